@@ -1,0 +1,127 @@
+"""What a fit ends in: posterior draws, parameters as people read them, diagnostics, verdicts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.verdicts import Verdict
+
+Effort = Literal["draft", "standard", "thorough"]
+Identifiability = Literal["identified", "weak", "prior_only"]
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter with its marginal posterior, in the unit that stands beside it.
+
+    ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
+    speak, near 1 the prior does.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+    identifiability: float
+    meaning: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give the parameter as the plain object that ``--json`` prints."""
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "mean": self.mean,
+            "sd": self.sd,
+            "q05": self.q05,
+            "q50": self.q50,
+            "q95": self.q95,
+            "identifiability": self.identifiability,
+        }
+
+
+@dataclass(frozen=True)
+class StrokeError:
+    """Error on one stroke by a fit that had not seen it.
+
+    ``rms`` and ``relative_rms`` (rms over the rms of what was measured) are taken on the
+    band-limited samples that the likelihood uses.
+    """
+
+    stroke: int
+    recording: str
+    kind: str
+    speed: float
+    rms: float
+    relative_rms: float
+
+
+@dataclass(frozen=True)
+class FitSeries:
+    """Band-limited data against the fitted model, for plots: all arrays have shape (n,).
+
+    ``time_s`` restarts at every recording; ``recording`` and ``stroke`` index what a point came
+    from. ``measured``, ``predicted``, ``band_low`` and ``band_high`` (5 % and 95 % of the
+    posterior of the mean) are torque in N m (force in N for a linear joint), signed as the
+    quantity that was fitted.
+    """
+
+    time_s: NDArray[np.float64]
+    recording: NDArray[np.int64]
+    stroke: NDArray[np.int64]
+    opening: NDArray[np.float64]
+    opening_rate: NDArray[np.float64]
+    contact: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    band_low: NDArray[np.float64]
+    band_high: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """The result of one fit: the same type for friction and for a cut.
+
+    ``what`` is "friction" or "cut". ``rung`` names the chosen law in words ("coulomb + viscous,
+    asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the law (read
+    back by the package compiler). ``draws`` has shape (draws, parameters) in SI, columns in the
+    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the rungs that
+    were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms`` and ``chosen``.
+    ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
+    ``inputs_hash`` identifies recordings, recipe and settings: equal hashes need no second fit.
+    """
+
+    what: Literal["friction", "cut"]
+    effort: Effort
+    rung: str
+    structure: Mapping[str, Any]
+    parameters: tuple[FittedParameter, ...]
+    draws: NDArray[np.float64]
+    map_point: NDArray[np.float64]
+    series: FitSeries
+    held_out: tuple[StrokeError, ...]
+    rungs: tuple[Mapping[str, Any], ...]
+    diagnostics: Mapping[str, Any]
+    verdicts: tuple[Verdict, ...]
+    effort_unit: str
+    position_unit: str
+    inputs_hash: str
+    sources: tuple[str, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    def parameter(self, name: str) -> FittedParameter:
+        """Return the parameter called ``name``; KeyError if this fit has none."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return the posterior draws of one parameter, shape (draws,)."""
+        names = [parameter.name for parameter in self.parameters]
+        return self.draws[:, names.index(name)]

@@ -1,0 +1,217 @@
+"""The recipe's schema: what a lab writes down about its rig, material and scene.
+
+Units stand in the keys, as people write them (millimetres, degrees); the properties that end in
+``_m`` or ``_rad`` give the same in SI for the rooms behind. Unknown keys and non-finite numbers
+are refused.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+FORMAT = "scissorcal-recipe/1"
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1)]
+Range = tuple[Finite, Finite]
+
+
+class Section(BaseModel):
+    """Base of every table of the recipe: frozen, strict about keys and numbers."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class LogNormalPrior(Section):
+    """A positive quantity, log-normal: ``median``, and the factor that holds 90 % of the belief.
+
+    ``{ median = 3000, factor_90 = 10 }`` says: between 300 and 30000 with 90 % probability.
+    """
+
+    median: Positive
+    factor_90: Annotated[float, Field(gt=1, allow_inf_nan=False)]
+
+    @property
+    def log_sd(self) -> float:
+        return math.log(self.factor_90) / 1.6448536269514722
+
+
+class Edge(Section):
+    """The cutting edge e(s) of one blade in its own frame, until photographs give it.
+
+    ``line``: e = offset + s tan(taper). ``arc``: the same plus curvature s^2 / 2.
+    """
+
+    family: Literal["line", "arc"] = "line"
+    offset_mm: Finite
+    taper_deg: Finite
+    curvature_per_m: Finite = 0.0
+    length_mm: Positive
+
+    @model_validator(mode="after")
+    def _curvature_needs_arc(self) -> Edge:
+        if self.family == "line" and self.curvature_per_m != 0.0:
+            raise ValueError('curvature_per_m needs family = "arc"')
+        return self
+
+
+class Control(Section):
+    """Gains by which a motor-driven capture tracks its trajectory."""
+
+    opening_kp_Nm_per_rad: Positive = 6.0
+    opening_kd_Nm_s_per_rad: NonNegative = 0.06
+    opening_ki_Nm_per_rad_s: NonNegative = 20.0
+    advance_kp_N_per_m: Positive = 3000.0
+    advance_kd_N_s_per_m: NonNegative = 40.0
+    advance_ki_N_per_m_s: NonNegative = 10000.0
+
+
+class Rig(Section):
+    """The device: which blades move, the handle, and the blade."""
+
+    joint: Literal["rotary", "linear"] = "rotary"
+    moving: Literal["both", "upper"] = "both"
+    handle_radius_mm: Positive = 60.0
+    edge: Edge
+    control: Control = Control()
+
+    @property
+    def moving_blades(self) -> int:
+        return 2 if self.moving == "both" else 1
+
+
+class Material(Section):
+    """The plate that is cut or pressed. Its near edge is the zero of ``advance``."""
+
+    name: str
+    thickness_mm: Positive
+    sheet_length_mm: Positive = 200.0
+
+
+class Scene(Section):
+    """What is rendered, over which ranges, how fast and how well."""
+
+    cut: bool = True
+    render: tuple[Literal["torque", "handle_force", "translation_force"], ...] = ("torque",)
+    render_friction: bool = True
+    closure: Literal["work", "eq4"] = "work"
+    opening_deg: Range
+    opening_rate_rad_per_s: Range
+    contact_mm: Range
+    loop_rate_Hz: Positive = 1000.0
+    tolerance_percent: Positive = 7.0
+    confidence_percent: Annotated[float, Field(gt=50, lt=100)] = 95.0
+
+    @model_validator(mode="after")
+    def _ranges_ascend(self) -> Scene:
+        for name in ("opening_deg", "opening_rate_rad_per_s", "contact_mm"):
+            low, high = getattr(self, name)
+            if not 0 <= low < high:
+                raise ValueError(f"{name} must be [low, high] with 0 <= low < high")
+        return self
+
+    @property
+    def opening_rad(self) -> tuple[float, float]:
+        low, high = self.opening_deg
+        return math.radians(low), math.radians(high)
+
+    @property
+    def contact_m(self) -> tuple[float, float]:
+        low, high = self.contact_mm
+        return low * 1e-3, high * 1e-3
+
+
+class Limits(Section):
+    """What the loop never exceeds, whatever the model says."""
+
+    torque_Nm: Positive = 1.0
+    torque_slew_Nm_per_s: Positive = 200.0
+    force_N: Positive = 30.0
+    force_slew_N_per_s: Positive = 5000.0
+    engagement_ramp_s: Positive = 0.5
+
+
+class CaptureFriction(Section):
+    """Empty closing and opening at several speeds, then excited motion for the inertia."""
+
+    speeds_rad_per_s: tuple[Positive, ...] = (0.05, 0.12, 0.3, 0.7, 1.5)
+    repeats: Count = 2
+    excitation_s: Positive = 10.0
+
+
+class CaptureCut(Section):
+    """Strokes through fresh material at stated speeds, or presses where nothing is cut."""
+
+    speeds_rad_per_s: tuple[Positive, ...] = (0.1, 0.25, 0.6)
+    strokes_per_sheet: Count = 4
+    sheets: Count = 3
+
+
+class Capture(Section):
+    friction: CaptureFriction = CaptureFriction()
+    cut: CaptureCut = CaptureCut()
+
+
+class FitFriction(Section):
+    """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both."""
+
+    rung: Literal["auto", "coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"] = "auto"
+    symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
+    cutoff_Hz: Positive = 100.0
+
+
+class FitCut(Section):
+    """Families of the response and of fracture; "auto" compares them."""
+
+    response: Literal["auto", "power", "exponential"] = "auto"
+    fracture: Literal["auto", "smooth", "rippled"] = "auto"
+    reference_indentation_mm: Positive = 0.3
+    response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
+    response_exponent: LogNormalPrior = LogNormalPrior(median=1.5, factor_90=3.0)
+    toughness_J_per_m2: LogNormalPrior | None = None
+
+
+class Fit(Section):
+    effort: Literal["draft", "standard"] = "standard"
+    friction: FitFriction = FitFriction()
+    cut: FitCut = FitCut()
+
+
+class Recipe(Section):
+    """A whole recipe. ``format`` names the schema's version."""
+
+    format: Literal["scissorcal-recipe/1"]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    description: str = ""
+    specimen: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")] | None = None
+    rig: Rig
+    material: Material
+    scene: Scene
+    limits: Limits = Limits()
+    capture: Capture = Capture()
+    fit: Fit = Fit()
+
+    @model_validator(mode="after")
+    def _toughness_only_where_cut(self) -> Recipe:
+        if self.scene.cut and self.fit.cut.toughness_J_per_m2 is None:
+            raise ValueError(
+                "fit.cut.toughness_J_per_m2 is missing: a scene that cuts needs a prior for it, "
+                "for example { median = 3000, factor_90 = 10 }"
+            )
+        if not self.scene.cut and self.fit.cut.toughness_J_per_m2 is not None:
+            raise ValueError(
+                "fit.cut.toughness_J_per_m2 is set, but scene.cut = false: nothing is cut, so "
+                "remove the prior or set scene.cut = true"
+            )
+        return self
+
+    @property
+    def upper_face_m(self) -> float:
+        """Height of the plate's upper face: h/2 where both blades move, h where one does."""
+        h = self.material.thickness_mm * 1e-3
+        return h / 2 if self.rig.moving == "both" else h

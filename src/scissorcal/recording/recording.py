@@ -1,0 +1,120 @@
+"""What a recording is, once it is in memory: arrays with time first, strokes, and provenance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Kind = Literal["friction", "cut", "render"]
+StrokeKind = Literal["closing", "opening", "excitation", "press"]
+
+SAMPLE_DTYPE = np.dtype(
+    [
+        ("sequence", "<u4"),
+        ("flags", "<u4"),
+        ("host_time_ns", "<i8"),
+        ("device_time_us", "<i8"),
+        ("opening", "<f8"),
+        ("advance", "<f8"),
+        ("motor_torque", "<f8"),
+        ("handle_force", "<f8"),
+        ("torque_command", "<f8"),
+        ("force_command", "<f8"),
+        ("stroke", "<i4"),
+        ("latency_ns", "<u4"),
+    ]
+)
+"""One sample as it stands in a recording and in the servo loop's ring: 80 bytes, little-endian.
+
+``device_time_us`` is unwrapped (it does not fall back after 2**32 us); ``stroke`` is the index into
+the recording's strokes, -1 between them; ``latency_ns`` runs from the state frame's arrival to the
+command's departure, 0 where no command was sent.
+"""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Whether the moving joint turns or slides, which fixes the units of its channels.
+
+    A rotary joint has radians and N m; a linear one metres and newtons.
+
+    >>> Joint("linear").effort_unit
+    'N'
+    """
+
+    kind: Literal["rotary", "linear"] = "rotary"
+
+    @property
+    def position_unit(self) -> str:
+        return "rad" if self.kind == "rotary" else "m"
+
+    @property
+    def effort_unit(self) -> str:
+        return "N m" if self.kind == "rotary" else "N"
+
+    @property
+    def inertia_unit(self) -> str:
+        return "kg m^2" if self.kind == "rotary" else "kg"
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One planned movement within a recording: its kind, nominal speed and sheet of material.
+
+    ``speed`` is the magnitude of the nominal rate (rad/s or m/s), NaN where the movement has no
+    single speed; ``sheet`` counts fresh pieces of material from 0, -1 where none is loaded.
+    """
+
+    index: int
+    kind: StrokeKind
+    speed: float = float("nan")
+    sheet: int = -1
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A capture or an import: samples, strokes, and where they come from.
+
+    ``samples`` has SAMPLE_DTYPE, shape (N,). For a linear joint ``opening`` holds metres and
+    ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
+    (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
+    SHA-256 of the file it was read from. ``notes`` are sentences about what reading had to do
+    (recovered tail, garbled frames, gaps), for the report.
+    """
+
+    kind: Kind
+    samples: NDArray[np.void]
+    strokes: tuple[Stroke, ...] = ()
+    joint: Joint = Joint()
+    handle_radius_m: float = float("nan")
+    device: Mapping[str, Any] = field(default_factory=dict)
+    recipe_toml: str = ""
+    source: str = ""
+    content_hash: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def device_time_s(self) -> NDArray[np.float64]:
+        """Device clock in seconds from the first sample, shape (N,)."""
+        ticks = self.samples["device_time_us"]
+        return (ticks - ticks[0]) * 1e-6 if len(ticks) else np.zeros(0)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the recording on the device clock, in seconds."""
+        time = self.device_time_s
+        return float(time[-1]) if len(time) else 0.0
+
+    @property
+    def drive_effort(self) -> NDArray[np.float64]:
+        """Torque (or force) that drives the joint: motor minus handle_radius times handle force.
+
+        Opening is positive; a hand that closes the handles gives a positive handle force.
+        """
+        motor: NDArray[np.float64] = np.asarray(self.samples["motor_torque"], dtype=np.float64)
+        hand = np.asarray(self.samples["handle_force"], dtype=np.float64)
+        if np.isnan(self.handle_radius_m):
+            return motor
+        return motor - self.handle_radius_m * hand
