@@ -1,0 +1,19 @@
+"""Posteriors of any model: optimum, curvature, autocorrelation, importance sampling."""
+
+from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
+from scissorcal.inference.curvature import gradient, hessian
+from scissorcal.inference.infer import Posterior, infer
+from scissorcal.inference.optimise import Optimum, find_optimum
+from scissorcal.inference.problem import Problem
+
+__all__ = [
+    "Optimum",
+    "Posterior",
+    "Problem",
+    "find_optimum",
+    "gradient",
+    "hessian",
+    "infer",
+    "ljung_box",
+    "robust_covariance_of_scores",
+]

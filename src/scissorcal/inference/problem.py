@@ -1,0 +1,42 @@
+"""What a fit hands to inference: a log-prior and the terms of a log-likelihood, over R^p."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A posterior over unconstrained parameters, shape (p,).
+
+    ``log_prior`` gives one number. ``log_likelihood_terms`` gives one number per observation,
+    shape (n,), in order of time; ``series`` (n,) names the uninterrupted series that each
+    observation belongs to, so that autocorrelation is never taken across a gap. ``prior_sd`` (p,)
+    is the size of each parameter before data. ``starts`` (k, p) are where the search begins; each
+    must have a finite posterior. ``lower`` and ``upper`` (p,) bound the search.
+    """
+
+    names: tuple[str, ...]
+    log_prior: Callable[[Array], float]
+    log_likelihood_terms: Callable[[Array], Array]
+    series: NDArray[np.int64]
+    prior_sd: Array
+    starts: Array
+    lower: Array
+    upper: Array
+
+    def log_likelihood(self, point: Array) -> float:
+        """Sum of the likelihood's terms; -inf where any of them is not finite."""
+        total = float(np.sum(self.log_likelihood_terms(point)))
+        return total if np.isfinite(total) else -np.inf
+
+    def log_posterior(self, point: Array) -> float:
+        """Log-posterior up to a constant; -inf outside the bounds or where it is not finite."""
+        if np.any(point < self.lower) or np.any(point > self.upper):
+            return -np.inf
+        prior = float(self.log_prior(point))
+        return prior + self.log_likelihood(point) if np.isfinite(prior) else -np.inf

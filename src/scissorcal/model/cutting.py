@@ -1,0 +1,157 @@
+"""Cutting: where the crack tip settles, and the torque that the blades feel there."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.model.edge import Edge, edge_height
+from scissorcal.model.response import Response
+
+Array = NDArray[np.float64]
+
+SETTLING_STEPS = 40
+STEEPEST_START = 1e-9
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """Everything that fixes the torque of a cut.
+
+    ``moving_blades`` is 1 or 2, ``upper_face_m`` the plate's upper face y_top, ``fracture_energy``
+    is J_c h in J per metre of cut (newtons), None where nothing is cut. ``kappa`` is the share of the
+    fracture energy at which a running crack stops: 1 is smooth, below 1 ripples. ``closure`` is
+    the torque's law: ``work`` derives from the stored energy, ``eq4`` is tau = x_c g cos(alpha).
+    """
+
+    edge: Edge
+    response: Response
+    moving_blades: int
+    upper_face_m: float
+    fracture_energy: float | Array | None
+    kappa: float | Array = 1.0
+    closure: Literal["work", "eq4"] = "work"
+
+
+def cut_torque(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
+    """Average torque with the crack tip at ``contact``, after the crack has settled.
+
+    Where the blades press harder than the material bears, the crack runs outwards first, so that
+    the result is the torque that is felt there on average. Torque in N m, positive as it
+    resists closing; ``opening`` (rad) and ``contact`` (m) broadcast.
+    """
+    theta = np.asarray(opening, dtype=np.float64)
+    x = np.asarray(contact, dtype=np.float64)
+    if cutting.fracture_energy is not None:
+        x = np.maximum(x, settled_contact(cutting, theta))
+    return torque_at(cutting, theta, x)
+
+
+def cut_torque_along(
+    cutting: Cutting, opening: Array, advance: Array, crack: float
+) -> tuple[Array, Array]:
+    """Average torque and crack tip along one motion, shape (N,) each.
+
+    ``opening`` (rad) and ``advance`` (m) are samples in order of time, ``crack`` the tip's place
+    in the plate (m) before. With kappa = 1 the tip is the running maximum of where it settles,
+    so that no step depends on the sampling; material once cut gives no torque again.
+    """
+    if cutting.fracture_energy is None:
+        tip = np.full(opening.shape, crack)
+    else:
+        settled = settled_contact(cutting, opening) + advance
+        tip = np.maximum(np.maximum.accumulate(settled), crack)
+    return torque_at(cutting, opening, tip - advance), tip
+
+
+def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
+    """Contact x_c at which the crack just stands: m g(delta) tan(psi) = mean fracture energy.
+
+    With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`ripple_moments`.
+    Solved along the edge by Newton steps on y(s) = y_top - delta_c(psi(s)), one step for a
+    straight edge. Where the edges are parallel or open towards the tip (tan(psi) <= 0) no force
+    along the cut arises, the crack cannot advance, and the result is -inf.
+    """
+    if cutting.fracture_energy is None:
+        raise ValueError("nothing is cut here: settled_contact needs a fracture energy")
+    theta = np.asarray(opening, dtype=np.float64)
+    beta = theta / cutting.moving_blades
+    sine, cosine = np.sin(beta), np.cos(beta)
+    edge = cutting.edge
+    energy = cutting.fracture_energy * _mean_share(cutting)
+    shape = np.broadcast_shapes(theta.shape, np.shape(energy))
+    station = np.full(shape, 0.5 * edge.length_m)
+    cuts = np.ones(shape, dtype=bool)
+    steps = 2 if edge.curvature_per_m == 0.0 else SETTLING_STEPS
+    for _ in range(steps):
+        taper = edge.slope_at(station)
+        slope = (sine + taper * cosine) / (cosine - taper * sine)
+        cuts = slope > STEEPEST_START
+        force = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
+        target = cutting.upper_face_m - cutting.response.indentation_at(force)
+        height = station * sine + edge.offset_at(station) * cosine
+        rise = np.where(cuts, sine + taper * cosine, 1.0)
+        step = np.where(cuts, (target - height) / rise, 0.0)
+        station = station + np.clip(step, -edge.length_m * 10, edge.length_m * 10)
+        if np.all(np.abs(step) < 1e-14):
+            break
+    x = station * cosine - edge.offset_at(station) * sine
+    return np.where(cuts, x, -np.inf)
+
+
+def torque_at(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
+    """Torque with the crack held at ``contact``: the response alone, whatever it bears.
+
+    ``work``: tau = g (x_c + phi tan(psi)), the gradient of the stored energy m * integral of g.
+    ``eq4``: tau = x_c g cos(alpha).
+    """
+    theta = np.asarray(opening, dtype=np.float64)
+    x = np.asarray(contact, dtype=np.float64)
+    reached = np.isfinite(x)
+    view = edge_height(cutting.edge, np.where(reached, x, 0.0), theta / cutting.moving_blades)
+    force = cutting.response.force_at(
+        np.where(reached, cutting.upper_face_m - view.height, -1.0)
+    )
+    if cutting.closure == "work":
+        return np.asarray(force * view.lever)
+    taper = cutting.edge.slope_at(view.station)
+    return np.asarray(force * x / np.sqrt(1.0 + taper**2))
+
+
+@dataclass(frozen=True)
+class RippleMoments:
+    """What fracture in steps does to the force, relative to its peak g_c at each place.
+
+    ``mean_share`` is the mean force over a cycle as a share of g_c, ``sd_share`` its standard
+    deviation, ``stroke_m`` the indentation that one cycle takes, in metres.
+    """
+
+    mean_share: Array
+    sd_share: Array
+    stroke_m: Array
+
+
+def ripple_moments(cutting: Cutting, peak_force: ArrayLike) -> RippleMoments:
+    """Mean, spread and length of a fracture cycle whose force peaks at ``peak_force`` (N).
+
+    Between two runs of the crack the indentation grows steadily from where g = kappa g_c to where
+    g = g_c, so that the moments are those of g under a uniform indentation between both.
+    """
+    peak = np.asarray(peak_force, dtype=np.float64)
+    response = cutting.response
+    low = response.indentation_at(cutting.kappa * peak)
+    high = response.indentation_at(peak)
+    length = high - low
+    smooth = length <= 1e-12 * high
+    safe = np.where(smooth, 1.0, length)
+    mean = np.where(smooth, peak, (response.energy_at(high) - response.energy_at(low)) / safe)
+    square = np.where(smooth, peak**2, response.mean_square_between(low, high))
+    spread = np.sqrt(np.maximum(square - mean**2, 0.0))
+    return RippleMoments(mean / peak, spread / peak, np.where(smooth, 0.0, length))
+
+
+def _mean_share(cutting: Cutting) -> Array:
+    if np.all(np.asarray(cutting.kappa) >= 1.0):
+        return np.asarray(1.0)
+    return ripple_moments(cutting, cutting.response.force).mean_share

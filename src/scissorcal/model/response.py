@@ -1,0 +1,95 @@
+"""The material's response g(delta): force at the edge against indentation."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+LARGEST_ARGUMENT = 700.0
+"""exp() overflows a float64 just above this; beyond it the exponential response is held."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """A response family with its two parameters, which may be arrays that broadcast.
+
+    Both families are written through ``force``, the force in newtons at the indentation
+    ``reference_m``, so that their parameters are nearly uncorrelated and mean the same:
+
+    * ``power``: g = force (delta / reference)^exponent
+    * ``exponential``: g = force (exp(b delta) - 1) / (exp(b reference) - 1), b = exponent / reference
+
+    For delta <= 0 there is no contact and no force.
+
+    >>> float(Response("power", force=2.0, exponent=1.5, reference_m=3e-4).force_at(3e-4))
+    2.0
+    """
+
+    family: Literal["power", "exponential"]
+    force: float | Array
+    exponent: float | Array
+    reference_m: float
+
+    def force_at(self, indentation: ArrayLike) -> Array:
+        """Force g in newtons, shape of the broadcast of ``indentation`` (m) and parameters."""
+        u = self._relative(indentation)
+        if self.family == "power":
+            with np.errstate(divide="ignore"):
+                return np.asarray(self.force * np.where(u > 0, u, 0.0) ** self.exponent)
+        return np.asarray(self.force * np.expm1(self._argument(u)) / np.expm1(self.exponent))
+
+    def energy_at(self, indentation: ArrayLike) -> Array:
+        """Stored energy, the integral of g from 0 to delta, in joules."""
+        u = self._relative(indentation)
+        if self.family == "power":
+            power = np.asarray(self.exponent) + 1.0
+            return np.asarray(self.force * self.reference_m * u**power / power)
+        argument = self._argument(u)
+        shape = (np.expm1(argument) - argument) / np.expm1(self.exponent)
+        return np.asarray(self.force * self.reference_m * shape / self.exponent)
+
+    def stiffness_at(self, indentation: ArrayLike) -> Array:
+        """Stiffness dg/d(delta) in N/m; infinite at 0+ for a power below one."""
+        u = self._relative(indentation)
+        inside = np.asarray(indentation) > 0
+        if self.family == "power":
+            with np.errstate(divide="ignore"):
+                grade = self.exponent * np.where(u > 0, u, 0.0) ** (np.asarray(self.exponent) - 1.0)
+        else:
+            grade = self.exponent * np.exp(self._argument(u)) / np.expm1(self.exponent)
+        return np.where(inside, self.force * grade / self.reference_m, 0.0)
+
+    def indentation_at(self, force: ArrayLike) -> Array:
+        """Indentation in metres at which the response reaches ``force`` >= 0 (the inverse of g)."""
+        ratio = np.maximum(np.asarray(force, dtype=np.float64), 0.0) / self.force
+        if self.family == "power":
+            return np.asarray(self.reference_m * ratio ** (1.0 / np.asarray(self.exponent)))
+        grown = np.log1p(ratio * np.expm1(self.exponent))
+        return np.asarray(self.reference_m * grown / self.exponent)
+
+    def mean_square_between(self, low: ArrayLike, high: ArrayLike) -> Array:
+        """Mean of g^2 over indentations uniform between ``low`` and ``high``, in N^2.
+
+        Needed for the strength of the fracture ripple; 16-point Gauss-Legendre, whose error is
+        below 1e-10 for every response within the range of one ripple cycle.
+        """
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        low, high = np.asarray(low)[..., None], np.asarray(high)[..., None]
+        points = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+        widened = Response(
+            self.family, _last_axis(self.force), _last_axis(self.exponent), self.reference_m
+        )
+        return np.asarray(0.5 * np.sum(weights * widened.force_at(points) ** 2, axis=-1))
+
+    def _relative(self, indentation: ArrayLike) -> Array:
+        return np.maximum(np.asarray(indentation, dtype=np.float64), 0.0) / self.reference_m
+
+    def _argument(self, relative: Array) -> Array:
+        return np.minimum(self.exponent * relative, LARGEST_ARGUMENT)
+
+
+def _last_axis(value: float | Array) -> float | Array:
+    return value[..., None] if isinstance(value, np.ndarray) and value.ndim else value
