@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
 FORMAT = "scissorcal-recipe/1"
 
@@ -18,13 +18,15 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
-Range = tuple[Finite, Finite]
+Range = Annotated[tuple[Finite, Finite], Strict(False)]
+Speeds = Annotated[tuple[Positive, ...], Strict(False), Field(min_length=1)]
+Rendered = Literal["torque", "handle_force", "translation_force"]
 
 
 class Section(BaseModel):
-    """Base of every table of the recipe: frozen, strict about keys and numbers."""
+    """Base of every table of the recipe: frozen, strict about keys, types and numbers."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class LogNormalPrior(Section):
@@ -49,7 +51,7 @@ class Edge(Section):
 
     family: Literal["line", "arc"] = "line"
     offset_mm: Finite
-    taper_deg: Finite
+    taper_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)]
     curvature_per_m: Finite = 0.0
     length_mm: Positive
 
@@ -97,7 +99,7 @@ class Scene(Section):
     """What is rendered, over which ranges, how fast and how well."""
 
     cut: bool = True
-    render: tuple[Literal["torque", "handle_force", "translation_force"], ...] = ("torque",)
+    render: Annotated[tuple[Rendered, ...], Strict(False), Field(min_length=1)] = ("torque",)
     render_friction: bool = True
     closure: Literal["work", "eq4"] = "work"
     opening_deg: Range
@@ -113,6 +115,8 @@ class Scene(Section):
             low, high = getattr(self, name)
             if not 0 <= low < high:
                 raise ValueError(f"{name} must be [low, high] with 0 <= low < high")
+        if self.opening_deg[1] > 180:
+            raise ValueError("opening_deg must not exceed 180: it is the angle between the blades")
         return self
 
     @property
@@ -139,7 +143,7 @@ class Limits(Section):
 class CaptureFriction(Section):
     """Empty closing and opening at several speeds, then excited motion for the inertia."""
 
-    speeds_rad_per_s: tuple[Positive, ...] = (0.05, 0.12, 0.3, 0.7, 1.5)
+    speeds_rad_per_s: Speeds = (0.05, 0.12, 0.3, 0.7, 1.5)
     repeats: Count = 2
     excitation_s: Positive = 10.0
 
@@ -147,7 +151,7 @@ class CaptureFriction(Section):
 class CaptureCut(Section):
     """Strokes through fresh material at stated speeds, or presses where nothing is cut."""
 
-    speeds_rad_per_s: tuple[Positive, ...] = (0.1, 0.25, 0.6)
+    speeds_rad_per_s: Speeds = (0.1, 0.25, 0.6)
     strokes_per_sheet: Count = 4
     sheets: Count = 3
 
@@ -200,8 +204,8 @@ class Recipe(Section):
     def _toughness_only_where_cut(self) -> Recipe:
         if self.scene.cut and self.fit.cut.toughness_J_per_m2 is None:
             raise ValueError(
-                "fit.cut.toughness_J_per_m2 is missing: a scene that cuts needs a prior for it, "
-                "for example { median = 3000, factor_90 = 10 }"
+                "fit.cut.toughness_J_per_m2 is missing: a scene that cuts (scene.cut = true) needs a "
+                "prior for it, for example { median = 3000, factor_90 = 10 }"
             )
         if not self.scene.cut and self.fit.cut.toughness_J_per_m2 is not None:
             raise ValueError(

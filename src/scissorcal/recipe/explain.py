@@ -1,0 +1,279 @@
+"""Say what is wrong with a recipe: line, key, what is allowed, and what was probably meant."""
+
+import difflib
+import json
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from scissorcal.recipe.locate import key_lines
+from scissorcal.recipe.units import conversion, split_unit
+
+Path = tuple[str | int, ...]
+
+_COMPARISONS = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+_EXPECTED = {
+    "float_type": "a number such as 0.1",
+    "int_type": "a whole number such as 3",
+    "bool_type": "true or false",
+    "string_type": 'text in quotes, such as "paper"',
+    "tuple_type": "a list such as [0.1, 0.5]",
+    "list_type": "a list such as [0.1, 0.5]",
+    "model_type": "a table, [name] with keys below it",
+    "dict_type": "a table, [name] with keys below it",
+}
+
+
+def explain(
+    error: ValidationError, document: Mapping[str, Any], text: str, model: type[BaseModel]
+) -> list[str]:
+    """Turn what pydantic found into sentences in the order of the file, each with its line.
+
+    A key that was written under another name (a wrong unit, a typo) is one mistake, not two: the
+    name that stands there is reported, the name that is therefore missing is not.
+    """
+    details = error.errors(include_url=False)
+    unknown = [_path(item) for item in details if item["type"] == "extra_forbidden"]
+    meant = {path: _suggest(path, model, document) for path in unknown}
+    excused = {(*path[:-1], key) for path, key in meant.items() if key is not None}
+    mistakes: list[tuple[Path, str]] = []
+    for item in details:
+        path = _path(item)
+        if item["type"] == "missing":
+            if path not in excused:
+                mistakes.append((path[:-1], _missing(path)))
+        elif item["type"] == "extra_forbidden":
+            mistakes.append((path, _unknown(path, meant[path], item["input"], model)))
+        elif item["type"] == "value_error":
+            mistakes.append(_broken_rule(path, item))
+        else:
+            fields = _fields(model, path)
+            mistakes.append((path, f"{dotted(path)}: {_wrong_value(item, fields)}"))
+    lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
+    return [
+        f"line {line}, {sentence}" if path and line else sentence
+        for line, (path, sentence) in sorted(
+            zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0
+        )
+    ]
+
+
+def dotted(path: Path) -> str:
+    """Write a path as people do: ``scene.contact_mm[1]``."""
+    words = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return words.lstrip(".")
+
+
+def _path(item: Any) -> Path:
+    return tuple(item["loc"])
+
+
+def _given(document: Any, path: Path) -> Path:
+    """Cut a path down to the part that the document really has (a scalar has no items)."""
+    for depth, key in enumerate(path):
+        try:
+            document = document[key]
+        except (KeyError, IndexError, TypeError):
+            return path[:depth]
+    return path
+
+
+def _missing(path: Path) -> str:
+    table = dotted(path[:-1])
+    if isinstance(path[-1], int):
+        return f"{table}: the list is too short; it needs {path[-1] + 1} numbers or more."
+    where = f"in [{table}]" if table else "at the top of the file"
+    return f"{dotted(path)} is missing: add {path[-1]} {where}."
+
+
+def _broken_rule(path: Path, item: Any) -> tuple[Path, str]:
+    """Place a rule between keys at the first key that its sentence names and the table has."""
+    reason = str(item["ctx"]["error"])
+    for word in reason.split():
+        inner = tuple(word.strip("(),:;").split("."))
+        if (path or len(inner) > 1) and _given(item["input"], inner) == inner:
+            place = (*path, *inner)
+            spoken = reason if word.startswith(dotted(place)) else f"{dotted(place)}: {reason}"
+            return place, f"{spoken}."
+    return path, f"{dotted(path)}: {reason}." if path else f"{reason}."
+
+
+def _wrong_value(item: Any, fields: Sequence[str]) -> str:
+    kind, given, context = item["type"], _show(item["input"]), item.get("ctx", {})
+    if kind == "finite_number":
+        return f"{given} is not a finite number; write the value, or leave the key out."
+    if kind in _COMPARISONS:
+        name, words = _COMPARISONS[kind]
+        return f"{given} must be {words} {context[name]:g}."
+    if kind == "literal_error":
+        return _choices(item["input"], context["expected"])
+    if kind == "string_pattern_mismatch":
+        return (
+            f"{given} has characters that a name must not have: use letters, digits, '.', '_' "
+            "and '-', at most 64, beginning with a letter or digit."
+        )
+    if kind in {"too_long", "too_short"}:
+        bound = context.get("max_length", context.get("min_length"))
+        words = "at most" if kind == "too_long" else "at least"
+        return f"{given} has {context['actual_length']} items, but {words} {bound} are allowed."
+    expected = _EXPECTED.get(kind)
+    if kind == "model_type" and fields:
+        expected = f"a table with the keys {', '.join(fields)}"
+    if expected is None:
+        return f"{given}: {item['msg']}."
+    return f"{given} is {_kind_of(item['input'])}, but this must be {expected}.{_unquote(item)}"
+
+
+def _unquote(item: Any) -> str:
+    if item["type"] not in {"float_type", "int_type"} or not isinstance(item["input"], str):
+        return ""
+    try:
+        number = float(item["input"])
+    except ValueError:
+        return ""
+    return f" Write {item['input'].strip()} without quotes." if math.isfinite(number) else ""
+
+
+def _choices(given: Any, expected: str) -> str:
+    allowed = [choice.strip("'") for choice in expected.replace(" or ", ", ").split(", ")]
+    close = difflib.get_close_matches(str(given), allowed, 1, 0.5)
+    listed = ", ".join(f'"{choice}"' for choice in allowed)
+    hint = f' Did you mean "{close[0]}"?' if close else ""
+    return f"{_show(given)} is not allowed here; allowed: {listed}.{hint}"
+
+
+def _unknown(path: Path, meant: str | None, value: Any, model: type[BaseModel]) -> str:
+    key, place = str(path[-1]), dotted(path)
+    if meant is None:
+        fields = _fields(model, path[:-1])
+        allowed = ", ".join(fields) if fields else "nothing"
+        table = _elsewhere(key, path, model)
+        return f"{place}: unknown key.{table} Allowed here: {allowed}."
+    hint = _conversion_hint(key, meant, value)
+    return f"{place}: unknown key. Did you mean {meant}?{hint}"
+
+
+def _elsewhere(key: str, path: Path, model: type[BaseModel]) -> str:
+    homes = [table for table in _tables(model) if key in _fields(model, table)]
+    homes = [table for table in homes if table != path[:-1]]
+    if len(homes) != 1:
+        return ""
+    return f" It belongs {'in [' + dotted(homes[0]) + ']' if homes[0] else 'at the top'}."
+
+
+def _suggest(path: Path, model: type[BaseModel], document: Any) -> str | None:
+    """Return the key that was probably meant: same stem in another unit, else a near spelling."""
+    key = str(path[-1])
+    present = document
+    for part in path[:-1]:
+        present = present[part]
+    fields = [name for name in _fields(model, path[:-1]) if name not in present]
+    stem, unit = split_unit(key)
+    for name in fields:
+        field_stem, field_unit = split_unit(name)
+        if field_unit is None or field_stem.lower() != stem.lower():
+            continue
+        if unit is None or conversion(unit, field_unit) is not None:
+            return name
+    stems = {split_unit(name)[0]: name for name in reversed(fields)}
+    close = difflib.get_close_matches(key, fields, 1, 0.75)
+    if not close and not any(name == key for name in fields):
+        close = [stems[match] for match in difflib.get_close_matches(stem, list(stems), 1, 0.75)]
+    return close[0] if close else None
+
+
+def _conversion_hint(key: str, meant: str, value: Any) -> str:
+    stem, source = split_unit(key)
+    meant_stem, target = split_unit(meant)
+    if target is None or stem.lower() != meant_stem.lower():
+        return ""
+    if source is None:
+        return f" The unit stands in the name: {target.label}."
+    factor = conversion(source, target)
+    if factor is None or factor == 1.0:
+        return ""
+    hint = f" 1 {source.label} = {factor:.6g} {target.label}"
+    converted = _converted(value, factor)
+    return hint + (f", so write {meant} = {converted}." if converted else ".")
+
+
+def _converted(value: Any, factor: float) -> str | None:
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        return f"{value * factor:.6g}"
+    if isinstance(value, list) and value:
+        parts = [_converted(item, factor) for item in value]
+        return None if None in parts else f"[{', '.join(str(part) for part in parts)}]"
+    if isinstance(value, Mapping) and "median" in value:
+        parts = [
+            _converted(item, factor if key == "median" else 1.0) for key, item in value.items()
+        ]
+        pairs = ", ".join(f"{key} = {part}" for key, part in zip(value, parts, strict=True))
+        return None if None in parts else f"{{ {pairs} }}"
+    return None
+
+
+def _fields(model: type[BaseModel], table: Path) -> list[str]:
+    inner = _table_model(model, table)
+    return list(inner.model_fields) if inner is not None else []
+
+
+def _table_model(model: type[BaseModel], table: Path) -> type[BaseModel] | None:
+    for key in table:
+        if isinstance(key, int) or key not in model.model_fields:
+            return None
+        inner = _model_within(model.model_fields[key].annotation)
+        if inner is None:
+            return None
+        model = inner
+    return model
+
+
+def _model_within(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
+        for member in typing.get_args(annotation):
+            found = _model_within(member)
+            if found is not None:
+                return found
+    return None
+
+
+def _tables(model: type[BaseModel], prefix: Path = ()) -> list[Path]:
+    tables: list[Path] = [prefix]
+    for name, field in model.model_fields.items():
+        inner = _model_within(field.annotation)
+        if inner is not None:
+            tables += _tables(inner, (*prefix, name))
+    return tables
+
+
+def _show(value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    try:
+        text = json.dumps(value, ensure_ascii=False)
+    except (TypeError, ValueError):
+        text = str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _kind_of(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, (int, float)):
+        return "a number"
+    if isinstance(value, str):
+        return "text"
+    if isinstance(value, Sequence):
+        return "a list"
+    return "a table" if isinstance(value, Mapping) else "a date or time"

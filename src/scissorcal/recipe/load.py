@@ -1,0 +1,117 @@
+"""Read a TOML file into a checked model, or say in whole sentences what is wrong with it."""
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.locate import broken_statement
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from scissorcal.recipe.schema import Recipe
+
+    Model = TypeVar("Model", bound=BaseModel)
+
+_LARGEST_FILE = 1_000_000
+
+
+def load_recipe(path: Path | str) -> "Recipe":
+    """Read and check a recipe file.
+
+    Raises InputError naming file, line, key, what is allowed and a suggestion, for every mistake
+    found; and InputError where the file cannot be read.
+
+    >>> from scissorcal.recipe.library import recipe_path
+    >>> load_recipe(recipe_path("paper-80gsm")).material.thickness_mm
+    0.1
+    """
+    from scissorcal.recipe.schema import Recipe
+
+    return load_toml(Path(path), Recipe)
+
+
+def parse_recipe(text: str, source: str = "recipe") -> "Recipe":
+    """Check a recipe given as text; ``source`` names it in messages."""
+    from scissorcal.recipe.schema import Recipe
+
+    return parse_toml(text, Recipe, source)
+
+
+def load_toml(path: Path, model: "type[Model]") -> "Model":
+    """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`."""
+    return parse_toml(read_text(path), model, str(path))
+
+
+def parse_toml(text: str, model: "type[Model]", source: str) -> "Model":
+    """Check TOML text against ``model``; mistakes raise InputError as in `load_recipe`."""
+    from pydantic import ValidationError
+
+    from scissorcal.recipe.explain import explain
+
+    document = _parse(text, source)
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        mistakes = explain(error, document, text, model)
+    raise InputError(_message(source, mistakes))
+
+
+def read_text(path: Path) -> str:
+    """Read a UTF-8 text file of a sane size, else raise InputError."""
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_FILE:
+            raise InputError(f"{path} has {size} bytes, too many for a recipe: is it another file?")
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist: check the path.") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}, byte {error.start}: this is not UTF-8 text; save the file as UTF-8."
+        ) from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _parse(text: str, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        reason = str(error)
+    except RecursionError:
+        reason = "tables or arrays are nested too deeply"
+    where, line = "", None
+    if "(at line " in reason:
+        reason, _, place = reason.partition(" (at line ")
+        number, _, column = place.rstrip(")").partition(", column ")
+        line = int(number)
+        where = f", line {number}, column {column}"
+    elif reason.endswith(" (at end of document)"):
+        reason = reason.removesuffix(" (at end of document)")
+        line = broken_statement(text)
+        where = f", in what begins on line {line}"
+    shown = text.splitlines()[line - 1].strip() if line and line <= len(text.splitlines()) else ""
+    seen = f' It reads: "{shown[:80]}".' if shown else ""
+    hint = _syntax_hint(shown)
+    raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{seen}{hint}")
+
+
+def _syntax_hint(line: str) -> str:
+    key, equals, value = line.partition("=")
+    if not equals and ":" in line:
+        return ' Write "key = value", with an equals sign.'
+    word = value.strip()
+    if word and word.split()[0] in {"True", "False"}:
+        return " Write true or false in lower case."
+    if word and not key.strip().startswith("[") and (word[0].isalpha() or "," in word):
+        return ' Text stands in quotes, numbers have a decimal point: name = "paper", x = 0.1.'
+    return ""
+
+
+def _message(source: str, mistakes: list[str]) -> str:
+    if len(mistakes) == 1:
+        return f"{source}, {mistakes[0]}"
+    lines = "".join(f"\n  {mistake}" for mistake in mistakes)
+    return f"{source} has {len(mistakes)} mistakes:{lines}"
