@@ -60,9 +60,7 @@ def infer(
     """
     tell = progress or (lambda done, sentence: None)
     tell(0.0, "searching the optimum")
-    best = optimum or find_optimum(
-        problem.log_posterior, problem.starts, 0.3 * problem.prior_sd, problem.lower, problem.upper
-    )
+    best = optimum or find_optimum(problem)
     tell(0.4, "measuring the curvature")
     scale = problem.prior_sd
     step = natural_step(problem.log_likelihood, best.point, 0.1 * scale)

@@ -1,10 +1,12 @@
 """Multistart search for the posterior's optimum, with an honest word on how it ended."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.inference.curvature import gradient
+from scissorcal.inference.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -14,12 +16,17 @@ WORST = 1e300
 SAME_OPTIMUM = 0.5
 """Two optima whose log-posteriors differ by less than this count as one."""
 
+SETTLED = 1e-3
+"""A round of search that gains less log-posterior than this has arrived."""
+
+ROUNDS = 12
+
 
 @dataclass(frozen=True)
 class Optimum:
     """The best point that any start led to.
 
-    ``success`` is true where the search met its tolerance and the point is better than its start;
+    ``success`` is true where the last round of search gained nothing that matters.
     ``sentence`` says how it ended and what to do. ``agreeing`` counts the starts that ended at
     the same height, ``starts`` all of them; ``evaluations`` counts calls of the objective.
     """
@@ -33,26 +40,17 @@ class Optimum:
     evaluations: int
 
 
-def find_optimum(
-    objective: Callable[[Array], float],
-    starts: Array,
-    step: Array,
-    lower: Array,
-    upper: Array,
-    *,
-    max_evaluations: int = 4000,
-) -> Optimum:
-    """Maximise ``objective`` from every row of ``starts`` with BOBYQA, polished with Subplex.
+def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
+    """Maximise a log-posterior from every row of ``starts`` (default: the problem's own).
 
-    ``starts`` (k, p); ``step``, ``lower`` and ``upper`` (p,). The best point ever seen is kept,
-    whatever code the library returns, since it reports rounding trouble at points that are solved
-    and success at points it never could evaluate (Powell 2009, BOBYQA, report DAMTP 2009/NA06).
-    Raises ValueError if the objective is finite at no start.
+    Each start is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06) in coordinates
+    that the scores' outer product makes round, until a round gains nothing: strongly correlated
+    parameters then cost no more than independent ones. The best point ever seen is kept, whatever
+    code the library returns, since it reports rounding trouble at points that are solved and
+    success at points it never could evaluate. Raises ValueError if no start is finite.
     """
-    runs = [
-        _climb(objective, start, step, lower, upper, max_evaluations)
-        for start in np.atleast_2d(starts)
-    ]
+    chosen = problem.starts if starts is None else starts
+    runs = [_climb(problem, start) for start in np.atleast_2d(chosen)]
     finite = [run for run in runs if np.isfinite(run.value)]
     if not finite:
         raise ValueError("The log-posterior is finite at no start; check the data for NaN.")
@@ -60,7 +58,7 @@ def find_optimum(
     agreeing = sum(run.value > best.value - SAME_OPTIMUM for run in finite)
     sentence = best.sentence
     if agreeing < len(runs):
-        sentence += f" {agreeing} of {len(runs)} starts ended there; the others ended lower."
+        sentence += f" {agreeing} of {len(runs)} starts ended there, the others lower."
     return Optimum(
         best.point,
         best.value,
@@ -72,51 +70,67 @@ def find_optimum(
     )
 
 
-def _climb(
-    objective: Callable[[Array], float],
-    start: Array,
-    step: Array,
-    lower: Array,
-    upper: Array,
-    max_evaluations: int,
-) -> Optimum:
+def _climb(problem: Problem, start: Array) -> Optimum:
+    point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
+    value = problem.log_posterior(point)
+    evaluations, gained = 1, np.inf
+    root = np.diag(0.2 * problem.prior_sd)
+    for number in range(ROUNDS):
+        if not np.isfinite(value):
+            break
+        reached, height, used = _round(problem, point, value, root)
+        evaluations += used
+        gained, point, value = height - value, reached, height
+        if gained < SETTLED and number > 0:
+            break
+        root, used = _rounding(problem, point)
+        evaluations += used
+    success = bool(np.isfinite(value) and gained < SETTLED)
+    sentence = (
+        "The search settled."
+        if success
+        else "The search was still climbing when its rounds were used up: record more varied "
+        "motion, or choose a simpler rung."
+    )
+    return Optimum(point, value, success, sentence, 1, 1, evaluations)
+
+
+def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[Array, float, int]:
     import nlopt
 
-    best_point, best_value, evaluations = np.array(start, dtype=np.float64), -np.inf, 0
+    best_point, best_value, evaluations = centre, value, 0
 
-    def seen(point: Array, gradient: Array) -> float:
+    def seen(z: Array, gradient: Array) -> float:
         nonlocal best_point, best_value, evaluations
         evaluations += 1
-        inside = np.clip(point, lower, upper)
-        value = objective(inside)
-        if value > best_value:
-            best_point, best_value = inside.copy(), value
-        return -value if np.isfinite(value) else WORST
+        wanted = centre + root @ z
+        inside = np.clip(wanted, problem.lower, problem.upper)
+        height = problem.log_posterior(inside)
+        if height > best_value:
+            best_point, best_value = inside, height
+        outside = float(np.sum(((wanted - inside) / problem.prior_sd) ** 2))
+        return -height + 1e4 * outside if np.isfinite(height) else WORST
 
-    first = objective(best_point)
-    ended = []
-    for algorithm in (nlopt.LN_BOBYQA, nlopt.LN_SBPLX):
-        search = nlopt.opt(algorithm, len(start))
-        search.set_min_objective(seen)
-        search.set_lower_bounds(lower)
-        search.set_upper_bounds(upper)
-        search.set_initial_step(np.minimum(step, 0.49 * (upper - lower)))
-        search.set_ftol_abs(1e-6)
-        search.set_xtol_abs(1e-5 * step)
-        search.set_maxeval(max_evaluations)
-        try:
-            search.optimize(np.clip(best_point, lower, upper))
-            ended.append(search.last_optimize_result())
-        except nlopt.RoundoffLimited:
-            ended.append(nlopt.ROUNDOFF_LIMITED)
-        step = 0.02 * step
-        max_evaluations = min(max_evaluations, 60 * len(start))
-    cut_short = ended[0] == nlopt.MAXEVAL_REACHED
-    success = np.isfinite(best_value) and (best_value > first or not cut_short) and not cut_short
-    sentence = (
-        "The search met its tolerance."
-        if success
-        else "The search used up its evaluations before it met its tolerance: "
-        "record more varied motion, or start it nearer by hand."
-    )
-    return Optimum(best_point, best_value, bool(success), sentence, 1, 1, evaluations)
+    size = len(centre)
+    search = nlopt.opt(nlopt.LN_BOBYQA, size)
+    search.set_min_objective(seen)
+    search.set_lower_bounds(np.full(size, -1e3))
+    search.set_upper_bounds(np.full(size, 1e3))
+    search.set_initial_step(np.ones(size))
+    search.set_ftol_abs(0.1 * SETTLED)
+    search.set_maxeval(25 * size)
+    try:
+        search.optimize(np.zeros(size))
+    except nlopt.RoundoffLimited:
+        return best_point, best_value, evaluations
+    return best_point, best_value, evaluations
+
+
+def _rounding(problem: Problem, point: Array) -> tuple[Array, int]:
+    """Root of the covariance that the scores suggest, for rounder coordinates."""
+    step = 1e-4 * problem.prior_sd
+    scores = gradient(problem.log_likelihood_terms, point, step)
+    scaled = scores * problem.prior_sd
+    information = scaled.T @ scaled + np.eye(len(point))
+    values, vectors = np.linalg.eigh(information)
+    return problem.prior_sd[:, None] * vectors / np.sqrt(values), 4 * len(point)

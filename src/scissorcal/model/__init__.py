@@ -6,6 +6,7 @@ from scissorcal.model.cutting import (
     cut_torque_along,
     ripple_moments,
     settled_contact,
+    torque_spread_along,
 )
 from scissorcal.model.edge import Edge, EdgeView, edge_height
 from scissorcal.model.friction import FrictionLaw, friction_torque
@@ -23,4 +24,5 @@ __all__ = [
     "friction_torque",
     "ripple_moments",
     "settled_contact",
+    "torque_spread_along",
 ]

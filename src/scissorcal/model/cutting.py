@@ -79,8 +79,8 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     beta = theta / cutting.moving_blades
     sine, cosine = np.sin(beta), np.cos(beta)
     edge = cutting.edge
-    energy = cutting.fracture_energy * _mean_share(cutting)
-    shape = np.broadcast_shapes(theta.shape, np.shape(energy))
+    energy = np.asarray(cutting.fracture_energy)
+    shape = np.broadcast_shapes(theta.shape, energy.shape, np.shape(cutting.kappa))
     station = np.full(shape, 0.5 * edge.length_m)
     cuts = np.ones(shape, dtype=bool)
     steps = 2 if edge.curvature_per_m == 0.0 else SETTLING_STEPS
@@ -88,7 +88,8 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
         taper = edge.slope_at(station)
         slope = (sine + taper * cosine) / (cosine - taper * sine)
         cuts = slope > STEEPEST_START
-        force = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
+        peak = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
+        force = peak * _mean_share(cutting, peak)
         target = cutting.upper_face_m - cutting.response.indentation_at(force)
         height = station * sine + edge.offset_at(station) * cosine
         rise = np.where(cuts, sine + taper * cosine, 1.0)
@@ -110,9 +111,7 @@ def torque_at(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array
     x = np.asarray(contact, dtype=np.float64)
     reached = np.isfinite(x)
     view = edge_height(cutting.edge, np.where(reached, x, 0.0), theta / cutting.moving_blades)
-    force = cutting.response.force_at(
-        np.where(reached, cutting.upper_face_m - view.height, -1.0)
-    )
+    force = cutting.response.force_at(np.where(reached, cutting.upper_face_m - view.height, -1.0))
     if cutting.closure == "work":
         return np.asarray(force * view.lever)
     taper = cutting.edge.slope_at(view.station)
@@ -151,7 +150,42 @@ def ripple_moments(cutting: Cutting, peak_force: ArrayLike) -> RippleMoments:
     return RippleMoments(mean / peak, spread / peak, np.where(smooth, 0.0, length))
 
 
-def _mean_share(cutting: Cutting) -> Array:
-    if np.all(np.asarray(cutting.kappa) >= 1.0):
+def torque_spread_along(
+    cutting: Cutting, opening: Array, rate: Array, contact: Array, window_s: float
+) -> Array:
+    """Standard deviation that the ripple leaves in torque averaged over a window, shape (N,).
+
+    Between runs of the crack the force climbs as a saw-tooth. A moving average over r periods
+    leaves of a saw-tooth's variance the share rho^2 (1 - rho)^2 / r^2 with rho = r mod 1, from
+    the autocovariance of its Fourier series; r is the window times the rate at which the edge
+    sinks in, over the indentation that one cycle takes. N m, before it is known whether the
+    crack advances at all.
+    """
+    slope, lever = _slope_and_lever(cutting, opening, contact)
+    cuts = slope > STEEPEST_START
+    peak = np.asarray(cutting.fracture_energy) / (
+        cutting.moving_blades * np.where(cuts, slope, 1.0)
+    )
+    moments = ripple_moments(cutting, peak)
+    sinking = np.abs(rate) * np.abs(lever) / cutting.moving_blades
+    periods = np.maximum(window_s * sinking / np.maximum(moments.stroke_m, 1e-15), 1e-9)
+    part = periods % 1.0
+    kept = np.where(periods < 1.0, 1.0 - periods, part * (1.0 - part) / periods)
+    return np.where(cuts, moments.sd_share * peak * np.abs(lever) * kept, 0.0)
+
+
+def _slope_and_lever(cutting: Cutting, opening: Array, contact: Array) -> tuple[Array, Array]:
+    reached = np.where(np.isfinite(contact), contact, 0.0)
+    view = edge_height(cutting.edge, reached, opening / cutting.moving_blades)
+    return view.slope, view.lever
+
+
+def _mean_share(cutting: Cutting, peak: Array) -> Array:
+    kappa = np.asarray(cutting.kappa)
+    if np.all(kappa >= 1.0):
         return np.asarray(1.0)
-    return ripple_moments(cutting, cutting.response.force).mean_share
+    response = cutting.response
+    low, high = response.indentation_at(kappa * peak), response.indentation_at(peak)
+    length = np.maximum(high - low, 1e-30)
+    mean = (response.energy_at(high) - response.energy_at(low)) / length
+    return np.where(high - low <= 1e-12 * high, 1.0, mean / peak)

@@ -1,0 +1,145 @@
+"""From a posterior and the ladder that was climbed to the result that people read."""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.ladder import Climbed, rung_table
+from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
+from scissorcal.calibration.trust import trust_verdicts
+from scissorcal.inference import Posterior, ljung_box
+from scissorcal.recording.recording import Joint, Recording
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+MOST_POINTS = 20000
+BAND_DRAWS = 100
+
+
+def assemble(
+    *,
+    what: Literal["friction", "cut"],
+    effort: Effort,
+    posterior: Posterior,
+    climbed: list[Climbed],
+    chosen: Climbed,
+    structure: Mapping[str, Any],
+    bins: Bins,
+    strokes: Integers,
+    measured: Array,
+    contact: Array,
+    recordings: tuple[Recording, ...],
+    joint: Joint,
+    inputs_hash: str,
+    nuisance: tuple[str, ...],
+) -> FitResult:
+    """Put a finished fit into the form that reports, packages and files read.
+
+    ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
+    out of the parameter table. ``measured`` and ``contact`` are by bin (n,).
+    """
+    layout = chosen.rung.layout
+    likelihood = chosen.rung.likelihood
+    wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
+    natural = layout.columns(posterior.draws)
+    point = chosen.optimum.point
+    white = ljung_box(likelihood.standardised(point), bins.series)
+    held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
+    series = _series(chosen, posterior, bins, strokes, measured, contact)
+    parameters = tuple(layout.fitted(posterior.draws)[i] for i in wanted)
+    residuals = likelihood.residuals(point)
+    diagnostics = {
+        "k_hat": posterior.k_hat,
+        "effective_samples": posterior.effective,
+        "evaluations": chosen.optimum.evaluations + posterior.evaluations,
+        "observations": len(residuals),
+        "independent_share": white.share,
+        "whiteness_p": white.p_value,
+        "first_lag_autocorrelation": white.first_lag,
+        "largest_inflation": float(posterior.inflation.max()),
+        "residual_rms": float(np.sqrt(np.mean(residuals**2))),
+        "relative_error": float(np.linalg.norm(residuals) / np.linalg.norm(measured)),
+        "r_squared": float(1 - np.sum(residuals**2) / np.sum((measured - measured.mean()) ** 2)),
+        "starts_agreeing": f"{chosen.optimum.agreeing} of {chosen.optimum.starts}",
+        "search": chosen.optimum.sentence,
+        "rate_floor": bins.rate_floor,
+        "bin_s": bins.bin_s,
+        "noise": float(np.std(residuals)),
+    }
+    return FitResult(
+        what=what,
+        effort=effort,
+        rung=chosen.rung.name,
+        structure=structure,
+        parameters=parameters,
+        draws=natural[:, wanted],
+        map_point=layout.columns(point)[wanted],
+        series=series,
+        held_out=held_out,
+        rungs=rung_table(climbed, chosen),
+        diagnostics=diagnostics,
+        verdicts=trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance),
+        effort_unit=joint.effort_unit,
+        position_unit=joint.position_unit,
+        inputs_hash=inputs_hash,
+        sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
+        notes=tuple(note for recording in recordings for note in recording.notes),
+    )
+
+
+def _stroke_errors(
+    chosen: Climbed,
+    bins: Bins,
+    strokes: Integers,
+    measured: Array,
+    recordings: tuple[Recording, ...],
+) -> tuple[StrokeError, ...]:
+    planned = [stroke for recording in recordings for stroke in recording.strokes]
+    errors = []
+    for label in np.unique(strokes):
+        here = strokes == label
+        rms = float(np.sqrt(np.mean(chosen.held_out_residuals[here] ** 2)))
+        size = float(np.sqrt(np.mean(measured[here] ** 2)))
+        known = planned[label] if 0 <= label < len(planned) else None
+        errors.append(
+            StrokeError(
+                stroke=int(label),
+                recording=recordings[int(bins.recording[here][0])].source,
+                kind=known.kind if known else ("opening" if bins.rate[here][0] > 0 else "closing"),
+                speed=float(np.median(np.abs(bins.rate[here]))),
+                rms=rms,
+                relative_rms=rms / size if size > 0 else float("inf"),
+            )
+        )
+    return tuple(errors)
+
+
+def _series(
+    chosen: Climbed,
+    posterior: Posterior,
+    bins: Bins,
+    strokes: Integers,
+    measured: Array,
+    contact: Array,
+) -> FitSeries:
+    residuals = chosen.rung.likelihood.residuals
+    thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
+    every = max(1, len(posterior.draws) // BAND_DRAWS)
+    predictions = np.stack([measured - residuals(u) for u in posterior.draws[::every]])
+    low, high = np.quantile(predictions[:, thin], [0.05, 0.95], axis=0)
+    return FitSeries(
+        time_s=bins.time_s[thin],
+        recording=bins.recording[thin],
+        stroke=strokes[thin],
+        opening=bins.opening[thin],
+        opening_rate=bins.rate[thin],
+        contact=contact[thin],
+        measured=measured[thin],
+        predicted=(measured - residuals(chosen.optimum.point))[thin],
+        band_low=low,
+        band_high=high,
+    )

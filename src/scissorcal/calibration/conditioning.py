@@ -1,0 +1,182 @@
+"""From raw samples to band-limited bins: derivatives without phase, gaps respected."""
+
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+BIN_S = 0.005
+EDGE_SAMPLES = 50
+"""Samples left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
+
+GAP_FACTOR = 1.5
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Band-limited motion and drive in bins of a few milliseconds; all arrays (n,).
+
+    ``opening``, ``rate``, ``acceleration``, ``drive``, ``advance`` are means over a bin, in the
+    joint's SI units. ``moving`` is false where the rate's sign is not certain throughout the bin.
+    ``series`` numbers pieces without a gap, ``recording`` and ``stroke`` say what a bin came from
+    (stroke -1 between strokes, numbered across recordings), ``sheet`` which piece of material.
+    ``bin_s`` is the width of a bin, ``rate_floor`` the speed below which the sign is noise.
+    """
+
+    time_s: Array
+    opening: Array
+    rate: Array
+    acceleration: Array
+    drive: Array
+    advance: Array
+    moving: NDArray[np.bool_]
+    series: Integers
+    recording: Integers
+    stroke: Integers
+    sheet: Integers
+    bin_s: float
+    rate_floor: float
+
+    def where(self, keep: NDArray[np.bool_]) -> "Bins":
+        """Return the bins that ``keep`` selects."""
+        chosen = {
+            f.name: getattr(self, f.name)[keep]
+            for f in fields(self)
+            if isinstance(getattr(self, f.name), np.ndarray)
+        }
+        return Bins(**chosen, bin_s=self.bin_s, rate_floor=self.rate_floor)
+
+
+def condition(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Bins:
+    """Band-limit and bin recordings for a fit.
+
+    Position is low-passed forwards and backwards (4th-order Butterworth at ``cutoff_Hz``), rate and
+    acceleration are its central differences, the drive passes the same filter, and all are
+    averaged over bins of 5 ms (Janot, Gautier and Brunot 2019, the recipe of the EMPS benchmark,
+    with bins for its decimation). A jump of the device clock splits a recording; nothing
+    is interpolated across. Raises InputError where no piece is long enough.
+    """
+    if not recordings:
+        raise InputError("There is no recording to fit: capture or import one first.")
+    pieces: list[Bins] = []
+    stroke_offset = 0
+    for index, recording in enumerate(recordings):
+        for low, high in _pieces(recording):
+            pieces.append(
+                _bin_piece(recording, low, high, cutoff_Hz, index, stroke_offset, len(pieces))
+            )
+        stroke_offset += len(recording.strokes)
+    if not pieces:
+        names = ", ".join(recording.source or "recording" for recording in recordings)
+        raise InputError(
+            f"{names}: no stretch without gaps is longer than {4 * EDGE_SAMPLES} samples, "
+            "so no rate can be computed; record again without interruptions."
+        )
+    joined = {
+        f.name: np.concatenate([getattr(piece, f.name) for piece in pieces])
+        for f in fields(Bins)
+        if f.name not in ("bin_s", "rate_floor")
+    }
+    return Bins(
+        **joined,
+        bin_s=pieces[0].bin_s,
+        rate_floor=max(piece.rate_floor for piece in pieces),
+    )
+
+
+def _pieces(recording: Recording) -> list[tuple[int, int]]:
+    time = recording.device_time_s
+    if len(time) < 2:
+        return []
+    step = np.diff(time)
+    usual = float(np.median(step))
+    if usual <= 0:
+        raise InputError(
+            f"{recording.source or 'The recording'}: its clock does not advance; "
+            "check the time column or the device's clock."
+        )
+    breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
+    bounds = [0, *breaks.tolist(), len(time)]
+    return [(low, high) for low, high in pairwise(bounds) if high - low > 4 * EDGE_SAMPLES]
+
+
+def _bin_piece(
+    recording: Recording,
+    low: int,
+    high: int,
+    cutoff_Hz: float,
+    index: int,
+    stroke_offset: int,
+    number: int,
+) -> Bins:
+    from scipy.signal import butter, filtfilt
+
+    samples = recording.samples[low:high]
+    time = recording.device_time_s[low:high]
+    rate_Hz = (len(time) - 1) / (time[-1] - time[0])
+    numerator, denominator = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2))
+    position = np.asarray(samples["opening"], dtype=np.float64)
+    smooth = filtfilt(numerator, denominator, position)
+    drive = filtfilt(numerator, denominator, recording.drive_effort[low:high])
+    rate = _central(smooth, rate_Hz)
+    acceleration = _central(rate, rate_Hz)
+    floor = _rate_floor(position, cutoff_Hz, rate_Hz)
+    width = max(1, round(BIN_S * rate_Hz))
+    count = (len(time) - 2 * EDGE_SAMPLES) // width
+    kept = slice(EDGE_SAMPLES, EDGE_SAMPLES + count * width)
+
+    def binned(values: Array) -> Array:
+        return np.asarray(values[kept].reshape(count, width).mean(axis=1))
+
+    windows = rate[kept].reshape(count, width)
+    moving = (windows.min(axis=1) > floor) | (windows.max(axis=1) < -floor)
+    middle = np.arange(count) * width + EDGE_SAMPLES + width // 2
+    stroke = np.asarray(samples["stroke"], dtype=np.int64)
+    return Bins(
+        time_s=binned(time),
+        opening=binned(smooth),
+        rate=binned(rate),
+        acceleration=binned(acceleration),
+        drive=binned(drive),
+        advance=binned(np.asarray(samples["advance"], dtype=np.float64)),
+        moving=moving,
+        series=np.full(count, number),
+        recording=np.full(count, index),
+        stroke=np.where(stroke[middle] >= 0, stroke[middle] + stroke_offset, -1),
+        sheet=_sheets(recording)[low:high][middle],
+        bin_s=width / rate_Hz,
+        rate_floor=floor,
+    )
+
+
+def _central(values: Array, rate_Hz: float) -> Array:
+    return np.asarray(np.gradient(values) * rate_Hz)
+
+
+def _rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
+    """Three standard deviations of the rate that the encoder's steps alone would give."""
+    steps = np.abs(np.diff(position))
+    moved = steps[steps > 0]
+    if len(moved) == 0:
+        return 0.0
+    step = float(np.quantile(moved, 0.01))
+    share = min(2 * cutoff_Hz / rate_Hz, 1.0)
+    noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
+    return float(3 * noise)
+
+
+def _sheets(recording: Recording) -> Integers:
+    """Sheet in place at each sample: a stroke's own, held until the next stroke names another."""
+    stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
+    of_stroke = np.array([s.sheet for s in recording.strokes] + [-1], dtype=np.int64)
+    known = np.where(stroke >= 0, stroke, len(recording.strokes))
+    sheet = of_stroke[known]
+    last = np.maximum.accumulate(np.where(stroke >= 0, np.arange(len(stroke)), -1))
+    return np.where(last >= 0, sheet[np.maximum(last, 0)], -1)

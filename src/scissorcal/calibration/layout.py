@@ -1,0 +1,100 @@
+"""Parameters between people and the sampler: names, units, transforms, priors."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.result import FittedParameter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter with its prior: normal in u, where u = x, log(x) or log(x / (1 - x)).
+
+    ``mean`` and ``sd`` are the prior's in u.
+    """
+
+    name: str
+    unit: str
+    transform: Literal["identity", "log", "logit"]
+    mean: float
+    sd: float
+    meaning: str
+
+    def natural(self, u: Array) -> Array:
+        """Values in the parameter's own unit from unconstrained ones, any shape."""
+        if self.transform == "log":
+            return np.exp(u)
+        if self.transform == "logit":
+            return np.asarray(1.0 / (1.0 + np.exp(-u)))
+        return np.asarray(u)
+
+    def unconstrained(self, x: Array) -> Array:
+        """Unconstrained values from those in the parameter's unit, any shape."""
+        if self.transform == "log":
+            return np.log(x)
+        if self.transform == "logit":
+            return np.asarray(np.log(x) - np.log1p(-x))
+        return np.asarray(x)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """An ordered set of parameters."""
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def mean(self) -> Array:
+        return np.array([parameter.mean for parameter in self.parameters])
+
+    @property
+    def sd(self) -> Array:
+        return np.array([parameter.sd for parameter in self.parameters])
+
+    def natural(self, u: Array) -> dict[str, Array]:
+        """Values by name from unconstrained points of shape (..., p)."""
+        return {
+            parameter.name: parameter.natural(np.asarray(u[..., index]))
+            for index, parameter in enumerate(self.parameters)
+        }
+
+    def columns(self, u: Array) -> Array:
+        """Natural values in the layout's order, same shape (..., p) as ``u``."""
+        return np.stack(list(self.natural(u).values()), axis=-1)
+
+    def unconstrained(self, values: dict[str, float]) -> Array:
+        """An unconstrained point (p,) from values by name."""
+        return np.array(
+            [float(p.unconstrained(np.asarray(values[p.name]))) for p in self.parameters]
+        )
+
+    def fitted(self, u_draws: Array) -> tuple[FittedParameter, ...]:
+        """Summaries of posterior draws (n, p) as people read them."""
+        rows = []
+        for index, parameter in enumerate(self.parameters):
+            u = u_draws[:, index]
+            x = parameter.natural(u)
+            q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
+            rows.append(
+                FittedParameter(
+                    name=parameter.name,
+                    unit=parameter.unit,
+                    mean=float(x.mean()),
+                    sd=float(x.std(ddof=1)),
+                    q05=float(q05),
+                    q50=float(q50),
+                    q95=float(q95),
+                    identifiability=float(min(u.std(ddof=1) / parameter.sd, 1.0)),
+                    meaning=parameter.meaning,
+                )
+            )
+        return tuple(rows)
