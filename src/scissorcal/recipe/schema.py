@@ -204,8 +204,8 @@ class Recipe(Section):
     def _toughness_only_where_cut(self) -> Recipe:
         if self.scene.cut and self.fit.cut.toughness_J_per_m2 is None:
             raise ValueError(
-                "fit.cut.toughness_J_per_m2 is missing: a scene that cuts (scene.cut = true) needs a "
-                "prior for it, for example { median = 3000, factor_90 = 10 }"
+                "fit.cut.toughness_J_per_m2 is missing: a scene that cuts (scene.cut = true) "
+                "needs a prior for it, for example { median = 3000, factor_90 = 10 }"
             )
         if not self.scene.cut and self.fit.cut.toughness_J_per_m2 is not None:
             raise ValueError(

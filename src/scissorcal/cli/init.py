@@ -1,0 +1,41 @@
+"""``scissorcal init``"""
+
+from pathlib import Path
+
+import click
+
+from scissorcal.cli.output import Answer, command
+
+
+@click.command("init")
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--recipe",
+    default="paper-80gsm",
+    show_default=True,
+    help="A built-in recipe (paper-80gsm, cotton-cloth, press-only), or a recipe file (.toml).",
+)
+@command
+def init(folder: Path, recipe: str) -> Answer:
+    """Start a workspace in FOLDER from a recipe.
+
+    The recipe is copied to FOLDER/recipe.toml, to be edited: your rig, your material, your scene.
+
+    \b
+    Example:
+      $ scissorcal init my-paper --recipe paper-80gsm
+      my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.).
+      Edit my-paper/recipe.toml, then:
+        cd my-paper
+        scissorcal plan
+    """
+    from scissorcal.workday.workspace import create_workspace
+
+    workspace = create_workspace(folder, recipe)
+    loaded = workspace.recipe()
+    text = (
+        f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
+        f"Edit {folder / workspace.recipe_path.name}, then:\n  cd {folder}\n  scissorcal plan"
+    )
+    result = {"workspace": workspace.root, "recipe": loaded.name}
+    return Answer(result, text, files=[workspace.recipe_path])

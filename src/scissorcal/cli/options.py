@@ -1,0 +1,33 @@
+"""Options that several commands share."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+workspace_option: Decorator = click.option(
+    "--workspace",
+    "-w",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=None,
+    help="The workspace, or a folder in it; where you stand if not given.",
+)
+
+seed_option: Decorator = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of everything random, so that a run can be repeated.",
+)
+
+device_option: Decorator = click.option(
+    "--device",
+    required=True,
+    metavar="PORT|sim",
+    help='Serial port of the rig, such as /dev/ttyUSB0, or "sim" for a virtual one.',
+)

@@ -1,0 +1,107 @@
+"""What a scene requires: captures to take, fits to run, tables to build, and what is left out."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from scissorcal.recipe.schema import Recipe
+
+CaptureKind = Literal["friction", "cut"]
+FitKind = Literal["friction", "cut"]
+TableKind = Literal["edge", "response", "fracture", "friction"]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One thing that the scene needs or does without, and the reason in a sentence."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Everything that follows from a scene, in the order in which it is done.
+
+    ``left_out`` names what is neither asked for, nor fitted, nor shipped.
+    """
+
+    captures: tuple[Requirement, ...]
+    fits: tuple[Requirement, ...]
+    tables: tuple[Requirement, ...]
+    left_out: tuple[Requirement, ...]
+
+    def needs_capture(self, name: CaptureKind) -> bool:
+        return any(item.name == name for item in self.captures)
+
+    def needs_fit(self, name: FitKind) -> bool:
+        return any(item.name == name for item in self.fits)
+
+    def needs_table(self, name: TableKind) -> bool:
+        return any(item.name == name for item in self.tables)
+
+
+def requirements(recipe: Recipe) -> Requirements:
+    """Derive from a recipe what has to be captured, fitted and built.
+
+    A scene that renders no friction ships no friction table, and still captures and fits friction:
+    what the motor measures while it cuts is cutting *and* friction, so the response of the material
+    cannot be told from the friction of the pivot unless that is known from an empty stroke.
+    A scene that only presses needs neither toughness nor fracture. A linear joint carries no
+    blades: it has friction and inertia, and nothing is cut with it.
+
+    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> needs = requirements(builtin_recipe("press-only"))
+    >>> [item.name for item in needs.tables], [item.name for item in needs.left_out]
+    (['edge', 'response', 'friction'], ['fracture', 'translation force'])
+    """
+    if recipe.rig.joint == "linear":
+        return _linear_joint()
+    scene = recipe.scene
+    verb = "cut" if scene.cut else "pressed"
+    why_friction = (
+        "rendered, and taken off the torque measured with material between the blades"
+        if scene.render_friction
+        else "not rendered, but what is measured with material between the blades contains it"
+    )
+    tables = [
+        Requirement("edge", "where the blades touch the plate at each opening"),
+        Requirement("response", "force of the plate against indentation"),
+    ]
+    left_out = []
+    if scene.cut:
+        tables.append(Requirement("fracture", "when the crack advances (scene.cut = true)"))
+    else:
+        left_out.append(
+            Requirement("fracture", "nothing is cut (scene.cut = false): no toughness, no crack")
+        )
+    if scene.render_friction:
+        tables.append(Requirement("friction", "rendered (scene.render_friction = true)"))
+    else:
+        left_out.append(Requirement("friction table", "scene.render_friction = false"))
+    if "translation_force" not in scene.render:
+        left_out.append(
+            Requirement("translation force", 'scene.render does not name "translation_force"')
+        )
+    return Requirements(
+        captures=(
+            Requirement("friction", why_friction),
+            Requirement("cut", f"{recipe.material.name} is {verb} in this scene"),
+        ),
+        fits=(
+            Requirement("friction", why_friction),
+            Requirement("cut", "response and toughness" if scene.cut else "response only"),
+        ),
+        tables=tuple(tables),
+        left_out=tuple(left_out),
+    )
+
+
+def _linear_joint() -> Requirements:
+    why = "friction and inertia of the joint"
+    reason = "a linear joint carries no blades (rig.joint = linear)"
+    return Requirements(
+        captures=(Requirement("friction", why),),
+        fits=(Requirement("friction", why),),
+        tables=(),
+        left_out=tuple(Requirement(name, reason) for name in ("cut", "package")),
+    )

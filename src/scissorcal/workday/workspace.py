@@ -1,0 +1,118 @@
+"""A workspace: a folder with a recipe.toml, and where everything in it lies."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from scissorcal.errors import InputError, MissingError
+
+if TYPE_CHECKING:
+    from scissorcal.recipe.schema import Recipe
+
+RecordingKind = Literal["friction", "cut", "render"]
+FitKind = Literal["friction", "cut"]
+
+RECIPE_FILE = "recipe.toml"
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The file names of one workspace.
+
+    captures/<kind>-<UTC stamp>.mcap, fits/friction.nc and fits/cut.nc, report/report.html and
+    report/report.json, package/<recipe name>.zip, all below ``root``.
+    """
+
+    root: Path
+
+    @property
+    def recipe_path(self) -> Path:
+        return self.root / RECIPE_FILE
+
+    @property
+    def captures_dir(self) -> Path:
+        return self.root / "captures"
+
+    @property
+    def report_html(self) -> Path:
+        return self.root / "report" / "report.html"
+
+    @property
+    def report_json(self) -> Path:
+        return self.root / "report" / "report.json"
+
+    def recipe(self) -> "Recipe":
+        """Load the workspace's recipe; InputError where it is wrong."""
+        from scissorcal.recipe.load import load_recipe
+
+        return load_recipe(self.recipe_path)
+
+    def recordings(self, kind: RecordingKind) -> tuple[Path, ...]:
+        """Return the recordings of one kind, oldest first."""
+        return tuple(sorted(self.captures_dir.glob(f"{kind}-*.mcap")))
+
+    def new_recording(self, kind: RecordingKind, now: datetime | None = None) -> Path:
+        """Return a file name for a new recording that no file has yet; makes the folder."""
+        stamp = (now or datetime.now(UTC)).astimezone(UTC).strftime("%Y%m%dT%H%M%SZ")
+        self.captures_dir.mkdir(parents=True, exist_ok=True)
+        path = self.captures_dir / f"{kind}-{stamp}.mcap"
+        number = 1
+        while path.exists():
+            number += 1
+            path = self.captures_dir / f"{kind}-{stamp}-{number}.mcap"
+        return path
+
+    def fit_path(self, what: FitKind) -> Path:
+        return self.root / "fits" / f"{what}.nc"
+
+    def package_path(self, recipe: "Recipe") -> Path:
+        return self.root / "package" / f"{recipe.name}.zip"
+
+    def relative(self, path: Path) -> str:
+        """Name a file of the workspace as seen from its root."""
+        return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else str(path)
+
+
+def find_workspace(folder: Path | None = None) -> Workspace:
+    """Find the workspace that ``folder`` (or where you stand) lies in, looking upward.
+
+    Raises MissingError where no folder on the way up has a recipe.toml.
+    """
+    start = (folder or Path.cwd()).absolute()
+    for candidate in (start, *start.parents):
+        if (candidate / RECIPE_FILE).is_file():
+            return Workspace(candidate)
+    raise MissingError(
+        f"There is no {RECIPE_FILE} in {start} or above it, so this is no workspace: start one "
+        "with 'scissorcal init NAME --recipe paper-80gsm', or go into one."
+    )
+
+
+def create_workspace(folder: Path, recipe_name: str) -> Workspace:
+    """Make a workspace: the folder, and a copy of a built-in recipe (or of a recipe file) in it.
+
+    A copy of a file is checked before it is made. Raises InputError where the folder already
+    has a recipe, or the recipe is unknown or wrong.
+    """
+    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe.load import parse_recipe, read_text
+
+    workspace = Workspace(folder.absolute())
+    if workspace.recipe_path.exists():
+        raise InputError(
+            f"{workspace.recipe_path} is there already, and was left as it is: choose another "
+            "folder, or edit that recipe."
+        )
+    given = Path(recipe_name)
+    source = given if given.suffix == ".toml" else recipe_path(recipe_name)
+    text = read_text(source)
+    parse_recipe(text, str(source))
+    try:
+        workspace.root.mkdir(parents=True, exist_ok=True)
+        workspace.recipe_path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"{workspace.root} cannot be made into a workspace: {error.strerror}."
+        ) from None
+    return workspace
