@@ -1,0 +1,57 @@
+# Two commands do everything on a fresh machine: make demo, make test.
+# PYTHON chooses the interpreter (3.11 or newer): make test PYTHON=python3.12
+
+PYTHON ?= $(firstword $(foreach name,python3.13 python3.12 python3.11 python3,\
+	$(if $(shell $(name) -c 'import sys; sys.version_info >= (3, 11) and print(1)' 2>/dev/null),$(name))) python3)
+VENV := .venv
+RUN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch])
+PYTEST_ARGS ?=
+
+export PIP_DISABLE_PIP_VERSION_CHECK = 1
+
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check kernel setup clean
+
+demo: $(STAMP)
+	$(RUN)/scissorcal demo
+
+test: $(STAMP)
+	$(RUN)/pytest -m "not slow" $(PYTEST_ARGS)
+
+test-slow: $(STAMP)
+	$(RUN)/pytest -m slow $(PYTEST_ARGS)
+
+lint: $(STAMP)
+	$(RUN)/ruff check .
+
+format: $(STAMP)
+	$(RUN)/ruff format .
+	$(RUN)/ruff check --fix .
+
+format-check: $(STAMP)
+	$(RUN)/ruff format --check .
+
+types: $(STAMP)
+	$(RUN)/mypy
+
+schemas: $(STAMP)
+	$(RUN)/python -m scissorcal.workday.schemas --write
+
+schemas-check: $(STAMP)
+	$(RUN)/python -m scissorcal.workday.schemas --check
+
+setup kernel: $(STAMP)
+
+# The C core is built by the install itself; a changed source installs again.
+$(STAMP): pyproject.toml $(KERNEL)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "scissorcal needs Python 3.11 or newer; say which: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@test -x $(RUN)/python || $(PYTHON) -m venv $(VENV) || \
+	  { echo "Python's venv module is missing; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" wheel
+	$(RUN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist src/*.egg-info

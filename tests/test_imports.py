@@ -1,0 +1,143 @@
+"""Data flows one way: which room may import which, and what `scissorcal --help` may load."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import scissorcal
+
+PACKAGE = Path(scissorcal.__file__).parent
+LEAVES = {"errors", "verdicts"}
+LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
+MIDDLE = {"device", "calibration", "package", "render", "report"}
+MAY_IMPORT: dict[str, set[str]] = {
+    "errors": set(),
+    "verdicts": set(),
+    "kernel": set(),
+    "model": set(),
+    "inference": set(),
+    "recipe": set(),
+    "recording": {"recipe"},
+    "device": {"kernel", "recipe", "recording"},
+    "calibration": {"model", "inference", "recipe", "recording"},
+    "package": {"kernel", "model", "calibration", "recipe", "recording"},
+    "render": {"kernel", "device", "package", "recipe", "recording"},
+    "report": {"model", "calibration", "package", "recipe", "recording"},
+    "workday": LOWEST | MIDDLE,
+    "cli": LOWEST | MIDDLE | {"workday", "<root>"},
+    "<root>": {"package"},
+}
+ROOMS = set(MAY_IMPORT) - {"<root>"}
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(module: str) -> str:
+    """Name the room of a dotted module of this project; the package itself is "<root>"."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else "<root>"
+
+
+def module_of(path: Path) -> str:
+    parts = ("scissorcal", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports_of(source: str, package: str) -> Iterator[tuple[int, str, str | None]]:
+    """Yield line, module and name of every import at any depth of the code, functions included.
+
+    ``package`` is what relative imports start from. A module named in a string of the form
+    "module:name" (as lazily loaded commands are) counts as imported.
+    """
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name, None
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1]
+            parts = (above if node.level else []) + ([node.module] if node.module else [])
+            for alias in node.names:
+                if parts == ["scissorcal"] and alias.name in ROOMS:
+                    yield node.lineno, f"scissorcal.{alias.name}", None
+                else:
+                    yield node.lineno, ".".join(parts), alias.name
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            module, colon, name = node.value.partition(":")
+            if colon and module.startswith("scissorcal.") and name.isidentifier():
+                yield node.lineno, module, name
+
+
+def own_imports(path: Path) -> list[tuple[int, str, str | None]]:
+    module = module_of(path)
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    found = imports_of(path.read_text(encoding="utf-8"), package)
+    return [item for item in found if item[1].split(".")[0] == "scissorcal"]
+
+
+def test_every_room_has_a_rule() -> None:
+    rooms = {room_of(module_of(path)) for path in MODULES}
+    assert rooms <= set(MAY_IMPORT)
+    assert all("cli" not in allowed for allowed in MAY_IMPORT.values())
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_of)
+def test_imports_go_one_way(path: Path) -> None:
+    room = room_of(module_of(path))
+    allowed = MAY_IMPORT[room] | LEAVES | {room}
+    wrong = [
+        f"{path}:{line} imports {module}"
+        for line, module, name in own_imports(path)
+        if room_of(module) not in allowed and (module, name) != ("scissorcal", "__version__")
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_of)
+def test_no_private_name_crosses_a_wall(path: Path) -> None:
+    room = room_of(module_of(path))
+    wrong = [
+        f"{path}:{line} imports {name or ''} of {module}"
+        for line, module, name in own_imports(path)
+        if room_of(module) != room
+        and any(
+            part.startswith("_") and not part.startswith("__")
+            for part in (*module.split("."), name or "")
+        )
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_checker_sees_imports_inside_functions_relative_ones_and_strings() -> None:
+    source = (
+        "def f():\n"
+        "    from scissorcal.cli import main\n"
+        "    import scissorcal.device.link\n"
+        "    from scissorcal import render\n"
+        "    from ..report import build_report\n"
+        "    where = 'scissorcal.workday.plan:plan'\n"
+    )
+    assert sorted(imports_of(source, "scissorcal.model")) == [
+        (2, "scissorcal.cli", "main"),
+        (3, "scissorcal.device.link", None),
+        (4, "scissorcal.render", None),
+        (5, "scissorcal.report", "build_report"),
+        (6, "scissorcal.workday.plan", "plan"),
+    ]
+
+
+def test_help_loads_nothing_heavy() -> None:
+    program = (
+        "import sys\n"
+        "from scissorcal.cli.root import run\n"
+        "try:\n    run(['--help'])\n"
+        "except SystemExit as end:\n    assert end.code == 0, end.code\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mcap', 'matplotlib', 'cffi', 'serial'}\n"
+        "loaded = heavy & {name.partition('.')[0] for name in sys.modules}\n"
+        "sys.exit(f'loaded: {sorted(loaded)}' if loaded else 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "capture" in done.stdout
