@@ -38,4 +38,7 @@ class BuildWithData(build_py):
                     yield source, package / source.relative_to(ROOT)
 
 
-setup(cmdclass={"build_py": BuildWithData})
+setup(
+    cmdclass={"build_py": BuildWithData},
+    cffi_modules=["src/scissorcal/kernel/build_kernel.py:builder"],
+)

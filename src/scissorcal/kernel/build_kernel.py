@@ -1,0 +1,30 @@
+"""Builds the C core into ``scissorcal.kernel._kernel`` (cffi, API mode); setup.py names it.
+
+The declarations that cffi needs are the headers themselves, less their preprocessor lines, so that
+nothing is declared twice.
+"""
+
+from pathlib import Path
+
+from cffi import FFI
+
+C = Path("src/scissorcal/kernel/c")  # relative: setuptools refuses absolute source paths
+HEADERS = ("sc_wire.h",)
+
+
+def declarations() -> str:
+    """Give the headers' declarations without preprocessor lines, in order of dependence."""
+    text = "\n".join((C / header).read_text(encoding="utf-8") for header in HEADERS)
+    return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+
+
+builder = FFI()
+builder.cdef(declarations())
+builder.set_source(
+    "scissorcal.kernel._kernel",
+    "\n".join(f'#include "{header}"' for header in HEADERS),
+    sources=[str(source) for source in sorted(C.glob("*.c"))],
+    depends=[str(header) for header in sorted(C.glob("*.h"))],
+    include_dirs=[str(C)],
+    extra_compile_args=["-std=c99", "-O2", "-Wall", "-Wextra"],
+)
