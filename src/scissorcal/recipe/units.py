@@ -53,9 +53,8 @@ class Unit:
     @property
     def label(self) -> str:
         """The unit as people write it: ``N m s/rad`` for ``Nm_s_per_rad``."""
-        above, *below = f"_{self.name}".split("_per_")
-        words = [part.strip("_").replace("_", " ") for part in (above, *below)]
-        return "/".join([words[0] or "1", *words[1:]]).replace("Nm", "N m")
+        name = f"1_{self.name}" if self.name.startswith("per_") else self.name
+        return name.replace("_per_", "/").replace("_", " ").replace("Nm", "N m")
 
 
 def parse_unit(text: str) -> Unit | None:
@@ -69,12 +68,14 @@ def parse_unit(text: str) -> Unit | None:
     >>> parse_unit("cloth") is None
     True
     """
-    above, *below = f"_{text}".split("_per_")
-    if not above and not below:
-        return None
+    above, *below = text.split("_per_")
+    if above.startswith("per_"):
+        above, below = "", [above.removeprefix("per_"), *below]
     factor = 1.0
     powers: Counter[str] = Counter()
-    for sign, part in ((1, above[1:]), *((-1, piece) for piece in below)):
+    for sign, part in ((1, above), *((-1, piece) for piece in below)):
+        if not part and not (below and sign == 1):
+            return None
         for token in part.split("_") if part else ():
             symbol = token.rstrip("0123456789")
             power = sign * int(token[len(symbol) :] or 1)
