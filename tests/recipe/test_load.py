@@ -166,6 +166,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file() -> None:
         ("x = 0,1", "numbers have a decimal point"),
         ('a = 1\nb = """\nfoo', "in what begins on line 2"),
         ("[a]\nb = 1\nb = 2\n", "line 3"),
+        ("[a]\nb = 1\nb = 2\n", "It was given before; keep one of the two."),
         ("a = " + "[" * 5000, "nested too deeply"),
     ],
 )

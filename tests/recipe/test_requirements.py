@@ -29,7 +29,7 @@ def test_pressing_needs_neither_toughness_nor_fracture() -> None:
 
 
 def test_friction_that_is_not_rendered_is_fitted_but_not_shipped() -> None:
-    recipe = parse_recipe(PAPER.replace("cut = true", "cut = true\nrender_friction = false"))
+    recipe = parse_recipe(PAPER.replace("render_friction = true", "render_friction = false"))
     needs = requirements(recipe)
     assert needs.needs_capture("friction")
     assert needs.needs_fit("friction")

@@ -94,11 +94,13 @@ def _parse(text: str, source: str) -> dict[str, Any]:
         where = f", in what begins on line {line}"
     shown = text.splitlines()[line - 1].strip() if line and line <= len(text.splitlines()) else ""
     seen = f' It reads: "{shown[:80]}".' if shown else ""
-    hint = _syntax_hint(shown)
+    hint = _syntax_hint(shown, reason)
     raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{seen}{hint}")
 
 
-def _syntax_hint(line: str) -> str:
+def _syntax_hint(line: str, reason: str) -> str:
+    if "overwrite" in reason or "twice" in reason:
+        return " It was given before; keep one of the two."
     key, equals, value = line.partition("=")
     if not equals and ":" in line:
         return ' Write "key = value", with an equals sign.'
