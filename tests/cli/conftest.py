@@ -1,0 +1,59 @@
+"""Run the command line in this process and keep what it said."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from scissorcal.cli.root import run
+from scissorcal.recipe.library import schemas_dir
+
+
+@dataclass(frozen=True)
+class Said:
+    """Exit code and words of one run of the command line."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def envelope(self) -> dict[str, Any]:
+        """The one object on stdout, checked against its schema."""
+        (line,) = self.out.splitlines()
+        found: dict[str, Any] = json.loads(line)
+        schema = json.loads((schemas_dir() / "command.schema.json").read_text(encoding="utf-8"))
+        jsonschema.validate(found, schema)
+        assert found["ok"] == (self.code == 0)
+        return found
+
+
+Cli = Callable[..., Said]
+
+
+@pytest.fixture
+def cli(capsys: pytest.CaptureFixture[str]) -> Cli:
+    """Give a function that runs ``scissorcal`` with the given words."""
+
+    def call(*words: str | Path) -> Said:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            run([str(word) for word in words])
+        captured = capsys.readouterr()
+        assert isinstance(ended.value.code, int)
+        return Said(ended.value.code, captured.out, captured.err)
+
+    return call
+
+
+@pytest.fixture
+def workspace(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Make a workspace for paper and stand in it."""
+    folder = tmp_path / "paper"
+    assert cli("init", folder, "--recipe", "paper-80gsm").code == 0
+    monkeypatch.chdir(folder)
+    return folder

@@ -1,0 +1,170 @@
+"""Every command has help with an example, takes --json, and ends with the code it should."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+import scissorcal
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.root import scissorcal_command
+from scissorcal.errors import DeviceError, InputError, MissingError, ScissorcalError, VerdictError
+from scissorcal.verdicts import Verdict
+
+from .conftest import Cli
+
+
+def all_commands() -> Iterator[tuple[str, click.Command]]:
+    """Walk through all commands, groups left out."""
+    pending: list[tuple[str, click.Command]] = [("", scissorcal_command)]
+    while pending:
+        path, found = pending.pop()
+        if not isinstance(found, click.Group):
+            yield path, found
+            continue
+        context = click.Context(found)
+        for name in found.list_commands(context):
+            inner = found.get_command(context, name)
+            assert inner is not None
+            pending.append((f"{path} {name}".strip(), inner))
+
+
+COMMANDS = dict(all_commands())
+
+
+def test_the_day_is_there() -> None:
+    assert set(COMMANDS) >= {
+        "init",
+        "plan",
+        "capture friction",
+        "capture cut",
+        "import",
+        "export",
+        "recording show",
+        "fit",
+        "report",
+        "package build",
+        "package check",
+        "render",
+        "device simulate",
+        "device doctor",
+        "device list",
+        "demo",
+    }
+
+
+@pytest.mark.parametrize("path", COMMANDS)
+def test_help_has_an_example_with_output_and_json(path: str, cli: Cli) -> None:
+    said = cli(*path.split(), "--help")
+    assert said.code == 0
+    assert "--json" in said.out
+    lines = said.out.split("Example", 1)[1].splitlines()
+    calls = [index for index, line in enumerate(lines) if line.strip().startswith("$ scissorcal")]
+    assert calls, "no example"
+    assert any(
+        lines[index + 1].strip() and not lines[index + 1].strip().startswith("$") for index in calls
+    ), "no output in the example"
+
+
+def test_a_group_lists_its_commands_as_they_call_themselves() -> None:
+    assert isinstance(scissorcal_command, LazyGroup)
+    for name in scissorcal_command.lazy:
+        found = scissorcal_command.get_command(click.Context(scissorcal_command), name)
+        assert found is not None
+        assert found.name == name
+
+
+def test_version(cli: Cli) -> None:
+    assert scissorcal.__version__ in cli("--version").out
+
+
+@pytest.mark.parametrize(
+    "words", [["nope"], ["init"], ["init", "--nope"], ["fit", "colour"], ["capture", "cut"]]
+)
+def test_wrong_usage_is_two_and_still_one_object(words: list[str], cli: Cli) -> None:
+    plain = cli(*words)
+    assert plain.code == 2
+    assert plain.err
+    assert not plain.out
+    said = cli(*words, "--json")
+    assert said.code == 2
+    assert said.envelope["result"]["exit_code"] == 2
+    assert said.envelope["result"]["error"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "code"),
+    [
+        (ScissorcalError("Plain."), 1),
+        (InputError("File, line, mend."), 2),
+        (VerdictError("Failed."), 3),
+        (DeviceError("Unplugged."), 4),
+        (MissingError("Capture first."), 5),
+        (KeyError("colour"), 1),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_an_error_is_a_sentence_and_a_code(
+    raised: BaseException, code: int, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @click.command("broken")
+    @command
+    def broken() -> Answer:
+        raise raised
+
+    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: broken)
+    said = cli("broken")
+    assert said.code == code
+    assert "Traceback" not in said.err + said.out
+    assert said.err.startswith("Error: ")
+    envelope = cli("broken", "--json").envelope
+    assert envelope["result"]["exit_code"] == code
+    assert envelope["command"] == "broken"
+    if not isinstance(raised, KeyboardInterrupt):
+        assert "Traceback" in cli("broken", "--traceback").err
+
+
+def test_an_unexpected_failure_says_how_to_see_more(
+    cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @click.command("broken")
+    @command
+    def broken() -> Answer:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: broken)
+    said = cli("broken")
+    assert "ZeroDivisionError: division by zero" in said.err
+    assert "--traceback" in said.err
+
+
+def test_a_failed_verdict_is_three_and_prose_leaves_stdout_to_the_object(
+    cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = [
+        Verdict("fit.cut", "k-hat", "fail", 0.9, 0.7, "Far off."),
+        Verdict("fit.cut", "bounds", "not_evaluated", None, None, "No search."),
+    ]
+
+    @click.command("judged")
+    @command
+    def judged() -> Answer:
+        return Answer({"value": float("nan")}, "What it found.", verdicts, [Path("a.json")])
+
+    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: judged)
+    said = cli("judged")
+    assert said.code == 3
+    assert "What it found." in said.out
+    assert "FAIL  fit.cut  k-hat   Far off." in said.out
+    said = cli("judged", "--json")
+    assert said.code == 3
+    assert "What it found." in said.err
+    assert said.envelope["verdicts"][0]["status"] == "fail"
+    assert said.envelope["result"] == {"value": None}
+    assert said.envelope["files"] == ["a.json"]
+
+
+def test_tables_line_up() -> None:
+    assert table([["a", "long"], ["longer", "b"]]) == "a       long\nlonger  b"
