@@ -1,0 +1,333 @@
+"""The link to a rig: open a serial port or pseudo-terminal, shake hands, set values."""
+
+import itertools
+import math
+import os
+import secrets
+import select
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol, Self
+
+from scissorcal.device.ports import open_port
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import (
+    PROTOCOL_VERSION,
+    SCHEMA_HASH,
+    Config,
+    ConfigEcho,
+    ConfigKey,
+    ConfigStatus,
+    FrameDecoder,
+    Hello,
+    Identity,
+    Message,
+    State,
+    decode,
+    encode,
+)
+
+if TYPE_CHECKING:
+    import serial
+
+DEFAULT_BAUD = 921600
+CONFIGURE_ATTEMPTS = 5
+CONFIGURE_WAIT_S = 0.2
+HELLO_WAIT_S = 0.2
+READ_BYTES = 65536
+IDENTITY_TYPE = 0x11
+
+
+class Link(Protocol):
+    """What every way to a rig can do; see PortLink for a port, LockstepLink for virtual time."""
+
+    @property
+    def identity(self) -> Identity: ...
+
+    def configure(self, key: int, value: float) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def open_link(port: str, baud: int = DEFAULT_BAUD, timeout: float = 2.0) -> "PortLink":
+    """Open a port, throw away what waited in it, and ask the device who it is.
+
+    The port is locked against a second user. ``timeout`` (s) bounds the wait for the answer; a
+    device that needs longer to boot after its port is opened needs more. Raises DeviceError, with
+    what to do next, where the port is missing, busy or forbidden, where nothing answers, where
+    something else speaks there, and where the device's wire version or schema is another one.
+    """
+    link = PortLink(open_port(port, baud), port)
+    try:
+        link.shake_hands(timeout)
+    except BaseException:
+        link.close()
+        raise
+    return link
+
+
+class PortLink(AbstractContextManager["PortLink"]):
+    """A device on a serial port or pseudo-terminal that has answered the handshake."""
+
+    def __init__(self, port: "serial.Serial", name: str) -> None:
+        self.name = name
+        self.received = FrameDecoder()
+        self._port = port
+        self._identity: Identity | None = None
+        self._nonces = itertools.count(secrets.randbits(32))
+
+    @property
+    def identity(self) -> Identity:
+        """Who the device said it is."""
+        if self._identity is None:
+            raise DeviceError(f"{self.name}: the device has not been asked who it is.")
+        return self._identity
+
+    def fileno(self) -> int:
+        """Return the file descriptor, for the servo loop."""
+        return int(self._port.fileno())
+
+    def close(self) -> None:
+        """Close the port; a port that is gone already is no error."""
+        with suppress(OSError):
+            self._port.close()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def send(self, message: Message) -> None:
+        """Write one message whole. DeviceError if the port is gone or takes nothing for 1 s."""
+        data = encode(message)
+        while data:
+            try:
+                if not select.select([], [self.fileno()], [], 1.0)[1]:
+                    raise DeviceError(f"{self.name} takes no data: unplug and replug the device.")
+                data = data[os.write(self.fileno(), data) :]
+            except (OSError, ValueError) as error:
+                raise self._gone() from error
+
+    def receive(self, timeout: float) -> Iterator[Message]:
+        """Yield the messages that arrive within ``timeout`` seconds; unreadable ones are skipped.
+
+        Payloads of unknown type are dropped: a newer device may say more than this host knows.
+        """
+        for payload in self._payloads(timeout):
+            with suppress(ValueError):
+                yield decode(payload)
+
+    def configure(self, key: int, value: float) -> None:
+        """Set one value and wait for its echo; lost frames are sent again.
+
+        Raises DeviceError where the device does not know the key, refuses the value, holds
+        another value afterwards, or does not answer.
+        """
+        for _ in range(CONFIGURE_ATTEMPTS):
+            nonce = self._nonce()
+            self.send(Config(key, nonce, value))
+            for message in self.receive(CONFIGURE_WAIT_S):
+                if isinstance(message, ConfigEcho) and message.nonce == nonce:
+                    check_echo(self.name, message, key, value)
+                    return
+        raise DeviceError(
+            f"{self.name} did not confirm {_key_name(key)} = {value:g} in {CONFIGURE_ATTEMPTS} "
+            f"attempts ({self.received.garbled} frames arrived garbled): check the cable and the "
+            "baud rate."
+        )
+
+    def round_trip(self, timeout: float = 0.5) -> float:
+        """Seconds from HELLO to IDENTITY, the latency of port and device together; NaN if lost."""
+        nonce = self._nonce()
+        sent = time.perf_counter()
+        self.send(Hello(nonce))
+        for message in self.receive(timeout):
+            if isinstance(message, Identity) and message.nonce_echo == nonce:
+                return time.perf_counter() - sent
+        return math.nan
+
+    def state(self, timeout: float = 1.0) -> State:
+        """Return the next state the device sends (it must be streaming)."""
+        for message in self.receive(timeout):
+            if isinstance(message, State):
+                return message
+        raise DeviceError(
+            f"{self.name} answers, but sent no state for {timeout:g} s: restart the device."
+        )
+
+    def flush(self) -> None:
+        """Throw away what waits to be read and what has not been sent."""
+        import termios
+
+        with suppress(termios.error):
+            termios.tcflush(self.fileno(), termios.TCIOFLUSH)
+        while select.select([self.fileno()], [], [], 0)[0]:
+            if len(self._read()) < READ_BYTES:
+                break
+        self.received = FrameDecoder()
+
+    def shake_hands(self, timeout: float) -> None:
+        """Ask who is there until an answer with the right nonce comes, and check that it fits."""
+        self.flush()
+        deadline = time.monotonic() + timeout
+        frames, first = 0, b""
+        while time.monotonic() < deadline:
+            nonce = self._nonce()
+            self._write_delimiter()
+            self.send(Hello(nonce))
+            for payload in self._payloads(min(HELLO_WAIT_S, deadline - time.monotonic())):
+                frames += 1
+                first = first or payload[:8]
+                _refuse_other_version(self.name, payload)
+                with suppress(ValueError):
+                    message = decode(payload)
+                    if isinstance(message, Identity) and message.nonce_echo == nonce:
+                        self._identity = check_identity(self.name, message)
+                        return
+        raise self._no_identity(timeout, frames)
+
+    def _no_identity(self, timeout: float, frames: int) -> DeviceError:
+        heard = self.received.bytes_received
+        if heard == 0:
+            return DeviceError(
+                f"{self.name} is silent: {timeout:g} s after the question who it is, nothing has "
+                "arrived. Check that the rig is powered and that this is its port."
+            )
+        if frames == 0:
+            return DeviceError(
+                f"Something else speaks on {self.name}: {heard} bytes arrived and none made a "
+                "frame. Check the port and the baud rate (the device's, 921600 by default)."
+            )
+        return DeviceError(
+            f"{self.name} sends sound frames ({frames}) but does not say who it is: restart the "
+            "device, and check that its line towards it is connected."
+        )
+
+    def _payloads(self, timeout: float) -> Iterator[bytes]:
+        """Yield payloads until ``timeout``; one bunch that has arrived is always given whole."""
+        deadline = time.monotonic() + timeout
+        while True:
+            left = max(deadline - time.monotonic(), 0.0)
+            try:
+                ready = select.select([self.fileno()], [], [], left)[0]
+            except (OSError, ValueError) as error:
+                raise self._gone() from error
+            if not ready:
+                return
+            yield from self.received.feed(self._read())
+            if time.monotonic() > deadline:
+                return
+
+    def _read(self) -> bytes:
+        try:
+            data = os.read(self.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except (OSError, ValueError) as error:
+            raise self._gone() from error
+        if not data:
+            raise self._gone()
+        return data
+
+    def _write_delimiter(self) -> None:
+        """End whatever half a frame the device may still hold from an earlier talk."""
+        with suppress(BlockingIOError):
+            try:
+                os.write(self.fileno(), b"\0")
+            except BlockingIOError:
+                raise
+            except (OSError, ValueError) as error:
+                raise self._gone() from error
+
+    def _gone(self) -> DeviceError:
+        return DeviceError(
+            f"{self.name} went away: the device was unplugged or switched off. Plug it in and "
+            "start again."
+        )
+
+    def _nonce(self) -> int:
+        return next(self._nonces) & 0xFFFFFFFF
+
+    def __enter__(self) -> Self:
+        return self
+
+
+def check_identity(name: str, identity: Identity) -> Identity:
+    """Return an identity that this host can work with.
+
+    Raises DeviceError where version or schema differ, or where a limit is no number or empty.
+    """
+    if identity.schema_hash != SCHEMA_HASH:
+        raise DeviceError(
+            f"{name} speaks another wire schema: the device (firmware "
+            f"{identity.firmware_version}) has {identity.schema_hash:016x}, this scissorcal has "
+            f"{SCHEMA_HASH:016x}. Update the device's firmware to this scissorcal's "
+            "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
+        )
+    fields = (
+        "torque_limit",
+        "force_limit",
+        "opening_min",
+        "opening_max",
+        "advance_min",
+        "advance_max",
+        "opening_resolution",
+        "advance_resolution",
+        "handle_radius",
+    )
+    wrong = [field for field in fields if not math.isfinite(getattr(identity, field))]
+    if not identity.torque_limit > 0:
+        wrong.append("torque_limit")
+    if not identity.opening_min < identity.opening_max:
+        wrong.append("opening_min/opening_max")
+    if not identity.advance_min <= identity.advance_max:
+        wrong.append("advance_min/advance_max")
+    if identity.tick_us == 0:
+        wrong.append("tick_us")
+    if wrong:
+        raise DeviceError(
+            f"{name} states limits that cannot be right ({', '.join(dict.fromkeys(wrong))}): "
+            "correct its firmware's identity; no motor is moved before that."
+        )
+    return identity
+
+
+def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
+    """Raise DeviceError unless the echo says that the value asked for is in force."""
+    if echo.status == ConfigStatus.UNKNOWN_KEY:
+        raise DeviceError(
+            f"{name} does not know the setting {_key_name(key)}: update its firmware"
+            + (" (only a simulator has it)." if key >= 0x8000 else ".")
+        )
+    if echo.status != ConfigStatus.OK:
+        raise DeviceError(
+            f"{name} refused {_key_name(key)} = {value:g} (it holds {echo.value:g})"
+            + (
+                "; to take a fresh sheet the blades must stand open before it."
+                if key == ConfigKey.MATERIAL
+                else "."
+            )
+        )
+    if not math.isclose(echo.value, value, rel_tol=1e-6, abs_tol=1e-12):
+        raise DeviceError(
+            f"{name} confirmed {_key_name(key)} = {echo.value:g} where {value:g} was asked for: "
+            "its firmware is faulty."
+        )
+
+
+def _refuse_other_version(name: str, payload: bytes) -> None:
+    if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] != PROTOCOL_VERSION:
+        older = "the device's firmware" if payload[1] < PROTOCOL_VERSION else "scissorcal"
+        raise DeviceError(
+            f"{name} speaks wire protocol version {payload[1]}, this scissorcal version "
+            f"{PROTOCOL_VERSION}: update {older}."
+        )
+
+
+def _key_name(key: int) -> str:
+    return ConfigKey(key).name if key in list(ConfigKey) else f"0x{key:04x}"

@@ -1,0 +1,68 @@
+"""Serial ports and pseudo-terminals: open one for a rig, or say why that cannot be."""
+
+import errno
+import os
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from scissorcal.errors import DeviceError
+
+if TYPE_CHECKING:
+    import serial
+
+
+def open_port(port: str, baud: int) -> "serial.Serial":
+    """Open a port for one user alone, raw, without blocking, and without its adapter's delay.
+
+    Raises DeviceError, with what to do next, where it is missing, busy, forbidden or no port.
+    """
+    import serial
+
+    try:
+        opened = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True)
+    except (OSError, ValueError) as error:
+        raise DeviceError(_why_not_open(port, baud, error)) from error
+    # Adapters hold data back for up to 16 ms unless told not to; a pty has no such setting.
+    with suppress(ValueError, OSError, NotImplementedError, AttributeError):
+        opened.set_low_latency_mode(True)
+    os.set_blocking(opened.fileno(), False)
+    return opened
+
+
+def known_ports() -> tuple[str, ...]:
+    """Return the serial ports that this machine has now, sorted."""
+    from serial.tools import list_ports
+
+    return tuple(sorted(info.device for info in list_ports.comports()))
+
+
+def _why_not_open(port: str, baud: int, error: Exception) -> str:
+    number = _errno_of(error)
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        found = known_ports()
+        there = f"There are: {', '.join(found)}." if found else "This machine has none at all."
+        return f"There is no port {port}. {there} Plug the rig in, or use --device sim."
+    if number in (errno.EACCES, errno.EPERM):
+        return (
+            f"You may not open {port}: join the group that owns it (on most Linux systems "
+            "'sudo usermod -aG dialout $USER'), log in again, and retry."
+        )
+    if number in (errno.EBUSY, errno.EAGAIN):
+        return f"{port} is in use by another program: close that one first."
+    if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):
+        return f"{port} is no serial port, or cannot do {baud} baud: name the rig's port."
+    return f"{port} cannot be opened: {error}."
+
+
+def _errno_of(error: BaseException | None) -> int | None:
+    """Find the error number: pyserial keeps it, wraps it, or leaves it to what termios raised."""
+    while error is not None:
+        number: Any = getattr(error, "errno", None)
+        if number is None and error.args and isinstance(error.args[0], int):
+            number = error.args[0]
+        if isinstance(number, int):
+            return number
+        if "exclusively lock" in str(error):
+            return errno.EBUSY
+        error = error.__cause__ or error.__context__
+    return None
