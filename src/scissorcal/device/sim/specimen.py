@@ -6,16 +6,14 @@ model never does. Units stand in the keys; the properties that end in ``_m`` or 
 
 from __future__ import annotations
 
-import difflib
-import importlib.resources
 import math
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from scissorcal.errors import InputError
+from scissorcal.recipe.library import specimen_path
+from scissorcal.recipe.load import load_toml
 
 FORMAT = "scissorcal-specimen/1"
 
@@ -29,33 +27,15 @@ Range = tuple[Finite, Finite]
 def load_specimen(name_or_path: str | Path) -> Specimen:
     """Read a specimen by its name (``office-paper``) or from a file that ends in ``.toml``.
 
-    Raises InputError, with the file, the key and a suggestion, where it is missing or invalid.
+    Raises InputError, with the file, the line, the key and a suggestion, where it is missing or
+    invalid.
 
     >>> load_specimen("office-paper").material.response
     'power'
     """
-    path = _specimen_path(name_or_path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"The specimen {path} cannot be read: {error.strerror}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"The specimen {path} is not valid TOML: {error}.") from error
-    try:
-        return Specimen.model_validate(data)
-    except ValidationError as error:
-        raise InputError(_explain(path, error)) from error
-
-
-def specimen_names() -> tuple[str, ...]:
-    """Names of the specimens that come with scissorcal, sorted."""
-    return tuple(sorted(path.stem for path in specimens_dir().glob("*.toml")))
-
-
-def specimens_dir() -> Path:
-    """Folder of the specimens that come with scissorcal: in the wheel, or in the source tree."""
-    inside = Path(str(importlib.resources.files("scissorcal"))) / "recipes" / "specimens"
-    return inside if inside.is_dir() else Path(__file__).parents[4] / "recipes" / "specimens"
+    text = str(name_or_path)
+    path = Path(text) if text.endswith(".toml") else specimen_path(text)
+    return load_toml(path, Specimen)
 
 
 class Section(BaseModel):
@@ -278,40 +258,3 @@ class Specimen(Section):
         """Height of the plate's upper face: h/2 where both blades move, h where one does."""
         h = self.material.thickness_mm * 1e-3
         return h / 2 if self.blade.moving == "both" else h
-
-
-def _specimen_path(name_or_path: str | Path) -> Path:
-    text = str(name_or_path)
-    if text.endswith(".toml"):
-        return Path(text)
-    names = specimen_names()
-    if text not in names:
-        near = difflib.get_close_matches(text, names, n=1)
-        hint = f" Did you mean {near[0]}?" if near else ""
-        raise InputError(
-            f"There is no specimen called {text!r}: give one of {', '.join(names)}, "
-            f"or a path that ends in .toml.{hint}"
-        )
-    return specimens_dir() / f"{text}.toml"
-
-
-def _explain(path: Path, error: ValidationError) -> str:
-    lines = [f"The specimen {path} is invalid:"]
-    for problem in error.errors():
-        place = ".".join(str(part) for part in problem["loc"]) or "(whole file)"
-        hint = ""
-        if problem["type"] == "extra_forbidden":
-            near = difflib.get_close_matches(place.split(".")[-1], _known_keys(Specimen), n=1)
-            hint = f" Did you mean {near[0]}?" if near else " Remove it."
-        lines.append(f"  {place}: {problem['msg']}.{hint}")
-    return "\n".join(lines)
-
-
-def _known_keys(section: type[BaseModel]) -> list[str]:
-    keys: list[str] = []
-    for name, field in section.model_fields.items():
-        keys.append(name)
-        inner: Any = field.annotation
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
-            keys.extend(_known_keys(inner))
-    return keys

@@ -1,0 +1,257 @@
+"""The device's side of the wire: bytes in, frames out, one tick at a time; no clock, no port.
+
+How it behaves, beyond the messages themselves:
+
+* HELLO is answered with IDENTITY, CONFIG with CONFIG_ECHO that states the value in force. After
+  STREAM = 1 a STATE follows every tick. ``sequence`` counts ticks since power-on, streamed or not.
+* A COMMAND holds from the next tick on until another comes. One that is not finite is ignored.
+* With ENABLE the motors follow the commands; without it they give nothing. While they are
+  enabled, BRAKE_AFTER_MS without a COMMAND brakes them (short-circuited windings) and latches a
+  fault: COMMANDS_LOST stands as long as none comes, FAULT_LATCHED until a COMMAND carries
+  CLEAR_FAULT. While the fault is latched the motors brake, whatever is commanded. A host that
+  means to stop talking first sends a COMMAND without ENABLE.
+* Commands beyond the motors' limits are clipped and flagged TORQUE_SATURATED.
+* MATERIAL = 1 puts in a fresh sheet with its near edge at advance + contact = 0. It is refused
+  (VALUE_REFUSED) while the blades are in the way: open them or draw back first.
+* HAND_SPEED > 0 lets the virtual hand make HAND_STROKES rounds and then let go; 0 lets go at once.
+* An encoder that sticks is noticed after ENCODER_CHECK_MS: ENCODER_FAULT, and the fault latches.
+  Until then its reading is simply frozen.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from scissorcal.device.sim.faults import Faults, FaultyLine
+from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.kernel import (
+    Capability,
+    Command,
+    CommandFlag,
+    Config,
+    ConfigEcho,
+    ConfigKey,
+    ConfigStatus,
+    FrameDecoder,
+    Hello,
+    Identity,
+    Message,
+    State,
+    StateFlag,
+    decode,
+    encode,
+)
+
+DEVICE_NAME = "scissorcal-sim"
+FIRMWARE_VERSION = 1
+DEFAULT_BRAKE_AFTER_MS = 10.0
+ENCODER_CHECK_MS = 100
+TICK_US = round(TICK_S * 1e6)
+U32 = 0xFFFFFFFF
+FASTEST_HAND_rad_per_s = 5.0
+
+_ENABLE = int(CommandFlag.ENABLE)
+_CLEAR_FAULT = int(CommandFlag.CLEAR_FAULT)
+_MOTOR_ENABLED = int(StateFlag.MOTOR_ENABLED)
+_FAULT_LATCHED = int(StateFlag.FAULT_LATCHED)
+_COMMANDS_LOST = int(StateFlag.COMMANDS_LOST)
+_OPENING_AT_STOP = int(StateFlag.OPENING_AT_STOP)
+_TORQUE_SATURATED = int(StateFlag.TORQUE_SATURATED)
+_FORCE_SATURATED = int(StateFlag.HANDLE_FORCE_SATURATED)
+_ENCODER_FAULT = int(StateFlag.ENCODER_FAULT)
+
+
+class RigProtocol:
+    """A virtual rig that speaks the wire protocol.
+
+    Feed it what the host wrote (:meth:`receive`), let time pass (:meth:`tick`, one device tick
+    each), and collect what it says (:meth:`take`). ``garbled`` counts what it could not read,
+    ``unplugged`` turns True when its cable is pulled.
+    """
+
+    def __init__(
+        self, rig: VirtualRig, rng: np.random.Generator, faults: Faults | None = None
+    ) -> None:
+        self.rig = rig
+        self.faults = faults or Faults()
+        self.unplugged = False
+        self._line = FaultyLine(self.faults, rng)
+        self._decoder = FrameDecoder()
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._delay_ticks = round(self.faults.delay_ms * 1e-3 / TICK_S)
+        self._ticks = 0
+        self._streamed_since: int | None = None
+        self._values = {int(key): 0.0 for key in ConfigKey}
+        self._values[int(ConfigKey.BRAKE_AFTER_MS)] = DEFAULT_BRAKE_AFTER_MS
+        self._values[int(ConfigKey.HAND_STROKES)] = float(rig.hand.strokes)
+        self._command = Command(0, 0, 0.0, 0.0)
+        self._silent_ticks = 0
+        self._fault = False
+        self._lost = False
+        self._stuck_at: float | None = None
+        self._clock_rate = 1.0 + rig.specimen.sensors.clock_drift_ppm * 1e-6
+
+    @property
+    def garbled(self) -> int:
+        """Frames from the host that were thrown away."""
+        return self._decoder.garbled
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host, in pieces of any size."""
+        for payload in self._decoder.feed(self._line.garbled(data)):
+            if self._line.drops():
+                continue
+            try:
+                message = decode(payload)
+            except ValueError:
+                continue  # sound frames of another protocol are none of this device's business
+            self._handle(message)
+
+    def tick(self) -> None:
+        """Let one tick pass: move, measure, watch, and say so where streaming is on."""
+        self._watch_commands()
+        self._watch_faults()
+        command = self._command
+        enabled = bool(command.flags & _ENABLE) and not self._fault
+        measured = self.rig.tick(command.torque, command.force, enabled, self._fault)
+        self._ticks += 1
+        if not self._values[ConfigKey.STREAM]:
+            return
+        flags = (_MOTOR_ENABLED if enabled else 0) | (_FAULT_LATCHED if self._fault else 0)
+        flags |= (_COMMANDS_LOST if self._lost else 0) | (
+            _OPENING_AT_STOP if measured.at_stop else 0
+        )
+        flags |= (_TORQUE_SATURATED if measured.torque_saturated else 0) | (
+            _FORCE_SATURATED if measured.force_saturated else 0
+        )
+        flags |= _ENCODER_FAULT if self._encoder_noticed() else 0
+        opening = measured.opening
+        if self._stuck_at is not None:
+            opening = self._stuck_at
+        elif self._stuck():
+            self._stuck_at = opening
+        self._say(
+            State(
+                flags,
+                self._ticks & U32,
+                int(self._ticks * TICK_US * self._clock_rate) & U32,
+                opening,
+                measured.advance,
+                measured.motor_torque,
+                measured.handle_force,
+            )
+        )
+
+    def take(self) -> list[bytes]:
+        """Whole frames that are due for the host, oldest first."""
+        waiting = self._waiting
+        due = []
+        while waiting and waiting[0][0] <= self._ticks:
+            due.append(waiting.popleft()[1])
+        return due
+
+    def _handle(self, message: Message) -> None:
+        if isinstance(message, Command):
+            if math.isfinite(message.torque) and math.isfinite(message.force):
+                self._silent_ticks = 0
+                self._lost = False
+                if message.flags & _CLEAR_FAULT and not self._encoder_noticed():
+                    self._fault = False
+                self._command = message
+        elif isinstance(message, Hello):
+            self._say(self._identity(message.nonce))
+        elif isinstance(message, Config):
+            self._say(self._configured(message))
+
+    def _configured(self, config: Config) -> ConfigEcho:
+        """Set a value if it makes sense, and say what is in force now."""
+        key, value = config.key, config.value
+        if key not in self._values:
+            return ConfigEcho(ConfigStatus.UNKNOWN_KEY, key, config.nonce, 0.0)
+        accepted = self._accepts(key, value)
+        if accepted and key == ConfigKey.MATERIAL:
+            if value:
+                accepted = self.rig.load_sheet()
+            else:
+                self.rig.remove_sheet()
+        if accepted:
+            self._values[key] = value
+            self._apply(key, value)
+        status = ConfigStatus.OK if accepted else ConfigStatus.VALUE_REFUSED
+        return ConfigEcho(status, key, config.nonce, self._values[key])
+
+    def _accepts(self, key: int, value: float) -> bool:
+        if key in (ConfigKey.STREAM, ConfigKey.MATERIAL):
+            return value in (0.0, 1.0)
+        if key == ConfigKey.BRAKE_AFTER_MS:
+            return 1.0 <= value <= 1000.0
+        if key == ConfigKey.HAND_STROKES:
+            return 1.0 <= value <= 1000.0 and value == int(value)
+        return 0.0 <= value <= FASTEST_HAND_rad_per_s
+
+    def _apply(self, key: int, value: float) -> None:
+        rig = self.rig
+        if key == ConfigKey.STREAM and value and self._streamed_since is None:
+            self._streamed_since = self._ticks
+        elif key == ConfigKey.HAND_SPEED_rad_per_s:
+            rig.hand.start(value, rig.opening, rig.advance)
+        elif key == ConfigKey.HAND_STROKES:
+            rig.hand.strokes = int(value)
+
+    def _watch_commands(self) -> None:
+        self._silent_ticks += 1
+        if not self._command.flags & _ENABLE:
+            return
+        if (self._silent_ticks - 1) * TICK_US * 1e-3 >= self._values[ConfigKey.BRAKE_AFTER_MS]:
+            self._lost = True
+            self._fault = True
+
+    def _watch_faults(self) -> None:
+        if self._encoder_noticed():
+            self._fault = True
+        if self.faults.unplug_s is not None and self._streamed_s() >= self.faults.unplug_s:
+            self.unplugged = True
+
+    def _streamed_s(self) -> float:
+        """Seconds since the first STREAM; negative before."""
+        return (
+            -1.0 if self._streamed_since is None else (self._ticks - self._streamed_since) * TICK_S
+        )
+
+    def _stuck(self) -> bool:
+        at = self.faults.stuck_encoder_s
+        return at is not None and self._streamed_s() >= at
+
+    def _encoder_noticed(self) -> bool:
+        at = self.faults.stuck_encoder_s
+        return at is not None and self._streamed_s() >= at + ENCODER_CHECK_MS * 1e-3
+
+    def _say(self, message: Message) -> None:
+        if self._line.drops():
+            return
+        self._waiting.append((self._ticks + self._delay_ticks, self._line.garbled(encode(message))))
+
+    def _identity(self, nonce: int) -> Identity:
+        specimen = self.rig.specimen
+        mechanism, motor, sensors = specimen.mechanism, specimen.motor, specimen.sensors
+        low, high = mechanism.opening_range_deg
+        return Identity(
+            nonce_echo=nonce,
+            name=DEVICE_NAME,
+            serial=specimen.name[:16],
+            capabilities=int(
+                Capability.HANDLE_FORCE_SENSOR | Capability.ADVANCE_MOTOR | Capability.SIMULATOR
+            ),
+            firmware_version=FIRMWARE_VERSION,
+            tick_us=TICK_US,
+            torque_limit=motor.torque_limit_Nm,
+            force_limit=motor.force_limit_N,
+            opening_min=math.radians(low),
+            opening_max=math.radians(high),
+            advance_min=mechanism.advance.range_mm[0] * 1e-3,
+            advance_max=mechanism.advance.range_mm[1] * 1e-3,
+            opening_resolution=sensors.opening_step_rad,
+            advance_resolution=sensors.advance_step_um * 1e-6,
+            handle_radius=mechanism.handle_radius_mm * 1e-3,
+        )
