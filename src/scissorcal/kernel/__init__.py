@@ -18,11 +18,14 @@ from scissorcal.kernel.frames import (
     decode,
     encode,
 )
+from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
+from scissorcal.kernel.tables import ModelTables, Table
 from scissorcal.kernel.wire import FrameDecoder, crc16, encode_frame
 
 __all__ = [
     "PROTOCOL_VERSION",
     "SCHEMA_HASH",
+    "STEP_DTYPE",
     "Capability",
     "Command",
     "CommandFlag",
@@ -33,9 +36,14 @@ __all__ = [
     "FrameDecoder",
     "Hello",
     "Identity",
+    "Kernel",
     "Message",
+    "ModelTables",
     "State",
     "StateFlag",
+    "StepFlag",
+    "StepOutput",
+    "Table",
     "crc16",
     "decode",
     "encode",

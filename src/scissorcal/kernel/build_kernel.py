@@ -9,7 +9,7 @@ from pathlib import Path
 from cffi import FFI
 
 C = Path("src/scissorcal/kernel/c")  # relative: setuptools refuses absolute source paths
-HEADERS = ("sc_wire.h",)
+HEADERS = ("sc_wire.h", "sc_table.h", "sc_model.h")
 
 
 def declarations() -> str:
@@ -26,5 +26,6 @@ builder.set_source(
     sources=[str(source) for source in sorted(C.glob("*.c"))],
     depends=[str(header) for header in sorted(C.glob("*.h"))],
     include_dirs=[str(C)],
+    libraries=["m"],
     extra_compile_args=["-std=c99", "-O2", "-Wall", "-Wextra"],
 )

@@ -1,0 +1,33 @@
+/* The cutting edge: blade frame (s, e(s)) turned by beta, seen from the cut.
+ *
+ *     x = s cos(beta) - e(s) sin(beta),   y = s sin(beta) + e(s) cos(beta),   y_x = tan(psi)
+ */
+#ifndef SC_EDGE_H
+#define SC_EDGE_H
+
+#include "sc_table.h"
+
+/* A blade angle with its sine and cosine, which one step needs many times. */
+typedef struct {
+    float sine;
+    float cosine;
+} sc_turn;
+
+/* One place of the edge: station on the blade, where it stands (x, y), its slope tan(psi) against
+ * the cut and its taper e'(s) against the blade's centreline. */
+typedef struct {
+    float station;
+    float x;
+    float y;
+    float slope;
+    float taper;
+} sc_edge_point;
+
+/* The edge at a station; 0 if it stands too steeply against the cut there (psi > 87 deg). */
+int sc_edge_at_station(const sc_table *edge, sc_turn turn, float station, sc_edge_point *point);
+
+/* The edge over x: a guarded Newton solve for the station, closed form beyond the table's ends,
+ * where the edge goes on straight. 0 if no edge of bearable steepness stands there. */
+int sc_edge_over(const sc_table *edge, sc_turn turn, float x, sc_edge_point *point);
+
+#endif

@@ -1,0 +1,32 @@
+"""NumPy's view of the C core's structs, read off the compiled declarations."""
+
+from typing import Any
+
+import numpy as np
+
+from scissorcal.kernel._kernel import ffi
+
+_NUMBERS = {
+    "float": "<f4",
+    "double": "<f8",
+    "uint8_t": "u1",
+    "uint16_t": "<u2",
+    "int32_t": "<i4",
+    "uint32_t": "<u4",
+    "int64_t": "<i8",
+    "uint64_t": "<u8",
+}
+
+
+def dtype_of(struct: str) -> np.dtype[Any]:
+    """Give the dtype of a C struct of plain numbers, with the compiler's own offsets."""
+    kind = ffi.typeof(struct)
+    fields = [(name, _NUMBERS[field.type.cname], field.offset) for name, field in kind.fields]
+    return np.dtype(
+        {
+            "names": [name for name, _, _ in fields],
+            "formats": [number for _, number, _ in fields],
+            "offsets": [offset for _, _, offset in fields],
+            "itemsize": ffi.sizeof(kind),
+        }
+    )
