@@ -1,8 +1,11 @@
 # Two commands do everything on a fresh machine: make demo, make test.
 # PYTHON chooses the interpreter (3.11 or newer): make test PYTHON=python3.12
 
+# An interpreter that will do: new enough, and with the headers that the C core is built against.
+FIT := import sys, sysconfig, os; sys.exit(not (sys.version_info >= (3, 11) \
+	and os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))))
 PYTHON ?= $(firstword $(foreach name,python3.13 python3.12 python3.11 python3,\
-	$(if $(shell $(name) -c 'import sys; sys.version_info >= (3, 11) and print(1)' 2>/dev/null),$(name))) python3)
+	$(if $(filter 0,$(shell $(name) -c '$(FIT)' 2>/dev/null; echo $$?)),$(name))) python3)
 VENV := .venv
 RUN := $(VENV)/bin
 STAMP := $(VENV)/.installed
@@ -45,9 +48,9 @@ setup kernel: $(STAMP)
 
 # The C core is built by the install itself; a changed source installs again.
 $(STAMP): pyproject.toml $(KERNEL)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "scissorcal needs Python 3.11 or newer; say which: make PYTHON=/path/to/python3.11" >&2; exit 1; }
-	@test -x $(RUN)/python || $(PYTHON) -m venv $(VENV) || \
+	@$(PYTHON) -c '$(FIT)' || { echo "scissorcal needs Python 3.11 or newer with its headers (on \
+	Debian and Ubuntu: apt install python3-dev); say which: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@test -x $(RUN)/pip || $(PYTHON) -m venv $(VENV) || \
 	  { echo "Python's venv module is missing; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" wheel
 	$(RUN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
