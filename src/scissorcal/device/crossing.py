@@ -1,0 +1,93 @@
+"""Where the recipe's edge stands over the plate: what a plan needs to place cuts and presses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+
+TIP_SHARE = 0.97
+"""Share of the blade's length that a plan uses: the very tip is rounded."""
+
+GRID = 2001
+
+
+@dataclass(frozen=True)
+class Blade:
+    """The recipe's edge e(s) = offset + s tan(taper) + curvature s^2 / 2 over its plate, SI."""
+
+    moving_blades: int
+    offset: float
+    slope: float
+    curvature: float
+    length: float
+    upper_face: float
+
+    @classmethod
+    def of(cls, recipe: Recipe) -> "Blade":
+        edge = recipe.rig.edge
+        return cls(
+            moving_blades=recipe.rig.moving_blades,
+            offset=edge.offset_mm * 1e-3,
+            slope=float(np.tan(np.radians(edge.taper_deg))),
+            curvature=edge.curvature_per_m,
+            length=edge.length_mm * 1e-3,
+            upper_face=recipe.upper_face_m,
+        )
+
+    def crossing(self, opening: ArrayLike, above: float = 0.0) -> Array:
+        """Distance from the pivot (m) at which the edge is ``above`` m over the upper face.
+
+        The root of s sin(beta) + e(s) cos(beta) = y_top + above, a quadratic in s, put into
+        x = s cos(beta) - e(s) sin(beta). NaN where the edge never stands there, or not before
+        the blade's tip.
+
+        >>> from scissorcal.recipe.library import builtin_recipe
+        >>> blade = Blade.of(builtin_recipe("paper-80gsm"))
+        >>> np.round(1e3 * blade.crossing(np.radians([50.0, 12.0])), 1)
+        array([17.3, 57.4])
+        """
+        beta = np.asarray(opening, dtype=np.float64) / self.moving_blades
+        sine, cosine = np.sin(beta), np.cos(beta)
+        rise = self.upper_face + above - self.offset * cosine
+        grade = sine + self.slope * cosine
+        with np.errstate(invalid="ignore", divide="ignore"):
+            root = grade + np.sqrt(grade**2 + 2.0 * self.curvature * cosine * rise)
+            station = np.where(root > 0, 2.0 * rise / root, np.nan)
+        edge = self.offset + station * (self.slope + 0.5 * self.curvature * station)
+        reached = (station >= 0) & (station <= TIP_SHARE * self.length)
+        return np.where(reached, station * cosine - edge * sine, np.nan)
+
+    def opening_at(
+        self, contact: float, openings: tuple[float, float], above: float = 0.0
+    ) -> float | None:
+        """Opening (rad) within ``openings`` at which the edge crosses at ``contact`` (m), or None.
+
+        The inverse of :meth:`crossing`, which falls as the blades open, by interpolation on a
+        fine grid.
+        """
+        grid = np.linspace(*openings, GRID)
+        reach = self.crossing(grid, above)
+        known = np.isfinite(reach)
+        grid, reach = grid[known], reach[known]
+        if len(grid) < 2 or np.any(np.diff(reach) >= 0) or not reach[-1] <= contact <= reach[0]:
+            return None
+        return float(np.interp(contact, reach[::-1], grid[::-1]))
+
+    def cutting_range(
+        self, openings: tuple[float, float], contacts: tuple[float, float]
+    ) -> tuple[float, float] | None:
+        """Widest range of openings within ``openings`` whose crossing lies within ``contacts``.
+
+        None where there is none, or where the crossing does not move outwards as the blades
+        close.
+        """
+        grid = np.linspace(*openings, GRID)
+        reach = self.crossing(grid)
+        inside = np.flatnonzero((reach >= contacts[0]) & (reach <= contacts[1]))
+        if len(inside) < 2 or np.any(np.diff(reach[inside]) >= 0) or np.any(np.diff(inside) != 1):
+            return None
+        return float(grid[inside[0]]), float(grid[inside[-1]])

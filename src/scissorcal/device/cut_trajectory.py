@@ -1,0 +1,220 @@
+"""What the rig shall do with material between its blades: strokes through sheets, or presses."""
+
+from dataclasses import dataclass
+from itertools import cycle
+
+import numpy as np
+
+from scissorcal.device.crossing import TIP_SHARE, Blade
+from scissorcal.device.paths import PathBuilder
+from scissorcal.device.trajectory import (
+    ADVANCE_ACCELERATION,
+    ADVANCE_SPEED,
+    DWELL_S,
+    SETTLE_S,
+    TURN_ACCELERATION,
+    Plan,
+    Segment,
+    StrokeList,
+    opening_range,
+    refuse_linear,
+)
+from scissorcal.errors import DeviceError, InputError
+from scissorcal.kernel import Capability, Identity
+from scissorcal.recipe.schema import Recipe
+
+OPENING_SPEED = 1.0
+"""Speed at which the blades open again, rad/s; bounded by the scene's."""
+
+FIRST_LEAD_M = 1e-3
+LEAD_M = 4e-3
+"""How far before the end of the cut a stroke starts: a crack stays a little behind the blades."""
+
+ADVANCE_MARGIN_M = 2e-3
+SHEET_MARGIN_M = 2e-3
+LEAST_CUT_M = 5e-3
+
+CLEARANCE_M = 1e-3
+DEPTH_PER_REFERENCE = 1.5
+DEPTH_PER_FACE = 0.9
+
+
+def cut_plan(recipe: Recipe, identity: Identity) -> Plan:
+    """Plan strokes through fresh material, or presses where the scene cuts nothing.
+
+    Every sheet is one segment: close at one of the recipe's speeds (in turn), open, move on so
+    that the next stroke starts just before the end of the cut, and at last go back to where the
+    next sheet is loaded. A press closes at one contact position and opens again. Raises
+    DeviceError where the rig has no advance motor or too little way, InputError where the recipe
+    leaves nothing to cut or press.
+    """
+    refuse_linear(recipe)
+    if not identity.capabilities & Capability.ADVANCE_MOTOR:
+        raise DeviceError(
+            f"The device {identity.name} has no advance motor, so it cannot move on through the "
+            "material by itself: capture with --hand."
+        )
+    if recipe.scene.cut:
+        return _through_sheets(recipe, identity)
+    return _presses(recipe, identity)
+
+
+def hand_requests(recipe: Recipe) -> tuple[str, ...]:
+    """Sentences that ask a person for the strokes of a capture by hand, one for each sheet."""
+    refuse_linear(recipe)
+    capture = recipe.capture.cut
+    verb = "cut" if recipe.scene.cut else "press without cutting"
+    slow, fast = min(capture.speeds_rad_per_s), max(capture.speeds_rad_per_s)
+    return tuple(
+        f"Put in a fresh piece of {recipe.material.name} (piece {sheet + 1} of {capture.sheets}), "
+        f"then {verb} {capture.strokes_per_sheet} times by hand: some slowly ({slow:g} rad/s), "
+        f"some fast ({fast:g} rad/s)."
+        for sheet in range(capture.sheets)
+    )
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """One stroke: where the pivot stands, and the openings between which it closes."""
+
+    advance: float
+    top: float
+    bottom: float
+
+
+def _through_sheets(recipe: Recipe, identity: Identity) -> Plan:
+    cuts = _cuts_of_a_sheet(recipe, identity)
+    tick_s = identity.tick_us * 1e-6
+    opening_speed = min(OPENING_SPEED, recipe.scene.opening_rate_rad_per_s[1])
+    speeds = cycle(recipe.capture.cut.speeds_rad_per_s)
+    strokes = StrokeList()
+    segments = []
+    sheets = recipe.capture.cut.sheets
+    for sheet in range(sheets):
+        path = PathBuilder(cuts[0].top, cuts[0].advance, tick_s)
+        path.rest(DWELL_S)
+        for cut in cuts:
+            path.advance_to(cut.advance, ADVANCE_SPEED, ADVANCE_ACCELERATION)
+            path.rest(SETTLE_S)
+            speed = next(speeds)
+            closing = strokes.add("closing", speed, sheet)
+            path.open_to(cut.bottom, speed, TURN_ACCELERATION, closing)
+            path.rest(DWELL_S)
+            opening = strokes.add("opening", opening_speed, sheet)
+            path.open_to(cut.top, opening_speed, TURN_ACCELERATION, opening)
+            path.rest(DWELL_S)
+        path.advance_to(cuts[0].advance, ADVANCE_SPEED, ADVANCE_ACCELERATION)
+        path.rest(DWELL_S)
+        request = (
+            f"Put in a fresh piece of {recipe.material.name} (piece {sheet + 1} of {sheets}), its "
+            "near edge at the mark; the blades stand open before it."
+        )
+        segments.append(Segment(path.reference(), "sheet", sheet, request))
+    return Plan(tuple(segments), tuple(strokes.all), tick_s)
+
+
+def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
+    """Place up to strokes_per_sheet strokes on one sheet, within the sledge's way and the sheet."""
+    blade = Blade.of(recipe)
+    openings = blade.cutting_range(opening_range(recipe, identity), recipe.scene.contact_m)
+    if openings is None:
+        raise InputError(_never_crosses(recipe))
+    bottom, top = openings
+    inner, outer = float(blade.crossing(top)), float(blade.crossing(bottom))
+    end = recipe.material.sheet_length_mm * 1e-3 - SHEET_MARGIN_M
+    first, last = _sledge_way(identity)
+    cuts: list[_Cut] = []
+    crack = 0.0
+    for number in range(recipe.capture.cut.strokes_per_sheet):
+        advance = crack - inner - (FIRST_LEAD_M if number == 0 else LEAD_M)
+        reach = min(outer, end - advance)
+        if advance > last or advance + reach < crack + LEAST_CUT_M:
+            break
+        if advance < first:
+            raise DeviceError(
+                f"Before a fresh sheet the sledge must stand at {1e3 * advance:.0f} mm, and the "
+                f"device {identity.name} goes no further back than "
+                f"{1e3 * identity.advance_min:.0f} mm: raise the low end of scene.contact_mm no "
+                "further than the blades need, or mount the material further out."
+            )
+        closed = bottom if reach == outer else blade.opening_at(reach, openings)
+        if closed is None:
+            break
+        cuts.append(_Cut(advance, top, closed))
+        crack = advance + reach
+    if not cuts:
+        raise InputError(
+            f"material.sheet_length_mm = {recipe.material.sheet_length_mm:g} leaves no stroke of "
+            f"at least {1e3 * LEAST_CUT_M:.0f} mm: use longer pieces."
+        )
+    return tuple(cuts)
+
+
+def _presses(recipe: Recipe, identity: Identity) -> Plan:
+    """Press at several contact positions, every speed at each, round after round."""
+    capture = recipe.capture.cut
+    places = _press_places(recipe, identity, capture.strokes_per_sheet)
+    speeds = capture.speeds_rad_per_s
+    tick_s = identity.tick_us * 1e-6
+    strokes = StrokeList()
+    path = PathBuilder(places[0].top, places[0].advance, tick_s)
+    path.rest(DWELL_S)
+    for number in range(capture.sheets):
+        for index, place in enumerate(places):
+            speed = speeds[(index + number) % len(speeds)]
+            path.open_to(max(path.opening, place.top), OPENING_SPEED, TURN_ACCELERATION)
+            path.advance_to(place.advance, ADVANCE_SPEED, ADVANCE_ACCELERATION)
+            path.open_to(place.top, OPENING_SPEED, TURN_ACCELERATION)
+            path.rest(SETTLE_S)
+            path.open_to(place.bottom, speed, TURN_ACCELERATION, strokes.add("press", speed, 0))
+            path.rest(DWELL_S)
+            path.open_to(place.top, speed, TURN_ACCELERATION, strokes.add("opening", speed, 0))
+            path.rest(DWELL_S)
+    request = (
+        f"Put in the {recipe.material.name}, its near edge at the mark; the blades stand open "
+        "before it and will press it without cutting."
+    )
+    segment = Segment(path.reference(), "sheet", 0, request)
+    return Plan((segment,), tuple(strokes.all), tick_s)
+
+
+def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut, ...]:
+    """Contacts spread over the scene's range, each with openings from just above to deep."""
+    blade = Blade.of(recipe)
+    openings = opening_range(recipe, identity)
+    deepest = min(
+        DEPTH_PER_REFERENCE * recipe.fit.cut.reference_indentation_mm * 1e-3,
+        DEPTH_PER_FACE * recipe.upper_face_m,
+    )
+    clear = blade.cutting_range(openings, recipe.scene.contact_m)
+    if clear is None:
+        raise InputError(_never_crosses(recipe))
+    above = [value for value in blade.crossing(openings, CLEARANCE_M) if np.isfinite(value)]
+    below = [value for value in blade.crossing(openings, -deepest) if np.isfinite(value)]
+    tip = TIP_SHARE * blade.length
+    nearest = max(recipe.scene.contact_m[0], min(above, default=np.inf))
+    farthest = min(recipe.scene.contact_m[1], max(below, default=-np.inf), tip)
+    first, last = _sledge_way(identity)
+    places = []
+    for contact in np.linspace(nearest, farthest, count) if nearest < farthest else ():
+        top = blade.opening_at(float(contact), openings, CLEARANCE_M)
+        bottom = blade.opening_at(float(contact), openings, -deepest)
+        if top is not None and bottom is not None and first <= -contact <= last:
+            places.append(_Cut(-float(contact), top, bottom))
+    if not places:
+        raise InputError(_never_crosses(recipe))
+    return tuple(places)
+
+
+def _sledge_way(identity: Identity) -> tuple[float, float]:
+    return identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
+
+
+def _never_crosses(recipe: Recipe) -> str:
+    scene, edge = recipe.scene, recipe.rig.edge
+    return (
+        f"With rig.edge (offset {edge.offset_mm:g} mm, taper {edge.taper_deg:g} deg) the blades "
+        f"reach the plate nowhere within scene.opening_deg = {list(scene.opening_deg)} and "
+        f"scene.contact_mm = {list(scene.contact_mm)} that this device can go to: check the "
+        "edge's signs (the edges of scissors lie beyond the pivot, offset_mm < 0) and the ranges."
+    )

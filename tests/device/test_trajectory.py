@@ -1,0 +1,249 @@
+"""Plans: smooth, within limits, labelled, and with every cut in fresh material."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scissorcal.device.crossing import Blade
+from scissorcal.device.cut_trajectory import cut_plan, hand_requests
+from scissorcal.device.paths import PathBuilder, SwingLimits, glide, multisine
+from scissorcal.device.trajectory import (
+    TURN_ACCELERATION,
+    Plan,
+    approach,
+    check_reference,
+    friction_plan,
+    usable_opening,
+)
+from scissorcal.errors import DeviceError, InputError
+from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
+from tests.device.conftest import IDENTITY
+
+TICK_S = 1e-3
+CUTTING = ("paper-80gsm", "cotton-cloth")
+
+
+def changed(name: str, **tables: dict[str, object]) -> Recipe:
+    """Return a recipe of the library with some keys changed, table by table ("rig__edge")."""
+    plain = builtin_recipe(name).model_dump()
+    for table, keys in tables.items():
+        place = plain
+        for part in table.split("__"):
+            place = place[part]
+        place.update(keys)
+    return Recipe.model_validate(plain)
+
+
+@given(
+    distance=st.floats(-2, 2).filter(lambda d: abs(d) > 1e-6),
+    speed=st.floats(1e-2, 50),
+    acceleration=st.floats(1, 200),
+)
+@settings(max_examples=60, deadline=None)
+def test_glides_arrive_at_rest_within_their_bounds(
+    distance: float, speed: float, acceleration: float
+) -> None:
+    way, rate = glide(distance, speed, acceleration, TICK_S)
+    assert way[-1] == pytest.approx(distance)
+    assert rate[-1] == 0.0
+    assert np.abs(rate).max() <= speed * (1 + 1e-9)
+    assert np.all(np.diff(np.abs(way)) >= -1e-12)
+    assert np.abs(np.diff(rate, prepend=0.0)).max() / TICK_S <= acceleration * (1 + 1e-6)
+    middle = (rate[1:] + rate[:-1]) / 2
+    assert np.allclose(np.diff(way)[:-1] / TICK_S, middle[:-1], atol=0.05 * speed)
+
+
+def test_glide_of_nothing_takes_no_time() -> None:
+    assert len(glide(0.0, 1.0, 1.0, TICK_S)[0]) == 0
+
+
+def test_multisine_keeps_its_limits_and_uses_one_of_them() -> None:
+    limits = SwingLimits(amplitude=0.3, rate=1.5, acceleration=80.0)
+    way, rate = multisine(8.0, (1.0, 15.0), limits, TICK_S)
+    shares = (
+        np.abs(way).max() / limits.amplitude,
+        np.abs(rate).max() / limits.rate,
+        np.abs(np.gradient(rate)).max() / TICK_S / limits.acceleration,
+    )
+    assert max(shares) == pytest.approx(1.0, abs=0.01)
+    assert (way[-1], rate[-1]) == (0.0, 0.0)
+    assert np.abs(way[0]) < 1e-6
+    assert np.allclose(np.gradient(way) / TICK_S, rate, atol=0.01)
+
+
+def each_stroke(plan: Plan) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    """Stroke index with its opening, rate and advance, in order."""
+    found = []
+    for segment in plan.segments:
+        reference = segment.reference
+        for index in np.unique(reference.stroke[reference.stroke >= 0]):
+            of = reference.stroke == index
+            axes = (reference.opening, reference.opening_rate, reference.advance)
+            opening, rate, advance = (axis[of] for axis in axes)
+            found.append((int(index), opening, rate, advance))
+    return found
+
+
+def test_friction_sweeps_every_speed_both_ways_across_the_whole_scene() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    plan = friction_plan(recipe, IDENTITY, advance=-0.06)
+    low, high = recipe.scene.opening_rad
+    for index, opening, rate, advance in each_stroke(plan)[:-1]:
+        stroke = plan.strokes[index]
+        assert np.all(advance == -0.06)
+        assert np.all(rate <= 0 if stroke.kind == "closing" else rate >= 0)
+        cruising = np.abs(rate) > 0.99 * stroke.speed
+        assert opening[cruising].min() < low + 0.03
+        assert opening[cruising].max() > high - 0.03
+    planned = {(stroke.kind, stroke.speed) for stroke in plan.strokes[:-1]}
+    speeds = recipe.capture.friction.speeds_rad_per_s
+    assert planned == {(kind, speed) for kind in ("closing", "opening") for speed in speeds}
+    assert len(plan.strokes) == 4 * len(speeds) + 1
+    assert plan.strokes[-1].kind == "excitation"
+    assert [index for index, *_ in each_stroke(plan)] == list(range(len(plan.strokes)))
+
+
+@pytest.mark.parametrize("name", [*CUTTING, "press-only"])
+def test_plans_are_steady_and_within_limits(name: str) -> None:
+    recipe = builtin_recipe(name)
+    stops = usable_opening(IDENTITY)
+    for plan in (friction_plan(recipe, IDENTITY), cut_plan(recipe, IDENTITY)):
+        for segment in plan.segments:
+            reference = segment.reference
+            check_reference(reference, IDENTITY)
+            assert reference.opening.min() >= stops[0]
+            assert reference.opening.max() <= stops[1]
+            assert np.abs(np.diff(reference.opening)).max() < 2e-3
+            assert np.abs(np.diff(reference.advance)).max() < 1e-4
+            assert np.abs(np.diff(reference.opening_rate)).max() < 0.1
+
+
+@pytest.mark.parametrize("name", CUTTING)
+def test_every_cut_goes_through_fresh_material_within_the_scene(name: str) -> None:
+    recipe = builtin_recipe(name)
+    plan = cut_plan(recipe, IDENTITY)
+    blade = Blade.of(recipe)
+    assert len(plan.segments) == recipe.capture.cut.sheets
+    low, high = recipe.scene.contact_m
+    tolerance = 1e-4
+    for segment in plan.segments:
+        assert segment.load == "sheet"
+        crack = 0.0
+        for stroke in plan.strokes:
+            of = segment.reference.stroke == stroke.index
+            if stroke.kind != "closing" or not of.any():
+                continue
+            assert stroke.sheet == segment.sheet
+            crossing = blade.crossing(segment.reference.opening[of])
+            assert low - tolerance <= crossing.min()
+            assert crossing.max() <= high + tolerance
+            assert len(set(segment.reference.advance[of])) == 1
+            reach = segment.reference.advance[of] + crossing
+            assert reach[0] < crack, "a stroke starts behind the end of the cut"
+            assert reach[-1] > crack + 0.02
+            crack = reach[-1]
+        assert crack < recipe.material.sheet_length_mm * 1e-3
+        assert segment.reference.advance[-1] == segment.reference.advance[0]
+        assert segment.reference.opening[-1] == segment.reference.opening[0]
+    speeds = [stroke.speed for stroke in plan.strokes if stroke.kind == "closing"]
+    wanted = recipe.capture.cut.speeds_rad_per_s
+    assert speeds == [wanted[i % len(wanted)] for i in range(len(speeds))]
+
+
+def test_pushing_on_never_touches_the_sheet() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    segment = cut_plan(recipe, IDENTITY).segments[0]
+    reference = segment.reference
+    ahead = np.diff(reference.advance, append=reference.advance[-1]) > 0
+    reach = reference.advance + Blade.of(recipe).crossing(reference.opening)
+    crack = np.maximum.accumulate(np.where(reference.stroke >= 0, reach, 0.0))
+    assert np.all(reach[ahead] < crack[ahead])
+
+
+def test_a_short_sheet_is_used_and_not_severed() -> None:
+    recipe = changed("paper-80gsm", material={"sheet_length_mm": 30.0})
+    plan = cut_plan(recipe, IDENTITY)
+    reference = plan.segments[0].reference
+    reach = (reference.advance + Blade.of(recipe).crossing(reference.opening)).max()
+    assert 0.027 < reach < 0.03
+    with pytest.raises(InputError, match="sheet_length_mm = 4"):
+        cut_plan(changed("paper-80gsm", material={"sheet_length_mm": 4.0}), IDENTITY)
+
+
+def test_presses_stay_above_the_middle_and_visit_several_contacts() -> None:
+    recipe = builtin_recipe("press-only")
+    plan = cut_plan(recipe, IDENTITY)
+    blade = Blade.of(recipe)
+    assert {stroke.kind for stroke in plan.strokes} == {"press", "opening"}
+    assert {s.speed for s in plan.strokes} == set(recipe.capture.cut.speeds_rad_per_s)
+    contacts = set()
+    for index, opening, _, advance in each_stroke(plan):
+        if plan.strokes[index].kind == "press":
+            contact = -advance[0]
+            contacts.add(round(contact, 6))
+            assert blade.crossing(opening[0]) < contact < blade.crossing(opening[-1])
+            assert blade.crossing(opening[-1], above=-recipe.upper_face_m) < contact
+    assert len(contacts) == recipe.capture.cut.strokes_per_sheet
+    low, high = recipe.scene.contact_m
+    assert low <= min(contacts) < max(contacts) <= high
+
+
+def test_approach_starts_where_the_rig_stands_and_moves_one_axis_at_a_time() -> None:
+    start = cut_plan(builtin_recipe("paper-80gsm"), IDENTITY).segments[0].reference
+    way = approach(0.3, -0.075, start, TICK_S)
+    assert abs(way.opening[0] - 0.3) < 1e-4
+    assert abs(way.advance[0] + 0.075) < 1e-5
+    assert way.opening[-1] == start.opening[0]
+    assert way.advance[-1] == start.advance[0]
+    assert np.all(way.stroke == -1)
+    moves = (np.abs(np.diff(way.opening)) > 0) & (np.abs(np.diff(way.advance)) > 0)
+    assert not moves.any()
+
+
+def test_the_crossing_is_the_root_of_the_edge() -> None:
+    blade = dataclasses.replace(
+        Blade.of(builtin_recipe("paper-80gsm")), curvature=-1.5, moving_blades=1
+    )
+    for opening in np.radians([15.0, 25.0, 35.0]):
+        x = float(blade.crossing(opening))
+        station = np.linspace(0, blade.length, 200_001)
+        edge = blade.offset + blade.slope * station + blade.curvature * station**2 / 2
+        along = station * np.cos(opening) - edge * np.sin(opening)
+        height = station * np.sin(opening) + edge * np.cos(opening)
+        assert np.interp(x, along, height) == pytest.approx(blade.upper_face, abs=1e-9)
+        assert blade.opening_at(x, (0.1, 0.9)) == pytest.approx(opening, abs=1e-6)
+
+
+def test_a_rig_without_advance_motor_cuts_by_hand_only() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    with pytest.raises(DeviceError, match="--hand"):
+        cut_plan(recipe, IDENTITY._replace(capabilities=1))
+    assert len(hand_requests(recipe)) == recipe.capture.cut.sheets
+
+
+def test_what_cannot_be_planned_is_refused_with_a_reason() -> None:
+    with pytest.raises(InputError, match="share at least 3 degrees"):
+        friction_plan(
+            builtin_recipe("paper-80gsm"), IDENTITY._replace(opening_min=0.86, opening_max=1.2)
+        )
+    with pytest.raises(InputError, match="offset_mm < 0"):
+        cut_plan(changed("paper-80gsm", rig__edge={"offset_mm": 8.0}), IDENTITY)
+    with pytest.raises(DeviceError, match="goes no further back"):
+        cut_plan(builtin_recipe("paper-80gsm"), IDENTITY._replace(advance_min=0.0))
+    with pytest.raises(InputError, match="scissorcal import"):
+        friction_plan(changed("paper-80gsm", rig={"joint": "linear"}), IDENTITY)
+
+
+def test_references_beyond_the_limits_are_refused() -> None:
+    path = PathBuilder(0.5, 0.0, TICK_S)
+    path.open_to(1.0, 0.5, TURN_ACCELERATION)
+    with pytest.raises(InputError, match="planned opening goes from"):
+        check_reference(path.reference(), IDENTITY)
+    path = PathBuilder(0.5, float("nan"), TICK_S)
+    path.rest(0.1)
+    with pytest.raises(InputError, match="not finite"):
+        check_reference(path.reference(), IDENTITY)
