@@ -1,6 +1,7 @@
 """One file per thing that is fitted: recording + model + inference -> result."""
 
-from scissorcal.calibration.cut import cutting_from, fit_cut
+from scissorcal.calibration.cut import fit_cut
+from scissorcal.calibration.cut_data import cutting_from
 from scissorcal.calibration.friction import fit_friction, friction_law
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError

@@ -1,29 +1,21 @@
 """Fit the material's response and fracture to strokes through it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.conditioning import Bins, condition
-from scissorcal.calibration.friction import friction_law
+from scissorcal.calibration.conditioning import condition
+from scissorcal.calibration.cut_data import CutData, cutting_from
+from scissorcal.calibration.cut_likelihood import MaterialModel, innovations
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, Likelihood, Rung, choose, climb
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
 from scissorcal.inference import infer
-from scissorcal.model import (
-    Cutting,
-    Edge,
-    Response,
-    cut_torque_along,
-    friction_torque,
-    torque_spread_along,
-)
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 
@@ -31,6 +23,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 FEWEST_CONTACT_BINS = 60
+FELT = 5.0
+"""Torque counts as contact from this many standard deviations of the empty sweeps' noise."""
+
 NUISANCE = ("noise", "variation")
 """Parameters of the noise; those of friction, also nuisances here, are named in the code."""
 
@@ -56,15 +51,16 @@ def fit_cut(
     """
     tell = progress or (lambda done, sentence: None)
     every = condition(recordings, recipe.fit.friction.cutoff_Hz)
-    data = _Data(every, recipe, friction)
+    data = CutData(every, recipe, friction)
     _refuse_no_contact(data, recordings)
     climbed: list[Climbed] = []
     ladder = _ladder(data, recipe)
     for index, rung in enumerate(ladder):
         tell(0.5 * index / len(ladder), f"cut: trying {rung.name}")
-        climbed.append(climb(rung, data.bins.series, data.strokes))
-    felt = data.material_torque(ladder[0].starts[0])
-    chosen = choose(climbed, float(np.sqrt(np.mean(felt**2))))
+        neighbour = _nearest(rung, climbed)
+        begun = _from_neighbour(rung, neighbour) if neighbour else rung
+        climbed.append(climb(begun, data.bins.series, data.strokes))
+    chosen = choose(climbed)
     tell(0.5, f"cut: inferring {chosen.rung.name}")
     posterior = infer(
         chosen.rung.problem(data.bins.series),
@@ -73,19 +69,20 @@ def fit_cut(
         optimum=chosen.optimum,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
-    friction_names = tuple(parameter.name for parameter in data.friction_layout.parameters)
+    friction_names = data.friction_layout.names
     u = chosen.optimum.point
+    structure = {**chosen.rung.key, **data.geometry}
     return assemble(
         what="cut",
         effort=effort,
         posterior=posterior,
         climbed=climbed,
         chosen=chosen,
-        structure={**chosen.rung.key, **_geometry(recipe)},
+        structure=structure,
         bins=data.bins,
         strokes=data.strokes,
         measured=data.material_torque(u),
-        contact=data.contact(chosen.rung, u),
+        contact=data.contact(cutting_from(structure, chosen.rung.layout.natural(u))),
         recordings=recordings,
         joint=recordings[0].joint,
         inputs_hash=fit_inputs_hash(
@@ -107,135 +104,23 @@ def settings_of(recipe: Recipe) -> str:
     )
 
 
-def cutting_from(structure: dict[str, Any], values: dict[str, Array]) -> Cutting:
-    """The model of a cut from a fit's structure and parameters by name.
-
-    ``values`` may hold scalars or arrays that broadcast with what the model is evaluated on.
-    """
-    edge = structure["edge"]
-    return Cutting(
-        edge=Edge(**edge),
-        response=Response(
-            structure["response"],
-            values["response_force"],
-            values["response_exponent"],
-            structure["reference_indentation_m"],
-        ),
-        moving_blades=structure["moving_blades"],
-        upper_face_m=structure["upper_face_m"],
-        fracture_energy=values.get("fracture_energy"),
-        kappa=values.get("kappa", 1.0),
-        closure=structure["closure"],
-    )
-
-
-def _geometry(recipe: Recipe) -> dict[str, Any]:
-    edge = recipe.rig.edge
-    return {
-        "closure": recipe.scene.closure,
-        "reference_indentation_m": recipe.fit.cut.reference_indentation_mm * 1e-3,
-        "moving_blades": recipe.rig.moving_blades,
-        "upper_face_m": recipe.upper_face_m,
-        "edge": {
-            "family": edge.family,
-            "offset_m": edge.offset_mm * 1e-3,
-            "taper_rad": float(np.radians(edge.taper_deg)),
-            "length_m": edge.length_mm * 1e-3,
-            "curvature_per_m": edge.curvature_per_m,
-        },
-    }
-
-
-class _Data:
-    """Conditioned cuts with the friction they are to be freed from."""
-
-    def __init__(self, every: Bins, recipe: Recipe, friction: FitResult) -> None:
-        loaded = every.sheet >= 0
-        self.whole = every.where(loaded)
-        self.used = self.whole.moving & (self.whole.stroke >= 0)
-        self.bins = self.whole.where(self.used)
-        self.strokes = self.bins.stroke
-        self.geometry = _geometry(recipe)
-        self.center = float(friction.structure["angle_center"])
-        self.friction_layout, self.friction_mean, self.friction_precision = _friction_prior(
-            friction
-        )
-        self.sheets = _runs(self.whole.sheet)
-
-    def material_torque(self, u: Array) -> Array:
-        """Torque that is left for the material, given a point's friction parameters (last)."""
-        own = u[-len(self.friction_layout.parameters) :]
-        values = self.friction_layout.natural(own)
-        bins = self.bins
-        empty = friction_torque(friction_law(values, self.center), bins.opening, bins.rate)
-        offset = values.get("offset", np.asarray(0.0))
-        return np.asarray(values["inertia"] * bins.acceleration + empty + offset - bins.drive)
-
-    def along(self, cutting: Cutting) -> tuple[Array, Array]:
-        """Model torque and crack tip at every used bin, sheet by sheet."""
-        torque = np.empty(len(self.whole.opening))
-        tip = np.empty_like(torque)
-        for run in self.sheets:
-            torque[run], tip[run] = cut_torque_along(
-                cutting, self.whole.opening[run], self.whole.advance[run], 0.0
-            )
-        return torque, tip
-
-    def contact(self, rung: Rung, u: Array) -> Array:
-        """Contact x_c at every used bin at a point of a rung."""
-        cutting = cutting_from({**rung.key, **self.geometry}, _material_values(rung, u))
-        return np.asarray((self.along(cutting)[1] - self.whole.advance)[self.used])
-
-
-def _runs(labels: NDArray[np.int64]) -> list[slice]:
-    ends = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
-    return [slice(low, high) for low, high in zip(ends[:-1], ends[1:], strict=True)]
-
-
-def _friction_prior(friction: FitResult) -> tuple[Layout, Array, Array]:
-    """Friction's posterior as a normal prior in unconstrained coordinates."""
-    signed = ("offset", "angle_slope", "angle_curvature")
-    columns, rows = [], []
-    for parameter in friction.parameters:
-        draws = friction.column(parameter.name)
-        signed_one = parameter.name in signed
-        u = draws if signed_one else np.log(draws)
-        columns.append(u)
-        rows.append(
-            Parameter(
-                parameter.name,
-                parameter.unit,
-                "identity" if signed_one else "log",
-                float(u.mean()),
-                float(u.std(ddof=1)),
-                parameter.meaning,
-            )
-        )
-    cloud = np.stack(columns, axis=1)
-    covariance = np.cov(cloud, rowvar=False)
-    return Layout(tuple(rows)), cloud.mean(axis=0), np.linalg.inv(covariance)
-
-
-def _refuse_no_contact(data: _Data, recordings: tuple[Recording, ...]) -> None:
+def _refuse_no_contact(data: CutData, recordings: tuple[Recording, ...]) -> None:
     names = ", ".join(recording.source or "the recording" for recording in recordings)
     if len(data.bins.opening) == 0:
         raise InputError(
             f"{names}: no stroke through material is marked in it; capture cuts with "
             "'scissorcal capture cut', or mark strokes and sheets when importing."
         )
-    start = np.concatenate([np.zeros(0), data.friction_mean])
-    torque = data.material_torque(start)
-    noise = float(np.median(np.abs(torque - np.median(torque)))) + 1e-12
-    felt = int(np.sum(torque > 6 * noise))
-    if felt < FEWEST_CONTACT_BINS and float(torque.max()) < 10 * noise:
+    felt = int(np.sum(data.material_torque(data.friction_mean) > FELT * data.empty_noise))
+    if felt < FEWEST_CONTACT_BINS:
         raise InputError(
             f"{names}: the blades hardly touched the material (torque beyond friction in "
-            f"{felt * data.bins.bin_s:.2g} s). Check that the sheet lay between the blades and that "
-            "advance was zero at its near edge, then capture again."
+            f"{felt * data.bins.bin_s:.2g} s). Check that the sheet lay between the blades and "
+            "that advance was zero at its near edge, then capture again."
         )
 
 
-def _ladder(data: _Data, recipe: Recipe) -> list[Rung]:
+def _ladder(data: CutData, recipe: Recipe) -> list[Rung]:
     settings = recipe.fit.cut
     families = ("power", "exponential") if settings.response == "auto" else (settings.response,)
     if not recipe.scene.cut:
@@ -247,25 +132,23 @@ def _ladder(data: _Data, recipe: Recipe) -> list[Rung]:
     return [_rung(data, recipe, family, fracture) for fracture in fractures for family in families]
 
 
-def _rung(data: _Data, recipe: Recipe, family: str, fracture: str) -> Rung:
+def _rung(data: CutData, recipe: Recipe, family: str, fracture: str) -> Rung:
     material = _material_layout(data, recipe, fracture)
     layout = Layout(material.parameters + data.friction_layout.parameters)
     key = {"response": family, "fracture": fracture}
     structure = {**key, **data.geometry}
     own = len(material.parameters)
-    evaluate = _Evaluator(data, structure, material)
+    material_model = MaterialModel(data, structure, material)
 
     def residuals(u: Array) -> Array:
-        return data.material_torque(u) - evaluate(u[:own]).mean
+        return data.material_torque(u) - material_model(u[:own]).mean
 
     def standardised(u: Array) -> Array:
-        state = evaluate(u[:own])
-        return np.asarray((data.material_torque(u) - state.mean) / state.sd)
+        return innovations(residuals(u), material_model(u[:own])).standardised
 
     def terms(u: Array) -> Array:
-        state = evaluate(u[:own])
-        z = (data.material_torque(u) - state.mean) / state.sd
-        return np.asarray(-0.5 * z**2 - np.log(state.sd))
+        found = innovations(residuals(u), material_model(u[:own]))
+        return np.asarray(-0.5 * found.standardised**2 - np.log(found.sd))
 
     precision = np.zeros((len(layout.names),) * 2)
     precision[:own, :own] = np.diag(1 / material.sd**2)
@@ -281,55 +164,7 @@ def _rung(data: _Data, recipe: Recipe, family: str, fracture: str) -> Rung:
     )
 
 
-@dataclass(frozen=True)
-class _State:
-    mean: Array
-    sd: Array
-
-
-class _Evaluator:
-    """Model mean and standard deviation by bin, remembering the last material it was asked for.
-
-    Differences by friction's parameters leave the material unchanged, and the material is what
-    costs time.
-    """
-
-    def __init__(self, data: _Data, structure: dict[str, Any], layout: Layout) -> None:
-        self.data, self.structure, self.layout = data, structure, layout
-        self.last: tuple[bytes, _State] | None = None
-
-    def __call__(self, u: Array) -> _State:
-        key = u.tobytes()
-        if self.last is not None and self.last[0] == key:
-            return self.last[1]
-        state = self._evaluate(u)
-        self.last = (key, state)
-        return state
-
-    def _evaluate(self, u: Array) -> _State:
-        data, values = self.data, self.layout.natural(u)
-        cutting = cutting_from(self.structure, values)
-        torque, tip = data.along(cutting)
-        mean = torque[data.used]
-        variance = values["noise"] ** 2 + (values["variation"] * mean) ** 2
-        if "kappa" in values:
-            advancing = np.concatenate([[False], np.diff(tip) > 0])[data.used]
-            spread = torque_spread_along(
-                cutting,
-                data.bins.opening,
-                data.bins.rate,
-                tip[data.used] - data.bins.advance,
-                data.bins.bin_s,
-            )
-            variance = variance + np.where(advancing, spread, 0.0) ** 2
-        return _State(mean, np.sqrt(variance))
-
-
-def _material_values(rung: Rung, u: Array) -> dict[str, Array]:
-    return rung.layout.natural(u)
-
-
-def _material_layout(data: _Data, recipe: Recipe, fracture: str) -> Layout:
+def _material_layout(data: CutData, recipe: Recipe, fracture: str) -> Layout:
     settings = recipe.fit.cut
     force, exponent = settings.response_force_N, settings.response_exponent
     rows = [
@@ -385,7 +220,37 @@ def _material_layout(data: _Data, recipe: Recipe, fracture: str) -> Layout:
     return Layout(tuple(rows))
 
 
-def _starts(data: _Data, material: Layout) -> Array:
+def _nearest(rung: Rung, climbed: list[Climbed]) -> Climbed | None:
+    """The climbed rung that shares most discrete choices, the latest of equals."""
+    shared = [sum(c.rung.key[k] == v for k, v in rung.key.items()) for c in climbed]
+    return climbed[max(range(len(shared)), key=lambda i: (shared[i], i))] if climbed else None
+
+
+def _from_neighbour(rung: Rung, neighbour: Climbed) -> Rung:
+    """Start a rung where its neighbour ended, in the parameters that mean the same in both.
+
+    A ripple lowers the mean force for a given fracture energy, so that rungs with one start at
+    several strengths of it, each with the energy that keeps the mean.
+    """
+    names = list(neighbour.rung.layout.names)
+    same_family = rung.key["response"] == neighbour.rung.key["response"]
+    start = rung.starts[0].copy()
+    for index, name in enumerate(rung.layout.names):
+        if name in names and (same_family or name != "response_exponent"):
+            start[index] = neighbour.optimum.point[names.index(name)]
+    if "kappa" not in rung.layout.names or "kappa" in names:
+        return replace(rung, starts=start[None, :])
+    rows = []
+    where, energy = rung.layout.names.index("kappa"), rung.layout.names.index("fracture_energy")
+    for kappa in (0.9, 0.6):
+        row = start.copy()
+        row[where] = np.log(kappa) - np.log1p(-kappa)
+        row[energy] -= np.log(0.5 + 0.5 * kappa)
+        rows.append(row)
+    return replace(rung, starts=np.stack(rows))
+
+
+def _starts(data: CutData, material: Layout) -> Array:
     """Starts that differ in stiffness and fracture energy; friction starts at its mean."""
     torque = data.material_torque(data.friction_mean)
     noise = np.log(max(float(np.median(np.abs(torque))) * 0.3, 1e-6))

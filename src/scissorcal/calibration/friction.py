@@ -41,9 +41,9 @@ def fit_friction(
 
     drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
     + viscous, + Stribeck, + angle, each symmetric or not. An asymmetric law has no offset of its
-    own: an offset and unequal Coulomb levels cannot be told apart. The rung that unseen strokes cannot tell
-    from the best is taken, the cheapest first, unless ``settings`` name one. Works for a rotary
-    joint and for a linear one; units follow the recordings' joint.
+    own: an offset and unequal Coulomb levels cannot be told apart. The rung that unseen strokes
+    cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
+    for a rotary joint and for a linear one; units follow the recordings' joint.
 
     Raises InputError where the recordings hold too little motion, and says what is missing.
     """

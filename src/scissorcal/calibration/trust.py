@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
 from scissorcal.inference import Posterior
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Status, Verdict
 
 K_HAT_LIMIT = 0.7
 PRIOR_ONLY = 0.9
@@ -42,7 +42,7 @@ def trust_verdicts(
 
 def _search(scope: str, chosen: Climbed) -> Verdict:
     ended = chosen.optimum
-    status = "pass" if ended.success else "fail"
+    status: Status = "pass" if ended.success else "fail"
     return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
 
 
@@ -129,5 +129,5 @@ def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
         f"On strokes it had not seen the law is off by {median:.1%} (median, rms); "
         f"worst is stroke {worst.stroke} with {worst.relative_rms:.1%}."
     )
-    status = "pass" if median < HELD_OUT_LIMIT else "fail"
+    status: Status = "pass" if median < HELD_OUT_LIMIT else "fail"
     return Verdict(scope, "held-out", status, median, HELD_OUT_LIMIT, why)

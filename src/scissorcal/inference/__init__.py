@@ -1,7 +1,7 @@
 """Posteriors of any model: optimum, curvature, autocorrelation, importance sampling."""
 
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
-from scissorcal.inference.curvature import gradient, hessian
+from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import Posterior, infer
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
@@ -15,5 +15,6 @@ __all__ = [
     "hessian",
     "infer",
     "ljung_box",
+    "natural_step",
     "robust_covariance_of_scores",
 ]

@@ -40,7 +40,7 @@ def ljung_box(residuals: Array, series: Labels, lags: int = 20) -> Whiteness:
     statistic = n * (n + 2) * np.sum(correlations**2 / (n - np.arange(1, lags + 1)))
     summed, lag = 0.0, 1
     while lag + 1 <= longest:
-        pair = (_lagged(r, r, series, lag) + _lagged(r, r, series, lag + 1)) / total
+        pair = float(_lagged(r, r, series, lag) + _lagged(r, r, series, lag + 1)) / total
         if pair <= 0:
             break
         summed += pair

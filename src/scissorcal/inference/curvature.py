@@ -25,7 +25,7 @@ def gradient(function: Callable[[Array], Array], point: Array, step: Array) -> A
 
 
 def hessian(function: Callable[[Array], float], point: Array, step: Array) -> Array:
-    """Second derivatives of a scalar function, shape (p, p), symmetric, fourth order in ``step``."""
+    """Second derivatives of a scalar function, shape (p, p), of fourth order in ``step`` (p,)."""
     wide = _hessian_once(function, point, step)
     near = _hessian_once(function, point, step / 2)
     return (4 * near - wide) / 3

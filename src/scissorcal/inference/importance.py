@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ class Sampled:
         """Equally weighted draws (count, p), by systematic resampling."""
         positions = (rng.random() + np.arange(count)) / count
         chosen = np.searchsorted(np.cumsum(self.weights), positions)
-        return self.draws[rng.permutation(np.minimum(chosen, len(self.draws) - 1))]
+        return np.asarray(self.draws[rng.permutation(np.minimum(chosen, len(self.draws) - 1))])
 
 
 def sample_by_importance(
@@ -65,7 +66,8 @@ def _weigh(draws: Array, log_ratio: Array) -> Sampled:
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:
         return Sampled(draws, np.full(len(draws), 1 / len(draws)), np.inf, 0.0)
-    smoothed, k_hat = arviz.psislw(log_ratio[usable])
+    smooth: Any = arviz.psislw
+    smoothed, k_hat = smooth(log_ratio[usable])
     weights = np.zeros(len(draws))
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()

@@ -19,6 +19,9 @@ Progress = Callable[[float, str], None]
 RIDGE = 1e-3
 """Information, in units of the prior's, that keeps directions without data well defined."""
 
+LEAST_INFORMATION = 0.1
+"""Information along any direction, in units of the prior's, that a covariance is built from."""
+
 
 @dataclass(frozen=True)
 class Posterior:
@@ -70,11 +73,11 @@ def infer(
     stretch, robust = _stretch(information, spread, scale)
     slope_prior, curvature_prior = _prior_shape(problem, best.point, step)
     precision = robust + curvature_prior
-    covariance = np.linalg.inv(precision)
+    covariance = _inverse(precision, scale)
+    reach = 3 * np.sqrt(np.diag(covariance))
     slope = slope_prior + stretch.T @ scores.sum(axis=0)
-    shift = np.clip(covariance @ slope, -3 * np.sqrt(np.diag(covariance)), None)
-    centre = best.point + np.minimum(shift, 3 * np.sqrt(np.diag(covariance)))
-    naive = np.linalg.inv(information + curvature_prior + RIDGE * np.diag(1 / scale**2))
+    centre = best.point + np.clip(covariance @ slope, -reach, reach)
+    naive = _inverse(information + curvature_prior, scale)
     inflation = np.sqrt(np.diag(covariance) / np.diag(naive))
     null = _null_directions(robust, scale, problem.names)
 
@@ -111,6 +114,14 @@ def _positive(matrix: Array, scale: Array) -> Array:
     """Nearest positive semi-definite matrix, judged in units of the prior."""
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T / np.outer(scale, scale))
+
+
+def _inverse(precision: Array, scale: Array) -> Array:
+    """Covariance from a precision, taken in units of the prior and positive definite for sure."""
+    unit = np.outer(scale, scale)
+    scaled = precision * unit
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return np.asarray((vectors / np.maximum(values, LEAST_INFORMATION)) @ vectors.T * unit)
 
 
 def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Array]:

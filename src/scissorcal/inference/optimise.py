@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.curvature import gradient
 from scissorcal.inference.problem import Problem
 
 Array = NDArray[np.float64]
@@ -20,6 +19,9 @@ SETTLED = 1e-3
 """A round of search that gains less log-posterior than this has arrived."""
 
 ROUNDS = 12
+ROUNDS_BEFORE_CHOICE = 2
+HOPELESS = 20.0
+"""A start this much log-posterior below the best one after its first rounds is given up."""
 
 
 @dataclass(frozen=True)
@@ -45,54 +47,61 @@ def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
 
     Each start is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06) in coordinates
     that the scores' outer product makes round, until a round gains nothing: strongly correlated
-    parameters then cost no more than independent ones. The best point ever seen is kept, whatever
-    code the library returns, since it reports rounding trouble at points that are solved and
-    success at points it never could evaluate. Raises ValueError if no start is finite.
+    parameters then cost no more than independent ones. A start whose first rounds end far below
+    another's is given up. The best point ever seen is kept, whatever code the library returns,
+    since it reports rounding trouble at points that are solved and success at points it never
+    could evaluate. Raises ValueError if no start is finite.
     """
-    chosen = problem.starts if starts is None else starts
-    runs = [_climb(problem, start) for start in np.atleast_2d(chosen)]
-    finite = [run for run in runs if np.isfinite(run.value)]
-    if not finite:
+    chosen = np.atleast_2d(problem.starts if starts is None else starts)
+    begun = [_climb(problem, _begin(problem, start), ROUNDS_BEFORE_CHOICE) for start in chosen]
+    top = max(climb.value for climb in begun)
+    if not np.isfinite(top):
         raise ValueError("The log-posterior is finite at no start; check the data for NaN.")
-    best = max(finite, key=lambda run: run.value)
-    agreeing = sum(run.value > best.value - SAME_OPTIMUM for run in finite)
-    sentence = best.sentence
-    if agreeing < len(runs):
-        sentence += f" {agreeing} of {len(runs)} starts ended there, the others lower."
-    return Optimum(
-        best.point,
-        best.value,
-        best.success,
-        sentence,
-        agreeing,
-        len(runs),
-        sum(run.evaluations for run in runs),
-    )
-
-
-def _climb(problem: Problem, start: Array) -> Optimum:
-    point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
-    value = problem.log_posterior(point)
-    evaluations, gained = 1, np.inf
-    root = np.diag(0.2 * problem.prior_sd)
-    for number in range(ROUNDS):
-        if not np.isfinite(value):
-            break
-        reached, height, used = _round(problem, point, value, root)
-        evaluations += used
-        gained, point, value = height - value, reached, height
-        if gained < SETTLED and number > 0:
-            break
-        root, used = _rounding(problem, point)
-        evaluations += used
-    success = bool(np.isfinite(value) and gained < SETTLED)
+    ended = [
+        _climb(problem, climb, ROUNDS) if climb.value > top - HOPELESS else climb for climb in begun
+    ]
+    best = max(ended, key=lambda climb: climb.value)
+    agreeing = sum(climb.value > best.value - SAME_OPTIMUM for climb in ended)
+    success = best.gained < SETTLED
     sentence = (
         "The search settled."
         if success
         else "The search was still climbing when its rounds were used up: record more varied "
         "motion, or choose a simpler rung."
     )
-    return Optimum(point, value, success, sentence, 1, 1, evaluations)
+    if agreeing < len(ended):
+        sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
+    evaluations = sum(climb.evaluations for climb in ended)
+    return Optimum(best.point, best.value, success, sentence, agreeing, len(ended), evaluations)
+
+
+@dataclass(frozen=True)
+class _Climb:
+    point: Array
+    value: float
+    gained: float
+    root: Array
+    evaluations: int
+
+
+def _begin(problem: Problem, start: Array) -> _Climb:
+    point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
+    return _Climb(point, problem.log_posterior(point), np.inf, _rounding(problem, point), 1)
+
+
+def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
+    point, value, gained = climb.point, climb.value, climb.gained
+    root, evaluations = climb.root, climb.evaluations
+    for _ in range(rounds):
+        if not np.isfinite(value) or gained < SETTLED:
+            break
+        reached, height, used = _round(problem, point, value, root)
+        gained, point, value = height - value, reached, height
+        evaluations += used
+        if gained >= SETTLED:
+            root = _rounding(problem, point)
+            evaluations += 2 * len(point)
+    return _Climb(point, value, gained, root, evaluations)
 
 
 def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[Array, float, int]:
@@ -126,11 +135,14 @@ def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[
     return best_point, best_value, evaluations
 
 
-def _rounding(problem: Problem, point: Array) -> tuple[Array, int]:
+def _rounding(problem: Problem, point: Array) -> Array:
     """Root of the covariance that the scores suggest, for rounder coordinates."""
+    terms = problem.log_likelihood_terms
     step = 1e-4 * problem.prior_sd
-    scores = gradient(problem.log_likelihood_terms, point, step)
-    scaled = scores * problem.prior_sd
+    reaches = np.diag(step)
+    scaled = np.stack(
+        [0.5 * (terms(point + reach) - terms(point - reach)) / 1e-4 for reach in reaches], axis=-1
+    )
     information = scaled.T @ scaled + np.eye(len(point))
     values, vectors = np.linalg.eigh(information)
-    return problem.prior_sd[:, None] * vectors / np.sqrt(values), 4 * len(point)
+    return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))

@@ -5,8 +5,8 @@ from scissorcal.model.cutting import (
     cut_torque,
     cut_torque_along,
     ripple_moments,
+    ripple_spread,
     settled_contact,
-    torque_spread_along,
 )
 from scissorcal.model.edge import Edge, EdgeView, edge_height
 from scissorcal.model.friction import FrictionLaw, friction_torque
@@ -23,6 +23,6 @@ __all__ = [
     "edge_height",
     "friction_torque",
     "ripple_moments",
+    "ripple_spread",
     "settled_contact",
-    "torque_spread_along",
 ]

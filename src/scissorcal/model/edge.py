@@ -32,12 +32,14 @@ class Edge:
     def offset_at(self, station: ArrayLike) -> Array:
         """Offset e(s) in metres, same shape as ``station``."""
         s = np.asarray(station, dtype=np.float64)
-        return self.offset_m + s * (np.tan(self.taper_rad) + 0.5 * self.curvature_per_m * s)
+        return np.asarray(
+            self.offset_m + s * (np.tan(self.taper_rad) + 0.5 * self.curvature_per_m * s)
+        )
 
     def slope_at(self, station: ArrayLike) -> Array:
         """Slope e'(s) = tan(alpha(s)), same shape as ``station``."""
         s = np.asarray(station, dtype=np.float64)
-        return np.tan(self.taper_rad) + self.curvature_per_m * s
+        return np.asarray(np.tan(self.taper_rad) + self.curvature_per_m * s)
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
 
 def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
     tangent = np.tan(edge.taper_rad)
-    station = (x + edge.offset_m * sine) / (cosine - tangent * sine)
+    station: Array = (x + edge.offset_m * sine) / (cosine - tangent * sine)
     if edge.curvature_per_m == 0.0:
         return station
     for _ in range(NEWTON_STEPS):

@@ -37,9 +37,9 @@ def friction_torque(law: FrictionLaw, opening: ArrayLike, rate: ArrayLike) -> Ar
 
     ``opening`` (rad) and ``rate`` (rad/s) broadcast with each other and with the law's fields.
 
-    >>> law = FrictionLaw(coulomb_pos=0.010, coulomb_neg=0.012, viscous_pos=0.002, viscous_neg=0.002)
+    >>> law = FrictionLaw(coulomb_pos=0.010, coulomb_neg=0.012, viscous_neg=0.002)
     >>> friction_torque(law, 0.3, [-1.0, 0.0, 1.0])
-    array([-0.014,  0.   ,  0.012])
+    array([-0.014,  0.   ,  0.01 ])
     """
     w = np.asarray(rate, dtype=np.float64)
     speed = np.abs(w)

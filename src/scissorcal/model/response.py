@@ -20,7 +20,8 @@ class Response:
     ``reference_m``, so that their parameters are nearly uncorrelated and mean the same:
 
     * ``power``: g = force (delta / reference)^exponent
-    * ``exponential``: g = force (exp(b delta) - 1) / (exp(b reference) - 1), b = exponent / reference
+    * ``exponential``: g = force (exp(b delta) - 1) / (exp(b reference) - 1), with
+      b = exponent / reference
 
     For delta <= 0 there is no contact and no force.
 
@@ -70,26 +71,8 @@ class Response:
         grown = np.log1p(ratio * np.expm1(self.exponent))
         return np.asarray(self.reference_m * grown / self.exponent)
 
-    def mean_square_between(self, low: ArrayLike, high: ArrayLike) -> Array:
-        """Mean of g^2 over indentations uniform between ``low`` and ``high``, in N^2.
-
-        Needed for the strength of the fracture ripple; 16-point Gauss-Legendre, whose error is
-        below 1e-10 for every response within the range of one ripple cycle.
-        """
-        nodes, weights = np.polynomial.legendre.leggauss(16)
-        low, high = np.asarray(low)[..., None], np.asarray(high)[..., None]
-        points = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-        widened = Response(
-            self.family, _last_axis(self.force), _last_axis(self.exponent), self.reference_m
-        )
-        return np.asarray(0.5 * np.sum(weights * widened.force_at(points) ** 2, axis=-1))
-
     def _relative(self, indentation: ArrayLike) -> Array:
         return np.maximum(np.asarray(indentation, dtype=np.float64), 0.0) / self.reference_m
 
     def _argument(self, relative: Array) -> Array:
         return np.minimum(self.exponent * relative, LARGEST_ARGUMENT)
-
-
-def _last_axis(value: float | Array) -> float | Array:
-    return value[..., None] if isinstance(value, np.ndarray) and value.ndim else value
