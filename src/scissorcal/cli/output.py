@@ -96,6 +96,11 @@ def note(sentence: str) -> None:
     click.echo(sentence, err=True)
 
 
+def stdout_is_for_json() -> bool:
+    """Whether the running command was given ``--json``, so that stdout is the object's alone."""
+    return bool(click.get_current_context().params.get("as_json"))
+
+
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     """Lay out rows of words in columns; columns named in ``right`` are set flush right.
 

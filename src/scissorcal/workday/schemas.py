@@ -1,7 +1,7 @@
 """The JSON schemas in data_schemas/, generated from the code they describe.
 
-    python -m scissorcal.workday.schemas --check    # exit code 1 where a file has fallen behind
-    python -m scissorcal.workday.schemas --write    # write them anew
+python -m scissorcal.workday.schemas --check    # exit code 1 where a file has fallen behind
+python -m scissorcal.workday.schemas --write    # write them anew
 """
 
 import json

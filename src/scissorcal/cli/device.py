@@ -1,0 +1,35 @@
+"""``scissorcal device``"""
+
+import click
+
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.output import Answer, command
+
+_COMMANDS = {
+    "list": ("scissorcal.cli.device:list_", "The serial ports of this machine."),
+    "doctor": ("scissorcal.cli.doctor:doctor", "Measure port, timer and scheduler; name mends."),
+    "simulate": ("scissorcal.cli.simulate:simulate", "Serve a virtual rig on a pseudo-terminal."),
+}
+
+
+@click.group("device", cls=LazyGroup, lazy=_COMMANDS)
+def device() -> None:
+    """Find, check or simulate a rig."""
+
+
+@click.command("list")
+@command
+def list_() -> Answer:
+    """List the serial ports of this machine.
+
+    \b
+    Example:
+      $ scissorcal device list
+      /dev/ttyUSB0
+      sim (a virtual rig; every --device takes it)
+    """
+    from scissorcal.device.ports import known_ports
+
+    ports = known_ports()
+    lines = [*(ports or ["no serial port"]), "sim (a virtual rig; every --device takes it)"]
+    return Answer({"ports": ports}, "\n".join(lines))

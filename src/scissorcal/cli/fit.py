@@ -1,0 +1,104 @@
+"""``scissorcal fit``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.progress import progress
+
+if TYPE_CHECKING:
+    from scissorcal.calibration import FittedParameter
+    from scissorcal.workday.fits import FitOutcome
+
+
+@click.command("fit")
+@click.argument("what", type=click.Choice(["friction", "cut", "all"]), default="all")
+@click.option(
+    "--effort",
+    type=click.Choice(["draft", "standard"]),
+    default=None,
+    help="draft: quick, intervals unchecked; standard: checked. The recipe's if not given.",
+)
+@click.option("--force", is_flag=True, help="Fit again even where nothing changed.")
+@seed_option
+@workspace_option
+@command
+def fit(
+    what: Literal["friction", "cut", "all"],
+    effort: Literal["draft", "standard"] | None,
+    force: bool,
+    seed: int,
+    folder: Path | None,
+) -> Answer:
+    """Fit friction and the cut, as far as the scene requires them.
+
+    A fit whose recordings and settings have not changed is not done again.
+
+    \b
+    Example:
+      $ scissorcal fit friction
+      friction: coulomb + viscous, symmetric (standard)
+      parameter  unit      mean  sd  5 %  95 %  identifiability
+      $ scissorcal fit friction
+      friction: nothing changed since the last fit
+    """
+    from scissorcal.workday.fits import fit_workspace
+
+    workspace = open_workspace(folder)
+    wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
+    with progress() as tell:
+        outcomes = fit_workspace(
+            workspace, wanted, effort=effort, seed=seed, force=force, progress=tell
+        )
+    fits = [
+        {
+            "what": outcome.what,
+            "cached": outcome.cached,
+            "rung": outcome.result.rung,
+            "parameters": [parameter.name for parameter in outcome.result.parameters],
+            "effort": outcome.result.effort,
+            "rungs": outcome.result.rungs,
+            "diagnostics": outcome.result.diagnostics,
+            "held_out": outcome.result.held_out,
+            "inputs_hash": outcome.result.inputs_hash,
+            "notes": outcome.result.notes,
+        }
+        for outcome in outcomes
+    ]
+    result = {
+        "parameters": [
+            parameter.as_dict() for outcome in outcomes for parameter in outcome.result.parameters
+        ],
+        "fits": fits,
+    }
+    return Answer(
+        result,
+        "\n\n".join(_text(outcome) for outcome in outcomes),
+        verdicts=[verdict for outcome in outcomes for verdict in outcome.result.verdicts],
+        files=[outcome.path for outcome in outcomes if not outcome.cached],
+    )
+
+
+def _text(outcome: "FitOutcome") -> str:
+    fitted = outcome.result
+    head = f"{outcome.what}: {fitted.rung} ({fitted.effort})"
+    if outcome.cached:
+        head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
+    return f"{head}\n{parameter_table(fitted.parameters)}"
+
+
+def parameter_table(parameters: "tuple[FittedParameter, ...]") -> str:
+    """Set out fitted parameters for people."""
+    rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", "identifiability"]]
+    for parameter in parameters:
+        numbers = (parameter.mean, parameter.sd, parameter.q05, parameter.q95)
+        rows.append(
+            [parameter.name, parameter.unit]
+            + [f"{number:.4g}" for number in numbers]
+            + [f"{parameter.identifiability:.2f}"]
+        )
+    return table(rows, right=range(2, 7))

@@ -1,0 +1,94 @@
+"""``scissorcal package``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.output import Answer, command
+
+if TYPE_CHECKING:
+    from scissorcal.package import Manifest
+
+_COMMANDS = {
+    "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
+    "check": ("scissorcal.cli.package:check", "Hold a package to what it states."),
+}
+
+
+@click.group("package", cls=LazyGroup, lazy=_COMMANDS)
+def package() -> None:
+    """Build or check the model package, the one file that a rig renders."""
+
+
+@click.command("build")
+@click.option("--force", is_flag=True, help="Build again even where nothing changed.")
+@seed_option
+@workspace_option
+@command
+def build(force: bool, seed: int, folder: Path | None) -> Answer:
+    """Compile the workspace's fits into package/<recipe>.zip, and check it.
+
+    \b
+    Example:
+      $ scissorcal package build
+      package/paper-80gsm.zip: 5 tables, 200 draws, error bound 0.00012 N m
+      pass  package  bound  On 13337 places of its own the kernel is at most ...
+    """
+    from scissorcal.workday.packages import build_workspace_package
+
+    workspace = open_workspace(folder)
+    built = build_workspace_package(workspace, seed=seed, force=force)
+    head = f"{workspace.relative(built.path)}: {_contents(built.manifest)}"
+    if built.cached:
+        head += "\nnothing changed since it was built, so it is as it was"
+    text = "\n".join([head, *(f"note: {warning}" for warning in built.warnings)])
+    result = {**_facts(built.manifest), "cached": built.cached, "warnings": built.warnings}
+    files = [] if built.cached else [built.path]
+    return Answer(result, text, built.verdicts, files)
+
+
+@click.command("check")
+@click.argument("path", type=click.Path(path_type=Path), required=False)
+@workspace_option
+@command
+def check(path: Path | None, folder: Path | None) -> Answer:
+    """Check a package (PATH, or the workspace's): bytes, bound, extremes, fits.
+
+    \b
+    Example:
+      $ scissorcal package check package/paper-80gsm.zip
+      package/paper-80gsm.zip: 5 tables, 200 draws, error bound 0.00012 N m
+      pass  package  bound  On 13337 places of its own the kernel is at most ...
+    """
+    from scissorcal.package import check_package, open_package
+
+    if path is None:
+        workspace = open_workspace(folder)
+        path = workspace.package_path(workspace.recipe())
+    manifest = open_package(path).manifest
+    return Answer(_facts(manifest), f"{path}: {_contents(manifest)}", check_package(path))
+
+
+def _contents(manifest: "Manifest") -> str:
+    tables = [member for member in manifest.members if member.file.startswith("tables/")]
+    draws = max(
+        (member.shape[0] for member in manifest.members if member.file.startswith("draws/")),
+        default=0,
+    )
+    bound = manifest.bound.stated_Nm
+    return f"{len(tables)} tables, {draws} draws, error bound {bound:.2g} N m"
+
+
+def _facts(manifest: "Manifest") -> dict[str, object]:
+    return {
+        "name": manifest.name,
+        "content_hash": manifest.content_hash,
+        "inputs_hash": manifest.provenance.inputs_hash,
+        "bound": manifest.bound.model_dump(),
+        "ranges": manifest.ranges.model_dump(),
+        "bytes": sum(member.bytes for member in manifest.members),
+    }

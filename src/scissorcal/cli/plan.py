@@ -1,0 +1,56 @@
+"""``scissorcal plan``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import workspace_option
+from scissorcal.cli.output import Answer, command, table
+
+if TYPE_CHECKING:
+    from scissorcal.workday.plan import Plan
+
+
+@click.command("plan")
+@workspace_option
+@command
+def plan(folder: Path | None) -> Answer:
+    """What the scene requires: what is done, missing or stale, and what comes next.
+
+    Stale means that what it was made from has changed since, by content.
+
+    \b
+    Example:
+      $ scissorcal plan
+      step              state    found                 needed for
+      capture friction  missing  nothing recorded yet  rendered, and taken off the torque ...
+      next: scissorcal capture friction --device PORT
+    """
+    from scissorcal.workday.plan import make_plan
+
+    workspace = open_workspace(folder)
+    found = make_plan(workspace)
+    result = {
+        "recipe": found.recipe,
+        "workspace": workspace.root,
+        "steps": found.steps,
+        "tables": found.tables,
+        "left_out": found.left_out,
+        "notes": found.notes,
+        "next_command": found.next_command,
+    }
+    return Answer(result, _text(found))
+
+
+def _text(found: "Plan") -> str:
+    rows = [["step", "state", "found", "needed for"]]
+    rows += [[step.name, step.status, step.state, step.why] for step in found.steps]
+    lines = [f"{found.recipe}:", "", table(rows), ""]
+    if found.tables:
+        lines.append("tables to build: " + ", ".join(item.name for item in found.tables))
+    lines += [f"left out: {item.name} ({item.why})" for item in found.left_out]
+    lines += [f"note: {note}" for note in found.notes]
+    lines += ["", f"next: {found.next_command or 'nothing; scissorcal render is ready to run'}"]
+    return "\n".join(lines)

@@ -1,0 +1,54 @@
+"""``scissorcal device simulate``"""
+
+import click
+
+from scissorcal.cli.options import seed_option
+from scissorcal.cli.output import Answer, command, note, stdout_is_for_json
+
+
+@click.command("simulate")
+@click.argument("specimen", default="office-paper")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="KIND=VALUE",
+    help="drop=0.01, garble=0.01 (shares of frames), delay=16 (ms), unplug=5 or stuck-encoder=5 "
+    "(seconds after streaming begins); may be repeated.",
+)
+@seed_option
+@command
+def simulate(specimen: str, faults: tuple[str, ...], seed: int) -> Answer:
+    """Serve a virtual rig with SPECIMEN between its blades, until interrupted.
+
+    SPECIMEN is the name of a built-in specimen or a .toml file. The port's path is the first line
+    on stdout (on stderr with --json, where stdout has one object at the end).
+
+    \b
+    Example:
+      $ scissorcal device simulate office-paper --seed 1
+      /dev/pts/4
+    """
+    from scissorcal.device.sim.faults import parse_faults
+    from scissorcal.device.sim.server import serve
+    from scissorcal.device.sim.specimen import load_specimen
+
+    announced: list[str] = []
+
+    def announce(path: str) -> None:
+        announced.append(path)
+        click.echo(path, err=stdout_is_for_json())
+        note("Serving a virtual rig; interrupt (Ctrl-C) to end it.")
+
+    loaded = load_specimen(specimen)
+    ended = serve(loaded, seed, parse_faults(faults), announce)
+    why = "unplugged, as its fault said" if ended.unplugged else "ended"
+    text = f"{why} after {ended.ticks} ticks; the machine held it up {ended.stalls} times"
+    result = {
+        "port": announced[0],
+        "specimen": loaded.name,
+        "ticks": ended.ticks,
+        "stalls": ended.stalls,
+        "unplugged": ended.unplugged,
+    }
+    return Answer(result, text)

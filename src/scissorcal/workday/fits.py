@@ -1,0 +1,177 @@
+"""Fit what a workspace's scene requires, in order, and only where something changed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.requirements import requirements
+from scissorcal.recipe.schema import Recipe
+from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.workspace import FitKind, Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.calibration import FitResult
+    from scissorcal.calibration.result import Effort
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class FitOutcome:
+    """One fit of a workspace: its result, its file, and whether it had to be done at all."""
+
+    what: FitKind
+    result: "FitResult"
+    path: Path
+    cached: bool
+
+
+def fit_workspace(
+    workspace: Workspace,
+    wanted: Sequence[FitKind] = (),
+    *,
+    effort: "Effort | None" = None,
+    seed: int = 0,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[FitOutcome, ...]:
+    """Run the fits that the scene requires, each only where its inputs changed.
+
+    ``wanted`` names fits; none means all that the scene requires. A cut's fit builds on that of
+    friction, which is run first where it is missing or its inputs changed. ``effort`` is the
+    recipe's where not given. A fit whose inputs hash (recordings, settings, effort, fits it builds
+    on) equals that of the stored one is read back instead; ``force`` does it again all the same.
+
+    Raises InputError where the scene does not require what is wanted, MissingError where nothing
+    was captured, and what the fits themselves raise.
+    """
+    recipe = workspace.recipe()
+    needed = [item.name for item in requirements(recipe).fits]
+    order: list[FitKind] = [kind for kind in _ORDER if kind in (wanted or needed)]
+    for kind in order:
+        if kind not in needed:
+            raise InputError(
+                f"{workspace.recipe_path}: this scene requires no fit of {kind}; it requires "
+                f"{' and '.join(needed)}."
+            )
+    if "cut" in order and "friction" not in order and not _friction_is_current(workspace, recipe):
+        order.insert(0, "friction")
+    outcomes: list[FitOutcome] = []
+    for index, kind in enumerate(order):
+        share = _share(progress, index, len(order))
+        outcomes.append(_fit(workspace, recipe, kind, effort, seed, force, share))
+    return tuple(outcomes)
+
+
+def current_fits(workspace: Workspace, recipe: Recipe) -> "dict[FitKind, FitResult]":
+    """Load the fits that the scene requires, as far as they are of what is there now.
+
+    Raises MissingError naming the command where one is missing or its inputs changed since.
+    """
+    from scissorcal.calibration import load_fit
+
+    fits: dict[FitKind, FitResult] = {}
+    needed = [item.name for item in requirements(recipe).fits]
+    for what in (kind for kind in _ORDER if kind in needed):
+        path = workspace.fit_path(what)
+        if not path.is_file():
+            raise MissingError(f"There is no fit of {what} yet: run 'scissorcal fit' first.")
+        fits[what] = load_fit(path)
+        if not is_current(workspace, recipe, fits[what], fits.get("friction")):
+            raise MissingError(
+                f"{path} was made from other recordings or settings than there are now: run "
+                "'scissorcal fit' first."
+            )
+    return fits
+
+
+def is_current(
+    workspace: Workspace, recipe: Recipe, fit: "FitResult", friction: "FitResult | None"
+) -> bool:
+    """Whether a fit's inputs are still what they were, at the fit's own effort.
+
+    ``friction`` is the friction fit as it is now, which a fit of a cut builds on.
+    """
+    upstream = friction.inputs_hash if friction and fit.what == "cut" else ""
+    return fit.inputs_hash == expected_hash(workspace, recipe, fit.what, fit.effort, upstream)
+
+
+def expected_hash(
+    workspace: Workspace, recipe: Recipe, what: FitKind, effort: str, upstream: str = ""
+) -> str:
+    """Return the inputs hash that a fit of the workspace would have now."""
+    from scissorcal.calibration import fit_inputs_hash
+    from scissorcal.calibration.cut import settings_of
+
+    settings = recipe.fit.friction.model_dump_json() if what == "friction" else settings_of(recipe)
+    recordings = usable_recordings(workspace, recipe, what).recordings
+    return fit_inputs_hash(what, recordings, settings, effort, upstream)
+
+
+_ORDER: tuple[FitKind, ...] = ("friction", "cut")
+
+
+def _fit(
+    workspace: Workspace,
+    recipe: Recipe,
+    what: FitKind,
+    effort: "Effort | None",
+    seed: int,
+    force: bool,
+    progress: Progress,
+) -> FitOutcome:
+    import numpy as np
+
+    from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
+
+    chosen: Effort = effort or recipe.fit.effort
+    progress(0.0, f"{what}: reading recordings")
+    usable = usable_recordings(workspace, recipe, what)
+    if not usable.recordings:
+        raise MissingError(_nothing_captured(workspace, what, usable.left_out))
+    friction = load_fit(workspace.fit_path("friction")) if what == "cut" else None
+    path = workspace.fit_path(what)
+    upstream = friction.inputs_hash if friction else ""
+    if path.is_file() and not force:
+        stored = load_fit(path)
+        if stored.inputs_hash == expected_hash(workspace, recipe, what, chosen, upstream):
+            progress(1.0, f"{what}: nothing changed since the last fit")
+            return FitOutcome(what, stored, path, cached=True)
+    rng = np.random.default_rng([seed, _ORDER.index(what)])
+    if friction is None:
+        result = fit_friction(
+            usable.recordings, recipe.fit.friction, effort=chosen, rng=rng, progress=progress
+        )
+    else:
+        result = fit_cut(
+            usable.recordings, recipe, friction, effort=chosen, rng=rng, progress=progress
+        )
+    save_fit(result, path)
+    return FitOutcome(what, result, path, cached=False)
+
+
+def _friction_is_current(workspace: Workspace, recipe: Recipe) -> bool:
+    from scissorcal.calibration import load_fit
+
+    path = workspace.fit_path("friction")
+    return path.is_file() and is_current(workspace, recipe, load_fit(path), None)
+
+
+def _nothing_captured(workspace: Workspace, what: str, left_out: Sequence[str]) -> str:
+    because = "".join(f" {sentence}" for sentence in left_out)
+    return (
+        f"Nothing to fit: {workspace.captures_dir} has no {what} recording for this recipe."
+        f"{because} Take one with 'scissorcal capture {what} --device PORT' (or --device sim)."
+    )
+
+
+def _share(progress: Progress | None, index: int, count: int) -> Progress:
+    """Give the part of a progress that one of several steps may fill."""
+
+    def tell(done: float, sentence: str) -> None:
+        if progress is not None:
+            progress((index + done) / count, sentence)
+
+    return tell

@@ -1,0 +1,58 @@
+"""Build a workspace's model package from its fits, only where something changed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.requirements import requirements
+from scissorcal.verdicts import Verdict
+from scissorcal.workday.fits import current_fits
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.package import Manifest
+
+
+@dataclass(frozen=True)
+class Built:
+    """A package and what is known of it; ``cached`` where it was already there as it should be."""
+
+    path: Path
+    manifest: "Manifest"
+    verdicts: tuple[Verdict, ...]
+    warnings: tuple[str, ...]
+    cached: bool
+
+
+def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool = False) -> Built:
+    """Compile the fits of a workspace into package/<recipe>.zip.
+
+    Nothing is done where the package there was built from the same fits and recipe, unless
+    ``force``. Raises MissingError where a fit is missing or has fallen behind, and what
+    `scissorcal.package.build_package` raises.
+    """
+    import numpy as np
+
+    from scissorcal.package import build_package, check_package, open_package, package_inputs_hash
+
+    recipe = workspace.recipe()
+    if not requirements(recipe).tables:
+        raise InputError(
+            f"{workspace.recipe_path}: a linear joint carries no blades (rig.joint), so there is "
+            "no package to build; 'scissorcal report' shows its fit."
+        )
+    fits = current_fits(workspace, recipe)
+    friction, cut = fits.get("friction"), fits.get("cut")
+    path = workspace.package_path(recipe)
+    if path.is_file() and not force:
+        try:
+            package = open_package(path)
+        except InputError:
+            package = None
+        expected = package_inputs_hash(recipe, friction, cut)
+        if package and package.manifest.provenance.inputs_hash == expected:
+            verdicts = check_package(path)
+            return Built(path, package.manifest, verdicts, package.warnings, cached=True)
+    summary = build_package(recipe, friction, cut, path, np.random.default_rng(seed))
+    return Built(path, summary.manifest, summary.verdicts, summary.warnings, cached=False)

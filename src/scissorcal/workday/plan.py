@@ -1,0 +1,161 @@
+"""What a scene requires of the day: done, missing or stale, in order, and what comes next."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.requirements import CaptureKind, Requirement, requirements
+from scissorcal.recipe.schema import Recipe
+from scissorcal.verdicts import failed
+from scissorcal.workday.fits import is_current
+from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.reports import reported_fits
+from scissorcal.workday.workspace import FitKind, Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.calibration import FitResult
+
+Status = Literal["done", "missing", "stale"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the day: its state, the reason for that state, and the command that does it.
+
+    ``why`` says what the scene needs it for; ``state`` what was found.
+    """
+
+    name: str
+    status: Status
+    state: str
+    why: str
+    command: str
+    files: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All steps in the order of the day. ``next_command`` is None where nothing is left to do."""
+
+    recipe: str
+    steps: tuple[Step, ...]
+    tables: tuple[Requirement, ...]
+    left_out: tuple[Requirement, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def next_command(self) -> str | None:
+        """The command of the first step that is not done."""
+        return next((step.command for step in self.steps if step.status != "done"), None)
+
+
+def make_plan(workspace: Workspace) -> Plan:
+    """Compare what the recipe requires with what the workspace holds.
+
+    A fit is stale where its inputs (recordings, settings, fits that it builds on) no longer have
+    the hash it was made from; a report and a package where a fit that they show is another now. A
+    recording is stale where the recipe now names another rig, material or scene. Raises
+    InputError where the recipe is wrong.
+    """
+    recipe = workspace.recipe()
+    needs = requirements(recipe)
+    notes: list[str] = []
+    steps: list[Step] = []
+    for item in needs.captures:
+        kind: CaptureKind = "friction" if item.name == "friction" else "cut"
+        steps.append(_capture_step(workspace, recipe, kind, item.why, notes))
+    fits: dict[FitKind, FitResult] = {}
+    for item in needs.fits:
+        what: FitKind = "friction" if item.name == "friction" else "cut"
+        captured = next(step for step in steps if step.name == f"capture {what}")
+        steps.append(_fit_step(workspace, recipe, what, item.why, captured, fits))
+    fitted = all(step.status == "done" for step in steps)
+    steps.append(_report_step(workspace, fits, fitted))
+    if needs.tables:
+        steps.append(_package_step(workspace, recipe, fits, fitted))
+    return Plan(recipe.name, tuple(steps), needs.tables, needs.left_out, tuple(notes))
+
+
+def _capture_step(
+    workspace: Workspace, recipe: Recipe, kind: CaptureKind, why: str, notes: list[str]
+) -> Step:
+    command = f"scissorcal capture {kind} --device PORT"
+    name = f"capture {kind}"
+    try:
+        usable = usable_recordings(workspace, recipe, kind)
+    except InputError as error:
+        notes.append(str(error))
+        return Step(name, "missing", "a recording cannot be read", why, command)
+    notes.extend(usable.left_out)
+    if not usable.recordings:
+        if usable.left_out:
+            return Step(name, "stale", "recorded with another recipe", why, command)
+        return Step(name, "missing", "nothing recorded yet", why, command)
+    for recording in usable.recordings:
+        notes.extend(f"{recording.source}: {sentence}" for sentence in recording.notes)
+    seconds = sum(recording.duration_s for recording in usable.recordings)
+    count = len(usable.recordings)
+    state = f"{count} recording{'s' if count > 1 else ''}, {seconds:.0f} s"
+    files = tuple(recording.source for recording in usable.recordings)
+    return Step(name, "done", state, why, command, files)
+
+
+def _fit_step(
+    workspace: Workspace,
+    recipe: Recipe,
+    what: FitKind,
+    why: str,
+    captured: Step,
+    fits: "dict[FitKind, FitResult]",
+) -> Step:
+    """State of one fit; a fit that can be read is added to ``fits``."""
+    from scissorcal.calibration import load_fit
+
+    name, command, path = f"fit {what}", f"scissorcal fit {what}", workspace.fit_path(what)
+    if not path.is_file():
+        return Step(name, "missing", "not fitted yet", why, command)
+    try:
+        fit = fits[what] = load_fit(path)
+    except InputError:
+        state = f"{workspace.relative(path)} is damaged"
+        return Step(name, "stale", state, why, f"scissorcal fit {what} --force")
+    if captured.status != "done":
+        return Step(name, "stale", f"its recordings are {captured.status}", why, command)
+    if not is_current(workspace, recipe, fit, fits.get("friction")):
+        return Step(name, "stale", "its inputs changed since", why, command)
+    state = f"{fit.rung} ({fit.effort})"
+    wrong = [verdict.check for verdict in failed(fit.verdicts)]
+    if wrong:
+        state += f"; failed: {', '.join(wrong)}"
+    return Step(name, "done", state, why, command, (workspace.relative(path),))
+
+
+def _report_step(workspace: Workspace, fits: "dict[FitKind, FitResult]", fitted: bool) -> Step:
+    name, why, command = "report", "what to review before use", "scissorcal report"
+    path = workspace.report_json
+    if not path.is_file() or not workspace.report_html.is_file():
+        return Step(name, "missing", "not written yet", why, command)
+    if not fitted or reported_fits(workspace) != {fit.inputs_hash for fit in fits.values()}:
+        return Step(name, "stale", "it shows other fits than there are now", why, command)
+    files = (workspace.relative(workspace.report_html), workspace.relative(path))
+    return Step(name, "done", "shows the fits as they are now", why, command, files)
+
+
+def _package_step(
+    workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]", fitted: bool
+) -> Step:
+    from scissorcal.package import open_package, package_inputs_hash
+
+    name, why, command = "package build", "what the loop renders", "scissorcal package build"
+    path = workspace.package_path(recipe)
+    if not path.is_file():
+        return Step(name, "missing", "not built yet", why, command)
+    try:
+        manifest = open_package(path).manifest
+    except InputError:
+        return Step(name, "stale", f"{workspace.relative(path)} is damaged", why, command)
+    expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
+    if not fitted or manifest.provenance.inputs_hash != expected:
+        return Step(name, "stale", "built from other fits or another recipe", why, command)
+    state = f"error bound {manifest.bound.stated_Nm:.2g} N m"
+    return Step(name, "done", state, why, command, (workspace.relative(path),))
