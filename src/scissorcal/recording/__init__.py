@@ -1,0 +1,67 @@
+"""Recordings: write, read, recover, import and export what a rig did."""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scissorcal.recording.exporting import export_table
+    from scissorcal.recording.importing import import_table
+    from scissorcal.recording.reader import content_hash, read_attachments, read_recording
+    from scissorcal.recording.recording import (
+        SAMPLE_DTYPE,
+        Joint,
+        Kind,
+        Recording,
+        Stroke,
+        StrokeKind,
+    )
+    from scissorcal.recording.recovering import Recovered, recover
+    from scissorcal.recording.scan import Attachment
+    from scissorcal.recording.schema import recording_schema
+    from scissorcal.recording.strokes import StrokeLabels, label_strokes
+    from scissorcal.recording.summarising import RecordingSummary, summary
+    from scissorcal.recording.writer import RecordingWriter, write_recording
+
+__all__ = [
+    "SAMPLE_DTYPE",
+    "Attachment",
+    "Joint",
+    "Kind",
+    "Recording",
+    "RecordingSummary",
+    "RecordingWriter",
+    "Recovered",
+    "Stroke",
+    "StrokeKind",
+    "StrokeLabels",
+    "content_hash",
+    "export_table",
+    "import_table",
+    "label_strokes",
+    "read_attachments",
+    "read_recording",
+    "recording_schema",
+    "recover",
+    "summary",
+    "write_recording",
+]
+
+_HOMES = {
+    "exporting": ("export_table",),
+    "importing": ("import_table",),
+    "reader": ("content_hash", "read_attachments", "read_recording"),
+    "recording": ("SAMPLE_DTYPE", "Joint", "Kind", "Recording", "Stroke", "StrokeKind"),
+    "recovering": ("Recovered", "recover"),
+    "scan": ("Attachment",),
+    "schema": ("recording_schema",),
+    "strokes": ("StrokeLabels", "label_strokes"),
+    "summarising": ("RecordingSummary", "summary"),
+    "writer": ("RecordingWriter", "write_recording"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,131 @@
+"""Finish captures that were interrupted, without ever deleting a byte of them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from scissorcal.errors import InputError
+from scissorcal.recording import layout
+from scissorcal.recording.partfile import explained, is_same_file, seal, try_lock
+from scissorcal.recording.samplefile import SampleFile
+from scissorcal.recording.scan import Attachment, Note, Scan, Sheet, scan_file
+
+KEPT_SUFFIX = ".interrupted"
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What became of one half-written capture.
+
+    ``recovered``: ``recording`` is the proper file. ``empty``: it held no whole sample. ``busy``:
+    a live process still writes it, so it was left alone. ``kept`` is where the original stands.
+    """
+
+    status: Literal["recovered", "empty", "busy"]
+    kept: Path
+    recording: Path | None
+    samples: int
+    sentence: str
+
+
+def recover(folder: str | Path) -> tuple[Recovered, ...]:
+    """Turn every ``*.mcap.part`` of a folder into a proper recording, and say what was done.
+
+    The complete samples, notes and attachments go into ``<name>.mcap`` with a note about the
+    interruption; the original is kept as ``<name>.mcap.interrupted``. Captures that a live
+    process still writes are left alone. Safe to call at any time, by any number of processes,
+    and to be killed itself: the next call finishes the work, and a call with nothing to do
+    returns an empty tuple. A folder that does not exist holds nothing.
+    """
+    parts = sorted(Path(folder).glob("*.mcap" + layout.PART_SUFFIX))
+    return tuple(result for part in parts if (result := _recover_one(part)) is not None)
+
+
+def _recover_one(part: Path) -> Recovered | None:
+    try:
+        stream = part.open("rb")
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise InputError(
+            f"{part} cannot be recovered: {error.strerror}. Make the file readable first."
+        ) from error
+    with stream, explained(part):
+        if not try_lock(stream):
+            sentence = f"{part.name} is still being written, so it was left alone."
+            return Recovered("busy", part, None, 0, sentence)
+        if not is_same_file(part, stream):
+            return None
+        try:
+            scan = scan_file(part)
+        except InputError as error:
+            kept = _keep(part)
+            return Recovered("empty", kept, None, 0, f"Nothing could be recovered: {error}")
+        samples = scan.samples()
+        if not len(samples):
+            kept = _keep(part)
+            sentence = f"{part.name} was interrupted before its first sample was written."
+            return Recovered("empty", kept, None, 0, sentence)
+        path = _already_recovered(part, scan) or _rewrite(part, scan)
+        kept = _keep(part)
+    seconds = float(samples["device_time_us"][-1] - samples["device_time_us"][0]) * 1e-6
+    sentence = (
+        f"{path.name} was recovered from an interrupted capture: {len(samples)} samples, "
+        f"{seconds:.2f} s."
+    )
+    return Recovered("recovered", kept, path, len(samples), sentence)
+
+
+def _rewrite(part: Path, scan: Scan) -> Path:
+    """Write the proper recording beside the original and return its path."""
+    path = _free(part.with_name(part.name.removesuffix(layout.PART_SUFFIX)))
+    draft = part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + ".recovery")
+    metadata = scan.metadata.model_copy(update={"recovered_from": scan.content_hash})
+    with draft.open("wb") as stream:
+        file = SampleFile(stream, metadata)
+        for event in scan.events:
+            if isinstance(event, np.ndarray):
+                file.append(event)
+            elif isinstance(event, Note):
+                file.note(event.sentence)
+            elif isinstance(event, Sheet):
+                file.mark_sheet(event.number)
+            elif isinstance(event, Attachment):
+                file.attach(event.name, event.data, event.media_type)
+        if not scan.finished:
+            file.note(f"The capture was interrupted after {file.sample_count} samples.")
+        for sentence in scan.damage:
+            file.note(sentence)
+        file.finish()
+        seal(stream, draft, path)
+    return path
+
+
+def _already_recovered(part: Path, scan: Scan) -> Path | None:
+    """Find the recording that an earlier, itself interrupted call made of these bytes."""
+    name = part.name.removesuffix(".mcap" + layout.PART_SUFFIX)
+    for candidate in sorted(part.parent.glob(f"{name}*.mcap")):
+        try:
+            if scan_file(candidate).metadata.recovered_from == scan.content_hash:
+                return candidate
+        except InputError:
+            continue
+    return None
+
+
+def _keep(part: Path) -> Path:
+    """Rename the original out of the way; it is never deleted."""
+    kept = _free(part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + KEPT_SUFFIX))
+    return part.rename(kept)
+
+
+def _free(path: Path) -> Path:
+    """Return ``path``, or the first of ``stem-2``, ``stem-3``, ... that is not taken."""
+    stem, suffixes = path.name.split(".mcap", 1)
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{stem}-{number}.mcap{suffixes}")
+    return candidate

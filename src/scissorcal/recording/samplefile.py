@@ -1,0 +1,123 @@
+"""The MCAP side of writing: samples, notes and attachments into one open file, in small chunks."""
+
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.recording import layout
+from scissorcal.recording.recording import SAMPLE_DTYPE
+from scissorcal.recording.schema import RecordingMetadata, to_entries
+
+FLUSH_SPAN_NS = 125_000_000
+"""Host time that samples may wait in memory for their chunk: half of what is promised (0.25 s),
+so that the promise holds for a caller who appends eight times a second or oftener."""
+
+CHUNK_BYTES = 64 * 1024
+"""A chunk is closed at this size even where the samples' clock stands still (imports)."""
+
+
+class SampleFile:
+    """An MCAP file being written; knows the encoding, not names, locks or renaming.
+
+    The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it.
+    """
+
+    def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
+        self._entries = to_entries(metadata)
+        self._mcap = _start(stream, self._entries)
+        schema = self._mcap.register_schema(
+            layout.SCHEMA_NAME,
+            layout.SCHEMA_ENCODING,
+            layout.message_definition(metadata.joint_of_recording).encode(),
+        )
+        self._channel = self._mcap.register_channel(
+            layout.TOPIC,
+            layout.MESSAGE_ENCODING,
+            schema,
+            {f"unit.{f}": layout.unit_of(f, metadata.joint_of_recording) for f in layout.fields()},
+        )
+        self._mcap.flush()
+        self._flushed_at: int | None = None
+        self._newest_host_time = 0
+        self.sample_count = 0
+        self.holds_data = False
+
+    def append(self, samples: NDArray[np.void]) -> None:
+        """Add samples, shape (n,) with SAMPLE_DTYPE; close the chunk once it is 0.125 s old."""
+        if samples.dtype != SAMPLE_DTYPE or samples.ndim != 1:
+            raise ValueError(
+                f"samples must have SAMPLE_DTYPE and one dimension, not {samples.dtype} "
+                f"with shape {samples.shape}"
+            )
+        if not len(samples):
+            return
+        data = samples.tobytes()
+        size = SAMPLE_DTYPE.itemsize
+        times = np.maximum(samples["host_time_ns"], 0).tolist()
+        for index, (time, number) in enumerate(
+            zip(times, samples["sequence"].tolist(), strict=True)
+        ):
+            message = layout.CDR_HEADER + data[index * size : (index + 1) * size]
+            self._mcap.add_message(self._channel, time, message, time, number)
+        self.sample_count += len(samples)
+        self.holds_data = True
+        if self._flushed_at is None:
+            self._flushed_at = times[0]
+        self._newest_host_time = times[-1]
+        self.flush_if_due(times[-1])
+
+    def flush_if_due(self, host_time_ns: int) -> None:
+        """Write the chunk out if its oldest sample has waited long enough by this clock."""
+        if self._flushed_at is None:
+            return
+        if abs(host_time_ns - self._flushed_at) >= FLUSH_SPAN_NS:
+            self._flush(host_time_ns)
+
+    def attach(self, name: str, data: bytes, media_type: str) -> None:
+        """Add a file, in its place among the samples."""
+        self._flush(self._newest_host_time)
+        self._mcap.add_attachment(
+            create_time=0,
+            log_time=self._newest_host_time,
+            name=name,
+            media_type=media_type,
+            data=data,
+        )
+        self._mcap.flush()
+        self.holds_data = True
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence for the report, in its place among the samples."""
+        self._mark(layout.NOTE_NAME, {"note": sentence})
+
+    def mark_sheet(self, sheet: int) -> None:
+        """Say that from the next sample on this sheet of material is loaded (-1: none)."""
+        self._mark(layout.SHEET_NAME, {"sheet": str(sheet)})
+
+    def finish(self) -> None:
+        """Write what is left, the metadata again, the index and the footer; leave the file open."""
+        self._flush(self._newest_host_time)
+        self._mcap.add_metadata(layout.METADATA_NAME, self._entries)
+        self._mcap.finish()
+
+    def _mark(self, name: str, entries: dict[str, str]) -> None:
+        self._flush(self._newest_host_time)
+        self._mcap.add_metadata(name, entries)
+        self._mcap.flush()
+
+    def _flush(self, host_time_ns: int) -> None:
+        self._mcap.flush()
+        if self._flushed_at is not None:
+            self._flushed_at = host_time_ns
+
+
+def _start(stream: IO[bytes], entries: dict[str, str]) -> Any:
+    from mcap.writer import CompressionType, Writer
+
+    from scissorcal import __version__
+
+    writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start(profile=layout.PROFILE, library=f"scissorcal {__version__}")
+    writer.add_metadata(layout.METADATA_NAME, entries)
+    return writer

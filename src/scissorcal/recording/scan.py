@@ -1,0 +1,327 @@
+"""Walk through a recording's bytes and keep all that is whole, whatever happened to the rest."""
+
+import hashlib
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.recording import layout
+from scissorcal.recording.schema import RecordingMetadata, from_entries
+
+MAGIC = b"\x89MCAP0\r\n"
+LARGEST_CHUNK = 64 * 1024 * 1024
+HEAD = struct.Struct("<BQ")
+_ZSTD_FIELD = b"\x04\x00\x00\x00zstd"
+_ZSTD_FIELD_AT = HEAD.size + 28
+_MESSAGE_BODY = layout.MESSAGE_DTYPE.itemsize - HEAD.size
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file kept within a recording."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Note:
+    """A sentence that the writer left."""
+
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """From here on this sheet of material is loaded."""
+
+    number: int
+
+
+Event = NDArray[np.void] | Note | Sheet | Attachment
+
+
+@dataclass
+class Scan:
+    """What a file holds: ``events`` in the order they were written, and what was wrong with it."""
+
+    path: Path
+    content_hash: str
+    metadata: RecordingMetadata
+    events: list[Event] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    finished: bool = False
+
+    def samples(self) -> NDArray[np.void]:
+        """All samples in one array, shape (N,)."""
+        blocks = [event for event in self.events if isinstance(event, np.ndarray)]
+        return np.concatenate(blocks) if blocks else layout.empty_samples()
+
+    def notes(self) -> tuple[str, ...]:
+        """The sentences that the writer left."""
+        return tuple(event.sentence for event in self.events if isinstance(event, Note))
+
+
+def scan_file(path: Path) -> Scan:
+    """Read a whole file, complete, cut off or damaged; InputError if it is no recording."""
+    data = read_bytes(path)
+    _refuse_other_formats(path, data)
+    walk = _Walk()
+    for offset, opcode, body in _records(data, walk):
+        try:
+            walk.take(offset, opcode, body)
+        except _DamageError as damage:
+            walk.damage.append(f"The bytes from {offset} on are damaged ({damage}); left out.")
+    if walk.metadata is None:
+        raise InputError(_why_no_recording(path, walk))
+    if walk.finished:
+        found = sum(len(event) for event in walk.events if isinstance(event, np.ndarray))
+        if walk.stated_count is not None and walk.stated_count != found:
+            walk.damage.append(
+                f"{walk.stated_count - found} of {walk.stated_count} samples cannot be read."
+            )
+    return Scan(
+        path,
+        hashlib.sha256(data).hexdigest(),
+        walk.metadata,
+        walk.events,
+        walk.damage,
+        walk.finished,
+    )
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return a file's bytes; InputError with the reason if it cannot be read or is empty."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist. Check the name and the folder.") from None
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be read: {error.strerror}. Name a file that you may read."
+        ) from error
+    if not data:
+        raise InputError(f"{path} is empty (0 bytes): nothing was recorded. Capture again.")
+    return data
+
+
+class _DamageError(Exception):
+    """One record is damaged; the words say how."""
+
+
+@dataclass
+class _Walk:
+    """State while walking: what was found so far."""
+
+    metadata: RecordingMetadata | None = None
+    events: list[Event] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    topics: set[str] = field(default_factory=set)
+    channel: int | None = None
+    stated_count: int | None = None
+    finished: bool = False
+    metadata_complaint: str = ""
+
+    def take(self, offset: int, opcode: int, body: bytes) -> None:
+        from mcap.opcode import Opcode
+        from mcap.records import Statistics
+
+        if opcode == Opcode.CHUNK:
+            self._take_chunk(_open_chunk(body))
+        elif opcode == Opcode.CHANNEL:
+            self._take_channel(body)
+        elif opcode == Opcode.METADATA:
+            self._take_metadata(offset, body)
+        elif opcode == Opcode.ATTACHMENT:
+            self.events.append(_open_attachment(body))
+        elif opcode == Opcode.STATISTICS:
+            self.stated_count = _parse(Statistics, body).message_count
+
+    def _take_metadata(self, offset: int, body: bytes) -> None:
+        from mcap.records import Metadata
+
+        record = _parse(Metadata, body)
+        if record.name == layout.NOTE_NAME:
+            self.events.append(Note(record.metadata.get("note", "")))
+        elif record.name == layout.SHEET_NAME:
+            try:
+                self.events.append(Sheet(int(record.metadata["sheet"])))
+            except (KeyError, ValueError):
+                raise _DamageError("a sheet mark without a number") from None
+        elif record.name == layout.METADATA_NAME:
+            try:
+                metadata = from_entries(record.metadata)
+            except ValueError as error:
+                self.metadata_complaint = f"at byte {offset}, {error}"
+                raise _DamageError("the description of the recording") from None
+            self.metadata = self.metadata or metadata
+
+    def _take_channel(self, body: bytes) -> None:
+        from mcap.records import Channel
+
+        channel = _parse(Channel, body)
+        self.topics.add(channel.topic)
+        if channel.topic == layout.TOPIC:
+            self.channel = channel.id
+
+    def _take_chunk(self, data: bytes) -> None:
+        """Take a chunk's records; runs of sample messages in one sweep each."""
+        from mcap.opcode import Opcode
+
+        at = 0
+        while at + HEAD.size <= len(data):
+            opcode, length = HEAD.unpack_from(data, at)
+            if opcode == Opcode.MESSAGE and length == _MESSAGE_BODY:
+                count = (len(data) - at) // layout.MESSAGE_DTYPE.itemsize
+                view = np.frombuffer(data, layout.MESSAGE_DTYPE, count, at)
+                same = (view["opcode"] == opcode) & (view["length"] == length)
+                same &= view["channel"] == view["channel"][0]
+                run = count if same.all() else int(np.argmin(same))
+                if self.channel in (None, int(view["channel"][0])):
+                    self.events.append(view["sample"][:run].copy())
+                at += run * layout.MESSAGE_DTYPE.itemsize
+                continue
+            if opcode == Opcode.CHANNEL:
+                self._take_channel(data[at + HEAD.size : at + HEAD.size + length])
+            at += HEAD.size + length
+
+
+def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
+    """Yield (offset, opcode, body) of the whole records; go round damage, note where it is."""
+    offset = len(MAGIC)
+    while offset < len(data):
+        if walk.finished and data[offset:] == MAGIC:
+            return
+        end, opcode = offset, 0
+        if offset + HEAD.size <= len(data):
+            opcode, length = HEAD.unpack_from(data, offset)
+            end = offset + HEAD.size + length
+        if 1 <= opcode <= 15 and end <= len(data):
+            yield offset, opcode, data[offset + HEAD.size : end]
+            walk.finished = opcode == 2
+            offset = end
+            continue
+        walk.finished = False
+        resume = _next_chunk(data, offset + 1)
+        if resume is None:
+            walk.damage.append(
+                f"The file is cut off at byte {offset}: {len(data) - offset} bytes of an "
+                "unfinished record were left out."
+            )
+            return
+        walk.damage.append(f"The bytes from {offset} to {resume} cannot be read; left out.")
+        offset = resume
+    walk.finished = False
+
+
+def _next_chunk(data: bytes, start: int) -> int | None:
+    """Find the next chunk by the name of its compression, which has a fixed place in it."""
+    found = data.find(_ZSTD_FIELD, start + _ZSTD_FIELD_AT)
+    while found >= 0:
+        offset = found - _ZSTD_FIELD_AT
+        opcode, length = HEAD.unpack_from(data, offset)
+        if opcode == 6 and offset + HEAD.size + length <= len(data):
+            return offset
+        found = data.find(_ZSTD_FIELD, found + 1)
+    return None
+
+
+def _parse(record: Any, body: bytes) -> Any:
+    from mcap.data_stream import ReadDataStream
+    from mcap.exceptions import McapError
+
+    try:
+        return record.read(ReadDataStream(BytesIO(body)))
+    except (McapError, struct.error, UnicodeDecodeError, MemoryError, OverflowError) as error:
+        raise _DamageError(f"not a whole {record.__name__} record") from error
+
+
+def _open_chunk(body: bytes) -> bytes:
+    """Return a chunk's bytes after checking its size and checksum."""
+    import zstandard
+    from mcap.records import Chunk
+    from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
+
+    chunk = _parse(Chunk, body)
+    if len(body) != 40 + len(chunk.compression) + len(chunk.data):
+        raise _DamageError("a chunk whose length is wrong")
+    if chunk.uncompressed_size > LARGEST_CHUNK:
+        raise _DamageError(f"a chunk that claims {chunk.uncompressed_size} bytes")
+    try:
+        if chunk.compression == "zstd":
+            stated = zstandard.get_frame_parameters(chunk.data).content_size
+            if stated != chunk.uncompressed_size:
+                raise _DamageError("a chunk whose size is wrong")
+        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+        return stream.read(length)
+    except CRCValidationError as error:
+        raise _DamageError("a chunk whose checksum does not match") from error
+    except (zstandard.ZstdError, RuntimeError) as error:
+        raise _DamageError("a chunk that cannot be decompressed") from error
+
+
+def _open_attachment(body: bytes) -> Attachment:
+    import zlib
+
+    from mcap.records import Attachment as Record
+
+    record = _parse(Record, body)
+    if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+        raise _DamageError(f"attachment {record.name!r}, whose checksum does not match")
+    return Attachment(record.name, record.media_type, record.data)
+
+
+def _refuse_other_formats(path: Path, data: bytes) -> None:
+    if data.startswith(MAGIC):
+        return
+    if MAGIC.startswith(data):
+        raise InputError(
+            f"{path} is cut off within its first {len(MAGIC)} bytes: nothing can be recovered "
+            "from it. Capture again."
+        )
+    known = {
+        b"\x89PNG": "a PNG image",
+        b"\xff\xd8\xff": "a JPEG image",
+        b"PK\x03\x04": "a zip archive",
+        b"PAR1": "a Parquet table (bring it in with import)",
+        b"MATLAB": "a MATLAB file (bring it in with import)",
+        b"\x89HDF": "an HDF5 file",
+    }
+    looks = next((words for start, words in known.items() if data.startswith(start)), "")
+    if not looks:
+        printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in data[:1000])
+        text = printable > 0.9 * len(data[:1000])
+        looks = "text (a table is brought in with import)" if text else "not in the MCAP format"
+    raise InputError(
+        f"{path} is no recording: from its first bytes it is {looks}. Name an .mcap file that "
+        "scissorcal wrote."
+    )
+
+
+def _why_no_recording(path: Path, walk: _Walk) -> str:
+    if walk.metadata_complaint:
+        return f"{path} is not readable: {walk.metadata_complaint}."
+    others = sorted(walk.topics - {layout.TOPIC})
+    if others:
+        listed = ", ".join(others[:5])
+        return (
+            f"{path} is an MCAP file of another program (topics: {listed}), not a recording. "
+            "Export it to CSV there and bring it in with import."
+        )
+    if walk.damage:
+        return (
+            f"{path} is not readable: its description is missing. {walk.damage[0]} "
+            "Restore it from a copy, or capture again."
+        )
+    return (
+        f"{path} is an MCAP file without a recording's description. Name a file that "
+        "scissorcal wrote."
+    )

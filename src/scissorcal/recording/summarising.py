@@ -1,0 +1,130 @@
+"""What a recording holds, in numbers: duration, rate, gaps, strokes and ranges."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.recording.layout import unit_of
+from scissorcal.recording.recording import Recording, Stroke
+
+CHANNELS = (
+    "opening",
+    "advance",
+    "motor_torque",
+    "handle_force",
+    "torque_command",
+    "force_command",
+)
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Frames that the device sent and the recording lacks.
+
+    ``places`` counts the jumps of the sequence number, ``missing`` the frames lost in them;
+    ``longest`` frames are lost in the longest one, which begins at ``longest_at_s``.
+    """
+
+    places: int
+    missing: int
+    longest: int
+    longest_at_s: float
+
+
+@dataclass(frozen=True)
+class ChannelRange:
+    """Smallest and largest value of one channel, in ``unit``."""
+
+    channel: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StrokeSummary:
+    """One stroke as planned (or found) and as recorded: its samples and travel."""
+
+    stroke: Stroke
+    samples: int
+    travel: float
+
+
+@dataclass(frozen=True)
+class RecordingSummary:
+    """What ``recording show`` prints; ``rate_Hz`` is from the median step of the device clock."""
+
+    source: str
+    content_hash: str
+    kind: str
+    joint: str
+    samples: int
+    duration_s: float
+    rate_Hz: float
+    gaps: Gaps
+    strokes: tuple[StrokeSummary, ...]
+    ranges: tuple[ChannelRange, ...]
+    notes: tuple[str, ...]
+
+
+def summary(recording: Recording) -> RecordingSummary:
+    """Sum up a recording; every number is finite, also for an empty one (then 0)."""
+    samples = recording.samples
+    steps = np.diff(samples["device_time_us"])
+    step_us = float(np.median(steps)) if len(steps) else 0.0
+    return RecordingSummary(
+        source=recording.source,
+        content_hash=recording.content_hash,
+        kind=recording.kind,
+        joint=recording.joint.kind,
+        samples=len(samples),
+        duration_s=recording.duration_s,
+        rate_Hz=1e6 / step_us if step_us > 0 else 0.0,
+        gaps=find_gaps(samples),
+        strokes=tuple(_stroke(recording, stroke) for stroke in recording.strokes),
+        ranges=tuple(_range(recording, channel) for channel in CHANNELS),
+        notes=recording.notes,
+    )
+
+
+def find_gaps(samples: NDArray[np.void]) -> Gaps:
+    """Find jumps of the sequence number (which wraps at 2**32) in samples, shape (N,)."""
+    if len(samples) < 2:
+        return Gaps(0, 0, 0, 0.0)
+    lost = (np.diff(samples["sequence"]) - np.uint32(1)).astype(np.int64)
+    # A step back by less than half the range is a repeated or reordered frame, not 4e9 lost ones.
+    lost[lost >= 2**31] = 0
+    worst = int(np.argmax(lost))
+    time = samples["device_time_us"]
+    longest = int(lost[worst])
+    return Gaps(
+        places=int(np.count_nonzero(lost)),
+        missing=int(lost.sum()),
+        longest=longest,
+        longest_at_s=float(time[worst] - time[0]) * 1e-6 if longest else 0.0,
+    )
+
+
+def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
+    """Say in one sentence which frames are missing; nothing where none is."""
+    gaps = find_gaps(samples)
+    if not gaps.places:
+        return ()
+    return (
+        f"{gaps.missing} frames are missing in {gaps.places} places, the longest gap "
+        f"({gaps.longest} frames) at {gaps.longest_at_s:.3f} s.",
+    )
+
+
+def _stroke(recording: Recording, stroke: Stroke) -> StrokeSummary:
+    opening = recording.samples["opening"][recording.samples["stroke"] == stroke.index]
+    travel = float(opening.max() - opening.min()) if len(opening) else 0.0
+    return StrokeSummary(stroke, len(opening), travel)
+
+
+def _range(recording: Recording, channel: str) -> ChannelRange:
+    values = recording.samples[channel]
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    return ChannelRange(channel, unit_of(channel, recording.joint), low, high)

@@ -1,0 +1,170 @@
+"""Write a recording so that a killed capture loses a quarter of a second at most."""
+
+import contextlib
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import ScissorcalError
+from scissorcal.recording import layout
+from scissorcal.recording.partfile import create_locked, explained, seal
+from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
+from scissorcal.recording.samplefile import SampleFile
+from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
+
+
+class RecordingWriter:
+    """Writes ``<path>.part`` while it runs, and renames it to ``path`` at ``close``.
+
+    A half-written capture is therefore known by its name; the lock held on it tells ``recover``
+    whether its writer still lives. Whatever was appended more than 0.25 s ago (by the samples'
+    host clock) is with the operating system, so that killing the process does not lose it.
+
+    ``kind``, ``joint``, ``handle_radius_m`` (NaN: not known) and ``strokes`` are as in Recording;
+    ``recipe_toml`` is the recipe's text, ``device`` what the rig says of itself (plain numbers
+    and strings). ``min_travel`` [rad, or m] is for motion that nobody planned: strokes are then
+    found from the motion (``label_strokes``) whenever the file is read.
+
+    Raises InputError if ``path`` or its ``.part`` stands already, or the folder is missing;
+    ScissorcalError if the disk refuses (what was written until then is kept).
+
+    >>> with RecordingWriter("captures/friction.mcap", "friction") as writer:  # doctest: +SKIP
+    ...     writer.append(samples)
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        kind: Kind,
+        joint: Joint | None = None,
+        recipe_toml: str = "",
+        device: Mapping[str, Any] | None = None,
+        handle_radius_m: float = math.nan,
+        strokes: tuple[Stroke, ...] = (),
+        *,
+        min_travel: float | None = None,
+    ) -> None:
+        if strokes and min_travel is not None:
+            raise ValueError("give strokes or min_travel, not both")
+        self.path = Path(path)
+        self.part = self.path.with_name(self.path.name + layout.PART_SUFFIX)
+        metadata = RecordingMetadata(
+            kind=kind,
+            joint=(joint or Joint()).kind,
+            handle_radius_m=handle_radius_m if math.isfinite(handle_radius_m) else None,
+            strokes=stroke_records(strokes),
+            min_travel=min_travel,
+            recipe_toml=recipe_toml,
+            device=dict(device or {}),
+            versions=versions(),
+        )
+        self._stream = create_locked(self.path, self.part)
+        self._failed = False
+        with self._writing():
+            self._file = SampleFile(self._stream, metadata)
+
+    @property
+    def sample_count(self) -> int:
+        """Samples appended so far."""
+        return self._file.sample_count
+
+    def append(self, samples: NDArray[np.void]) -> None:
+        """Add samples, shape (n,) with SAMPLE_DTYPE, in the order of time."""
+        with self._writing():
+            self._file.append(samples)
+
+    def poll(self, host_time_ns: int) -> None:
+        """Write out what waits, if due by this clock; for a loop in which no sample arrives."""
+        with self._writing():
+            self._file.flush_if_due(host_time_ns)
+
+    def attach(self, name: str, data: bytes, media_type: str) -> None:
+        """Add a file (a photograph, a calibration), kept byte for byte."""
+        with self._writing():
+            self._file.attach(name, data, media_type)
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence for the report; it survives a killed capture."""
+        with self._writing():
+            self._file.note(sentence)
+
+    def mark_sheet(self, sheet: int) -> None:
+        """Say that from the next sample on this sheet of material is loaded (-1: none).
+
+        Only strokes that are found from the motion (``min_travel``) read this; planned strokes
+        carry their sheet themselves.
+        """
+        with self._writing():
+            self._file.mark_sheet(sheet)
+
+    def close(self) -> Path:
+        """Finish the file, give it its name and return that; a second call does nothing."""
+        if self._failed:
+            raise ScissorcalError(
+                f"{self.path} was not finished, because {self.part.name} could not be written. "
+                "The next command recovers what is in it."
+            )
+        if not self._stream.closed:
+            with self._writing():
+                self._file.finish()
+                seal(self._stream, self.part, self.path)
+        return self.path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._stream.closed:
+            return
+        if error is None:
+            self.close()
+        elif not self._file.holds_data:
+            self._stream.close()
+            self.part.unlink()
+        else:
+            reason = str(error) or type(error).__name__
+            self.note(f"The capture ended early after {self.sample_count} samples: {reason}")
+            self.close()
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Let go of file and lock where the disk refuses, so that recovery finds it."""
+        try:
+            with explained(self.part):
+                yield
+        except ScissorcalError:
+            self._failed = True
+            with contextlib.suppress(OSError):
+                self._stream.close()
+            raise
+
+
+def write_recording(recording: Recording, path: str | Path) -> Path:
+    """Write a recording that is in memory (an import, a made-up one) as one file; return its path.
+
+    Samples, strokes, joint, handle radius, device, recipe and notes come back from
+    ``read_recording`` as they were. Raises as RecordingWriter does.
+    """
+    with RecordingWriter(
+        path,
+        recording.kind,
+        recording.joint,
+        recording.recipe_toml,
+        recording.device,
+        recording.handle_radius_m,
+        recording.strokes,
+    ) as writer:
+        for sentence in recording.notes:
+            writer.note(sentence)
+        writer.append(recording.samples)
+    return writer.path

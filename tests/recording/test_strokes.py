@@ -1,0 +1,92 @@
+"""Strokes are found where the motion turns, whatever the noise, and rest belongs to none."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from scissorcal.recording import label_strokes
+
+Array = NDArray[np.float64]
+
+
+def trapezoids(speeds: list[float], rest_s: float, step: float = 1e-3) -> tuple[Array, Array]:
+    """Closing and opening by turns between 1.0 and 0.2, at constant speeds, with rests between."""
+    pieces, position = [np.full(round(rest_s / step), 1.0)], 1.0
+    for number, speed in enumerate(speeds):
+        target = 0.2 if number % 2 == 0 else 1.0
+        count = round(0.8 / speed / step)
+        pieces.append(np.linspace(position, target, count, endpoint=False))
+        pieces.append(np.full(round(rest_s / step), target))
+        position = target
+    opening = np.concatenate(pieces)
+    return opening, np.arange(len(opening)) * step
+
+
+def test_constant_speeds_are_found_with_their_rests_left_out() -> None:
+    speeds = [0.5, 1.0, 0.25, 2.0]
+    opening, time = trapezoids(speeds, rest_s=0.5)
+    labels = label_strokes(opening, time, 0.05, sheet=3)
+    assert [s.kind for s in labels.strokes] == ["closing", "opening", "closing", "opening"]
+    assert [s.index for s in labels.strokes] == [0, 1, 2, 3]
+    assert [s.speed for s in labels.strokes] == pytest.approx(speeds, rel=0.01)
+    assert {s.sheet for s in labels.strokes} == {3}
+    for stroke in labels.strokes:
+        here = np.flatnonzero(labels.stroke_of_sample == stroke.index)
+        assert np.all(np.diff(here) == 1)
+        moving = 0.8 / stroke.speed
+        # The motion, 0.05 s of rest at both ends, and the slow creep within 2 % of min_travel.
+        assert moving <= (len(here) + 1) * 1e-3 <= moving + 0.11
+
+
+@given(
+    noise=st.floats(0, 0.01),
+    step=st.sampled_from([0.0, 1e-4, 5e-3]),
+    seed=st.integers(0, 1000),
+    mirrored=st.booleans(),
+)
+def test_noise_and_encoder_steps_split_no_stroke(
+    noise: float, step: float, seed: int, mirrored: bool
+) -> None:
+    opening, time = trapezoids([0.7, 0.4, 1.1, 0.9], rest_s=0.2, step=2e-3)
+    opening = opening + noise * np.random.default_rng(seed).uniform(-1, 1, len(opening))
+    opening = np.round(opening / step) * step if step else opening
+    labels = label_strokes(-opening if mirrored else opening, time, 0.05)
+    kinds = ["closing", "opening"] * 2
+    assert [s.kind for s in labels.strokes] == (kinds[1:] + kinds[:1] if mirrored else kinds)
+
+
+@given(
+    values=st.lists(st.floats(-10, 10), max_size=60),
+    min_travel=st.floats(1e-3, 5),
+)
+def test_every_label_is_a_contiguous_leg_that_travels_enough(
+    values: list[float], min_travel: float
+) -> None:
+    opening = np.array(values)
+    labels = label_strokes(opening, np.arange(len(values)) * 0.001, min_travel)
+    assert len(labels.stroke_of_sample) == len(values)
+    assert set(labels.stroke_of_sample) <= {-1, *range(len(labels.strokes))}
+    kinds = [s.kind for s in labels.strokes]
+    assert all(one != other for one, other in itertools.pairwise(kinds))
+    if len(values) and np.ptp(opening) >= min_travel:
+        assert labels.strokes
+    else:
+        assert not labels.strokes
+
+
+def test_no_motion_and_no_samples_give_no_strokes() -> None:
+    assert label_strokes([], [], 0.1).strokes == ()
+    labels = label_strokes(np.full(100, 0.3), np.arange(100.0), 0.1)
+    assert labels.strokes == ()
+    assert set(labels.stroke_of_sample) == {-1}
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(ValueError, match="min_travel must be positive"):
+        label_strokes([0, 1], [0, 1], 0.0)
+    with pytest.raises(ValueError, match="shape"):
+        label_strokes([0, 1], [0], 0.1)
