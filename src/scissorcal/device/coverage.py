@@ -1,0 +1,171 @@
+"""Coverage of a capture: which speeds it has seen at which angles, in which direction, live."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.recipe.schema import Recipe
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Array = NDArray[np.float64]
+Direction = Literal["closing", "opening"]
+
+ANGLE_CELLS = 8
+NEEDED_S = 0.02
+RATE_WINDOW_S = 0.02
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of the grid: a direction, a nominal speed, a range of openings, and its seconds."""
+
+    direction: Direction
+    speed: float
+    opening: tuple[float, float]
+    seconds: float
+
+
+class CoverageGrid:
+    """Seconds of motion by direction, speed and angle; a cell is filled from ``needed_s`` on.
+
+    ``speeds`` (rad/s, ascending) are the nominal ones; a cell of speed reaches half-way to its
+    neighbours in the logarithm, and by the same factor outwards. Motion that fits no cell is left
+    out. Samples may come in blocks of any size.
+    """
+
+    def __init__(
+        self,
+        speeds: tuple[float, ...],
+        opening: tuple[float, float],
+        directions: tuple[Direction, ...] = ("closing", "opening"),
+        angle_cells: int = ANGLE_CELLS,
+        needed_s: float = NEEDED_S,
+    ) -> None:
+        self.speeds = tuple(sorted(set(speeds)))
+        self.directions = directions
+        self.needed_s = needed_s
+        self.angle_edges = np.linspace(*opening, angle_cells + 1)
+        self.speed_edges = _speed_edges(np.asarray(self.speeds))
+        self.seconds = np.zeros((len(directions), len(self.speeds), angle_cells))
+        self._time = np.zeros(0)
+        self._opening = np.zeros(0)
+
+    def add(self, samples: NDArray[np.void]) -> None:
+        """Count a block of samples (SAMPLE_DTYPE) that follows what was added before.
+
+        The rate at a sample is the difference over a window of 20 ms that ends there; a gap or a
+        repeat of the device's clock ends the window.
+        """
+        if len(samples) == 0:
+            return
+        time = np.concatenate([self._time, samples["device_time_us"] * 1e-6])
+        opening = np.concatenate([self._opening, samples["opening"]])
+        step = np.diff(time, prepend=time[0])
+        usual = float(np.median(step[1:])) if len(step) > 1 else 0.0
+        window = max(1, round(RATE_WINDOW_S / usual)) if usual > 0 else 1
+        new = np.arange(len(self._time), len(time))
+        new = new[new >= window]
+        span = time[new] - time[new - window]
+        sound = (span > 0) & (span < 1.5 * RATE_WINDOW_S)
+        new, span = new[sound], span[sound]
+        rate = (opening[new] - opening[new - window]) / span
+        middle = 0.5 * (opening[new] + opening[new - window])
+        self._count(rate, middle, span / window)
+        keep = min(len(time), window)
+        self._time, self._opening = time[-keep:], opening[-keep:]
+
+    @property
+    def filled(self) -> NDArray[np.bool_]:
+        """Which cells have enough, shape (directions, speeds, angles)."""
+        return np.asarray(self.seconds >= self.needed_s)
+
+    @property
+    def share(self) -> float:
+        """Share of the cells that are filled, from 0 to 1."""
+        return float(self.filled.mean())
+
+    def thin(self) -> tuple[Cell, ...]:
+        """Return the cells that still have too little, the emptiest first."""
+        cells = [
+            Cell(
+                self.directions[d],
+                self.speeds[s],
+                (float(self.angle_edges[a]), float(self.angle_edges[a + 1])),
+                float(self.seconds[d, s, a]),
+            )
+            for d, s, a in zip(*np.nonzero(~self.filled), strict=True)
+        ]
+        return tuple(sorted(cells, key=lambda cell: cell.seconds))
+
+    def sentence(self) -> str:
+        """Say in one line what is covered and what is thin.
+
+        >>> CoverageGrid((0.1, 0.5), (0.2, 0.8)).sentence()
+        '0 of 32 cells filled; thin: closing at 0.1, 0.5 rad/s; opening at 0.1, 0.5 rad/s'
+        """
+        parts = []
+        for d, direction in enumerate(self.directions):
+            speeds = [
+                f"{speed:g}"
+                for speed, filled in zip(self.speeds, self.filled[d].all(axis=1), strict=True)
+                if not filled
+            ]
+            if speeds:
+                parts.append(f"{direction} at {', '.join(speeds)} rad/s")
+        counts = f"{int(self.filled.sum())} of {self.filled.size} cells filled"
+        return f"{counts}; thin: {'; '.join(parts)}" if parts else counts
+
+    def table(self) -> "Table":
+        """Return the grid as a small table for rich: a row per speed, a column per angle."""
+        from rich.table import Table
+
+        table = Table(title=f"coverage {100 * self.share:.0f} %", title_justify="left")
+        table.add_column("rad/s", justify="right")
+        for low, high in zip(self.angle_edges[:-1], self.angle_edges[1:], strict=True):
+            table.add_column(f"{np.degrees(low):.0f}-{np.degrees(high):.0f}", justify="center")
+        for d, direction in enumerate(self.directions):
+            for s, speed in enumerate(self.speeds):
+                marks = [self._mark(float(seconds)) for seconds in self.seconds[d, s]]
+                table.add_row(
+                    f"{direction} {speed:g}", *marks, end_section=s + 1 == len(self.speeds)
+                )
+        return table
+
+    def __rich__(self) -> "Table":
+        return self.table()
+
+    def _mark(self, seconds: float) -> str:
+        if seconds >= self.needed_s:
+            return "[green]█[/green]"
+        return "[yellow]▄[/yellow]" if seconds > 0 else "[dim]·[/dim]"
+
+    def _count(self, rate: Array, opening: Array, seconds: Array) -> None:
+        angle = np.searchsorted(self.angle_edges, opening, side="right") - 1
+        speed = np.searchsorted(self.speed_edges, np.abs(rate), side="right") - 1
+        inside = (angle >= 0) & (angle < self.seconds.shape[2])
+        inside &= (speed >= 0) & (speed < self.seconds.shape[1])
+        for d, direction in enumerate(self.directions):
+            of = inside & ((rate < 0) if direction == "closing" else (rate > 0))
+            np.add.at(self.seconds[d], (speed[of], angle[of]), seconds[of])
+
+
+def friction_coverage(recipe: Recipe, opening: tuple[float, float]) -> CoverageGrid:
+    """Grid of a friction capture: its speeds in both directions over the openings (rad)."""
+    return CoverageGrid(recipe.capture.friction.speeds_rad_per_s, opening)
+
+
+def cut_coverage(recipe: Recipe, opening: tuple[float, float]) -> CoverageGrid:
+    """Grid of a cut capture: its speeds while closing over the openings (rad)."""
+    return CoverageGrid(recipe.capture.cut.speeds_rad_per_s, opening, ("closing",))
+
+
+def _speed_edges(speeds: Array) -> Array:
+    """Edges of the cells of speed: geometric means inside, the same factor outside."""
+    inner = np.sqrt(speeds[1:] * speeds[:-1])
+    first = speeds[0] ** 2 / inner[0] if len(inner) else speeds[0] / 2
+    last = speeds[-1] ** 2 / inner[-1] if len(inner) else speeds[-1] * 2
+    return np.concatenate([[first], inner, [last]])

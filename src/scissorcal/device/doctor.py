@@ -1,0 +1,151 @@
+"""The doctor: measure port, clocks and scheduler, and judge each."""
+
+import math
+import os
+import resource
+import select
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.diagnosis import Measurements, Percentiles, adapter_timer_path, judge
+from scissorcal.device.link import PortLink
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Capability, ConfigKey, State
+from scissorcal.verdicts import Verdict
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Progress = Callable[[float, str], None]
+
+ROUND_TRIPS = 100
+SLEEPS = 500
+DRIFT_CHUNKS = 24
+U32 = 2**32
+
+
+@dataclass(frozen=True)
+class Examination:
+    """Measurements and what they mean."""
+
+    measurements: Measurements
+    verdicts: tuple[Verdict, ...]
+
+
+def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = None) -> Examination:
+    """Listen to a device for ``seconds``, measure this machine, and judge both.
+
+    No motor is enabled. Raises DeviceError if the device stops answering.
+    """
+    tell = progress or (lambda done, sentence: None)
+    tell(0.0, "measuring the round trip")
+    trips = np.array([link.round_trip() for _ in range(ROUND_TRIPS)])
+    tell(0.2, f"listening to frames for {seconds:g} s")
+    arrival, device_us, sequence, garbled = _listen(link, seconds)
+    tell(0.8, "measuring timer and scheduler")
+    answered = trips[np.isfinite(trips)]
+    drift, error = clock_drift(arrival, device_us)
+    measured = Measurements(
+        simulated=bool(link.identity.capabilities & Capability.SIMULATOR),
+        tick_ms=link.identity.tick_us * 1e-3,
+        round_trip=Percentiles.of(answered),
+        round_trips=len(trips),
+        unanswered=int(len(trips) - len(answered)),
+        interval=Percentiles.of(np.diff(arrival)),
+        frames=len(arrival),
+        lost=_lost(sequence),
+        garbled=garbled,
+        drift_ppm=drift,
+        drift_se_ppm=error,
+        adapter_timer_ms=adapter_timer_ms(link.name),
+        lateness=Percentiles.of(_lateness()),
+        timer_resolution_ns=1e9 * time.clock_getres(time.CLOCK_MONOTONIC),
+        realtime_priority=_realtime_priority(),
+    )
+    tell(1.0, "done")
+    return Examination(measured, judge(measured, link.name))
+
+
+def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
+    """How much faster the device's clock runs than the host's, in ppm, with its standard error.
+
+    Frames are only ever late, so a line is fitted to the earliest frame of each of some chunks.
+    ``arrival_s`` and ``device_us`` (unwrapped), both (n,). NaN for fewer than 100 frames.
+    """
+    if len(arrival_s) < 100:
+        return math.nan, math.nan
+    host = arrival_s - arrival_s[0]
+    device = (device_us - device_us[0]) * 1e-6
+    ahead = device - host
+    best = [
+        int(chunk[np.argmax(ahead[chunk])])
+        for chunk in np.array_split(np.arange(len(host)), DRIFT_CHUNKS)
+    ]
+    x, y = host[best] - host[best].mean(), ahead[best]
+    slope = float(x @ (y - y.mean()) / (x @ x))
+    left = y - y.mean() - slope * x
+    error = math.sqrt(float(left @ left) / (len(x) - 2) / float(x @ x))
+    return 1e6 * slope, 1e6 * error
+
+
+def adapter_timer_ms(port: str, sys_root: Path = Path("/sys")) -> float | None:
+    """Latency timer (ms) of the USB adapter behind a port, None where there is none."""
+    path = adapter_timer_path(port, sys_root)
+    try:
+        return float(path.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None
+
+
+def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, int]:
+    """Arrival (s), device clock (us, unwrapped) and sequence of frames; and garbled frames."""
+    arrivals: list[float] = []
+    states: list[State] = []
+    link.configure(ConfigKey.STREAM, 1.0)
+    link.flush()
+    end = time.perf_counter() + seconds
+    try:
+        while (left := end - time.perf_counter()) > 0:
+            for message in link.receive(min(left, 0.5)):
+                if isinstance(message, State):
+                    arrivals.append(time.perf_counter())
+                    states.append(message)
+            if not states:
+                raise DeviceError(
+                    f"{link.name} was asked to stream and sends no state: restart the device."
+                )
+    finally:
+        garbled = link.garbled
+        link.configure(ConfigKey.STREAM, 0.0)
+    clock = np.array([state.device_us for state in states], dtype=np.int64)
+    unwrapped = clock + U32 * np.cumsum(np.diff(clock, prepend=clock[0]) < -(U32 // 2))
+    sequence = np.array([state.sequence for state in states], dtype=np.int64)
+    cut_by_flush = 1
+    return np.array(arrivals), unwrapped, sequence, max(garbled - cut_by_flush, 0)
+
+
+def _lost(sequence: Integers) -> int:
+    jumps = np.diff(sequence) % U32
+    return int(np.sum(jumps[jumps > 0] - 1))
+
+
+def _lateness() -> Array:
+    """How late this process wakes from waits of 1 ms, in seconds."""
+    late = np.empty(SLEEPS)
+    for index in range(SLEEPS):
+        start = time.perf_counter()
+        select.select([], [], [], 1e-3)
+        late[index] = time.perf_counter() - start - 1e-3
+    return np.maximum(late, 0.0)
+
+
+def _realtime_priority() -> int:
+    """Highest real-time priority that this user may ask for; 0 where none."""
+    if os.geteuid() == 0:
+        return os.sched_get_priority_max(os.SCHED_FIFO)
+    limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
+    return 99 if limit == resource.RLIM_INFINITY else limit

@@ -1,0 +1,106 @@
+"""The doctor measures what is there, and names the mend of what is wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.device.diagnosis import Measurements, Percentiles, judge
+from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
+from scissorcal.device.link import open_link
+from scissorcal.device.sim.process import SimProcess
+from scissorcal.verdicts import failed
+
+GOOD = Percentiles(0.9, 1.2, 1.5, 3.0)
+BAD = Percentiles(9.0, 17.0, 18.0, 30.0)
+SOUND = Measurements(
+    simulated=False,
+    tick_ms=1.0,
+    round_trip=GOOD,
+    round_trips=100,
+    unanswered=0,
+    interval=GOOD,
+    frames=5000,
+    lost=0,
+    garbled=0,
+    drift_ppm=30.0,
+    drift_se_ppm=2.0,
+    adapter_timer_ms=1.0,
+    lateness=Percentiles(0.05, 0.1, 0.2, 5.0),
+    timer_resolution_ns=1.0,
+    realtime_priority=50,
+)
+
+
+def test_a_sound_rig_passes_everything() -> None:
+    assert {verdict.status for verdict in judge(SOUND, "/dev/ttyUSB0")} == {"pass"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "check", "mend"),
+    [
+        ({"round_trip": BAD}, "round trip", "latency timer to 1 ms"),
+        ({"unanswered": 2}, "round trip", "no hub"),
+        ({"interval": BAD}, "frame intervals", "latency timer to 1 ms"),
+        ({"lost": 50}, "lost frames", "cable"),
+        ({"garbled": 1}, "lost frames", "baud rate"),
+        ({"adapter_timer_ms": 16.0}, "latency timer", "echo 1 | sudo tee /sys/bus/usb-serial"),
+        ({"drift_ppm": -900.0}, "drift", "oscillator"),
+        ({"timer_resolution_ns": 4e6}, "resolution", "CONFIG_HIGH_RES_TIMERS"),
+        ({"lateness": BAD}, "wake-up lateness", "real-time priority"),
+    ],
+)
+def test_each_trouble_fails_its_own_check_and_names_the_mend(
+    wrong: dict[str, object], check: str, mend: str
+) -> None:
+    measured = Measurements(**{**vars(SOUND), **wrong})
+    (verdict,) = failed(judge(measured, "/dev/ttyUSB0"))
+    assert verdict.check == check
+    assert mend in verdict.why
+
+
+def test_what_was_not_measured_is_not_judged() -> None:
+    measured = Measurements(
+        **{
+            **vars(SOUND),
+            "adapter_timer_ms": None,
+            "drift_ppm": float("nan"),
+            "realtime_priority": 0,
+        }
+    )
+    open_checks = [v.check for v in judge(measured, "p") if v.status == "not_evaluated"]
+    assert open_checks == ["latency timer", "drift", "real-time rights"]
+
+
+@pytest.mark.parametrize("true_ppm", [-200.0, 0.0, 30.0, 400.0])
+def test_drift_is_found_under_one_sided_jitter(true_ppm: float) -> None:
+    rng = np.random.default_rng(7)
+    device_us = np.arange(5000) * 1000
+    host = device_us * 1e-6 / (1 + true_ppm * 1e-6) + 12.5
+    late = rng.exponential(3e-4, 5000) + 0.016 * (rng.random(5000) < 0.02)
+    ppm, error = clock_drift(host + late, device_us)
+    assert error < 2.0
+    assert ppm == pytest.approx(true_ppm, abs=5 * error + 0.5)
+    assert np.isnan(clock_drift(host[:50], device_us[:50])[0])
+
+
+def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
+    folder = tmp_path / "bus/usb-serial/devices/ttyUSB7"
+    folder.mkdir(parents=True)
+    assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) is None
+    (folder / "latency_timer").write_text("16\n")
+    assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) == 16.0
+
+
+def test_a_rig_with_a_bad_line_is_found_out() -> None:
+    told: list[float] = []
+    with (
+        SimProcess("office-paper", seed=3, faults=("drop=0.02", "garble=0.02")) as sim,
+        open_link(sim.port) as link,
+    ):
+        found = examine(link, seconds=1.0, progress=lambda done, sentence: told.append(done))
+    assert found.measurements.lost > 0
+    assert found.measurements.garbled > 0
+    assert "lost frames" in {verdict.check for verdict in failed(found.verdicts)}
+    assert told == sorted(told)
+    assert told[-1] == 1.0
