@@ -30,7 +30,7 @@ class SimProcess:
     def __init__(
         self, specimen: str | Path, seed: int = 0, faults: Faults | Sequence[str] = ()
     ) -> None:
-        """Raises InputError for a bad specimen or fault, DeviceError if the server does not start."""
+        """Raises InputError for a bad specimen or fault, DeviceError if nothing starts."""
         options = faults.as_options() if isinstance(faults, Faults) else tuple(faults)
         command = [sys.executable, "-m", "scissorcal.device.sim.server", str(specimen)]
         command += [f"--seed={seed}", *(f"--fault={option}" for option in options)]

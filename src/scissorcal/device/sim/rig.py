@@ -4,10 +4,9 @@ The opening axis obeys
 
     I acc = motor_torque - R handle_force - friction(theta, rate) + tau_cut - offset
 
-and the advance axis the same with its mass and the cut's force. Each tick takes SUBSTEPS steps of
-the leapfrog scheme (half a step of position, one of velocity, half a step of position), which
-keeps the energy of elastic contact, with friction as an impulse (see
-:mod:`scissorcal.device.sim.friction`). Everything is plain Python on floats: for scalars that is
+and the advance axis the same with its mass and the cut's force. Each tick takes SUBSTEPS steps
+(see :mod:`scissorcal.device.sim.axis`), with friction as an impulse
+(:mod:`scissorcal.device.sim.friction`). Everything is plain Python on floats: for scalars that is
 faster than NumPy, and the laws share nothing with the model that is fitted or the kernel.
 """
 
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scissorcal.device.sim.axis import Axis
 from scissorcal.device.sim.blade import BladeOnSheet
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.friction import DryFriction
@@ -55,8 +55,9 @@ class EnergyBook:
 class VirtualRig:
     """A rig made of a specimen and a seeded generator; the same calls give the same numbers.
 
-    The public attributes ``opening``, ``rate``, ``advance``, ``advance_rate`` and ``time_s`` are
-    the truth, for tests and judges; what a device reports is what :meth:`tick` returns.
+    ``joint`` and ``sledge`` are its two axes; they, ``opening``, ``rate``, ``advance``,
+    ``advance_rate``, ``crack`` and ``time_s`` are the truth, for tests and judges. What a device
+    reports is what :meth:`tick` returns.
     """
 
     def __init__(self, specimen: Specimen, rng: np.random.Generator) -> None:
@@ -66,19 +67,25 @@ class VirtualRig:
         self.blade = BladeOnSheet(specimen)
         self.hand = VirtualHand(specimen, self.blade, TICK_S, hand_rng)
         self.sensors = SensorSet(specimen.sensors, TICK_S, sensor_rng)
-        self.friction = DryFriction.of_joint(mechanism.friction)
-        self.advance_friction = DryFriction.of_advance(mechanism.advance)
-        low, high = mechanism.opening_range_deg
-        self._opening_range = (math.radians(low), math.radians(high))
-        low, high = mechanism.advance.range_mm
-        self._advance_range = (low * 1e-3, high * 1e-3)
-        self._radius = mechanism.handle_radius_mm * 1e-3
         step = TICK_S / SUBSTEPS
+        low, high = mechanism.opening_range_deg
+        self.joint = Axis(
+            mechanism.inertia_kg_m2,
+            DryFriction.of_joint(mechanism.friction),
+            (math.radians(low), math.radians(high)),
+            START_OPENING_RAD,
+            step,
+        )
+        low, high = mechanism.advance.range_mm
+        self.sledge = Axis(
+            mechanism.advance.mass_kg,
+            DryFriction.of_advance(mechanism.advance),
+            (low * 1e-3, high * 1e-3),
+            START_ADVANCE_M,
+            step,
+        )
+        self._radius = mechanism.handle_radius_mm * 1e-3
         self._keep = math.exp(-step / (specimen.motor.lag_ms * 1e-3))
-        self.opening = _clip(START_OPENING_RAD, *self._opening_range)
-        self.advance = _clip(START_ADVANCE_M, *self._advance_range)
-        self.rate = 0.0
-        self.advance_rate = 0.0
         self.time_s = 0.0
         self.cut: Cut | None = None
         self._torque = 0.0
@@ -105,19 +112,17 @@ class VirtualRig:
         torque = _clip(torque, -limit, limit)
         force = _clip(force, -motor.force_limit_N, motor.force_limit_N)
         crack = None if self.cut is None else self.cut.sheet.crack
-        push, shove = self.hand.forces(
-            self.opening, self.rate, self.advance, self.advance_rate, crack
-        )
-        cogging = motor.cogging_Nm * math.sin(motor.cogging_periods_per_turn * self.opening)
+        joint, sledge = self.joint, self.sledge
+        push, shove = self.hand.forces(joint.place, joint.rate, sledge.place, sledge.rate, crack)
+        cogging = motor.cogging_Nm * math.sin(motor.cogging_periods_per_turn * joint.place)
         brakes = (motor.brake_Nm_s_per_rad, motor.brake_N_s_per_m) if braking else (0.0, 0.0)
-        self._move(torque, force, push, shove, cogging, brakes)
+        self._move(torque, force, self._radius * push, shove, cogging, brakes)
         self.time_s += TICK_S
-        low, high = self._opening_range
-        at_stop = not low + STOP_MARGIN_RAD < self.opening < high - STOP_MARGIN_RAD
+        at_stop = not joint.low + STOP_MARGIN_RAD < joint.place < joint.high - STOP_MARGIN_RAD
         return self.sensors.read(
-            self.opening,
-            self.advance,
-            self._torque - brakes[0] * self.rate,
+            joint.place,
+            sledge.place,
+            self._torque - brakes[0] * joint.rate,
             push,
             at_stop,
             saturated,
@@ -140,6 +145,26 @@ class VirtualRig:
         self.cut = None
 
     @property
+    def opening(self) -> float:
+        """Opening angle in rad."""
+        return self.joint.place
+
+    @property
+    def rate(self) -> float:
+        """Rate of the opening angle in rad/s."""
+        return self.joint.rate
+
+    @property
+    def advance(self) -> float:
+        """Place of the pivot in the plate frame, in m."""
+        return self.sledge.place
+
+    @property
+    def advance_rate(self) -> float:
+        """Rate of the advance in m/s."""
+        return self.sledge.rate
+
+    @property
     def crack(self) -> float:
         """Where the cut ends, in metres from the sheet's near edge; NaN without a sheet."""
         return math.nan if self.cut is None else self.cut.sheet.crack
@@ -147,11 +172,7 @@ class VirtualRig:
     @property
     def kinetic_energy(self) -> float:
         """Kinetic energy of both axes in joules."""
-        mechanism = self.specimen.mechanism
-        return 0.5 * (
-            mechanism.inertia_kg_m2 * self.rate**2
-            + mechanism.advance.mass_kg * self.advance_rate**2
-        )
+        return self.joint.kinetic_energy + self.sledge.kinetic_energy
 
     @property
     def stored_energy(self) -> float:
@@ -162,6 +183,8 @@ class VirtualRig:
     def energy(self) -> EnergyBook:
         """The books so far, a copy."""
         book = EnergyBook(**vars(self._book))
+        book.friction = self.joint.friction_J + self.sledge.friction_J
+        book.stops = self.joint.stops_J + self.sledge.stops_J
         if self.cut is not None:
             book.fracture += self.cut.fracture_J
             book.arrest += self.cut.arrest_J
@@ -171,70 +194,37 @@ class VirtualRig:
         self,
         torque: float,
         force: float,
-        push: float,
+        grip: float,
         shove: float,
         cogging: float,
         brakes: tuple[float, float],
     ) -> None:
-        mechanism = self.specimen.mechanism
-        inertia, mass = mechanism.inertia_kg_m2, mechanism.advance.mass_kg
-        step = TICK_S / SUBSTEPS
-        half, mobility, sledge = 0.5 * step, step / inertia, step / mass
-        damping = self.specimen.material.rate_damping_N_s_per_m
-        moving, cut, book, keep = self.blade.moving, self.cut, self._book, self._keep
-        offset = mechanism.torque_offset_Nm
-        opening, rate = self.opening, self.rate
-        advance, speed = self.advance, self.advance_rate
+        joint, sledge, cut, book = self.joint, self.sledge, self.cut, self._book
+        damping, moving = self.specimen.material.rate_damping_N_s_per_m, self.blade.moving
+        keep, offset = self._keep, self.specimen.mechanism.torque_offset_Nm
         actual, actual_force = self._torque, self._force
         for _ in range(SUBSTEPS):
             actual = torque + keep * (actual - torque)
             actual_force = force + keep * (actual_force - force)
-            opening += half * rate
-            advance += half * speed
-            on_opening = on_advance = drag_torque = drag_force = 0.0
+            joint.coast()
+            sledge.coast()
+            on_joint = on_sledge = drag_torque = drag_force = 0.0
             if cut is not None:
-                on_opening, drive, lever, slope, share = cut.move_to(opening, advance)
-                on_advance = -drive
+                on_joint, drive, lever, slope, share = cut.move_to(joint.place, sledge.place)
+                on_sledge = -drive
                 if damping and share and lever > 0.0:
-                    drag = damping * share * (slope * speed - lever * rate / moving)
-                    drag = max(drag, -on_opening / lever)
+                    drag = damping * share * (slope * sledge.rate - lever * joint.rate / moving)
+                    drag = max(drag, -on_joint / lever)
                     drag_torque, drag_force = drag * lever, -moving * drag * slope
-            outer = actual + cogging - self._radius * push - offset
-            free = rate + mobility * (outer + on_opening + drag_torque)
-            after = self.friction.next_rate(opening, rate, free, mobility, brakes[0])
-            free_speed = speed + sledge * (actual_force + shove + on_advance + drag_force)
-            after_speed = self.advance_friction.next_rate(
-                advance, speed, free_speed, sledge, brakes[1]
-            )
-            turned, slid = half * (rate + after), half * (speed + after_speed)
-            book.motor += (actual + cogging) * turned + actual_force * slid
-            book.hand += shove * slid - self._radius * push * turned
+            motor = actual + cogging
+            turned = joint.push(motor - grip - offset + on_joint + drag_torque, brakes[0])
+            slid = sledge.push(actual_force + shove + on_sledge + drag_force, brakes[1])
+            book.motor += motor * turned + actual_force * slid
+            book.hand += shove * slid - grip * turned
             book.offset -= offset * turned
-            book.blades += on_opening * turned + on_advance * slid
+            book.blades += on_joint * turned + on_sledge * slid
             book.damping -= drag_torque * turned + drag_force * slid
-            book.friction += ((free - after) * turned / mobility) + (
-                (free_speed - after_speed) * slid / sledge
-            )
-            rate, speed = after, after_speed
-            opening += half * rate
-            advance += half * speed
-            if not self._opening_range[0] < opening < self._opening_range[1]:
-                opening, rate = self._stop(opening, rate, self._opening_range, inertia)
-            if not self._advance_range[0] < advance < self._advance_range[1]:
-                advance, speed = self._stop(advance, speed, self._advance_range, mass)
-        self.opening, self.rate = opening, rate
-        self.advance, self.advance_rate = advance, speed
         self._torque, self._force = actual, actual_force
-
-    def _stop(
-        self, place: float, rate: float, bounds: tuple[float, float], inertia: float
-    ) -> tuple[float, float]:
-        """Throw an axis back from its stop, with the energy that the stop swallows booked."""
-        bound = bounds[0] if place <= bounds[0] else bounds[1]
-        inwards = rate > 0.0 if bound == bounds[0] else rate < 0.0
-        after = rate if inwards else -self.specimen.mechanism.stop_restitution * rate
-        self._book.stops += 0.5 * inertia * (rate * rate - after * after)
-        return bound, after
 
 
 def _finite(value: float) -> float:

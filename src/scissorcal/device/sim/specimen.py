@@ -105,7 +105,6 @@ class Mechanism(Section):
     torque_offset_Nm: Finite = 0.0
     handle_radius_mm: Positive = 60.0
     opening_range_deg: Range = (8.0, 55.0)
-    stop_restitution: Annotated[float, Field(ge=0, lt=1)] = 0.2
     friction: Friction
     advance: AdvanceAxis = AdvanceAxis()
 
@@ -129,13 +128,16 @@ class Mechanism(Section):
 
 
 class Motor(Section):
-    """Both motors: their limits, how late they follow, their cogging, and the brake."""
+    """Both motors: their limits, how late they follow, their cogging, and the brake.
+
+    Cogging turns with the opening axis; a motor behind a capstan cogs many times per turn.
+    """
 
     torque_limit_Nm: Positive = 1.5
     force_limit_N: Positive = 40.0
     lag_ms: Annotated[float, Field(ge=0.05, le=100)] = 1.0
-    cogging_Nm: NonNegative = 4.0e-4
-    cogging_periods_per_turn: NonNegative = 42.0
+    cogging_Nm: NonNegative = 3.0e-4
+    cogging_periods_per_turn: NonNegative = 252.0
     brake_Nm_s_per_rad: NonNegative = 0.02
     brake_N_s_per_m: NonNegative = 60.0
 
@@ -151,8 +153,8 @@ class Sensors(Section):
     advance_step_um: Positive = 1.0
     torque_white_Nm: NonNegative = 8.0e-4
     torque_slow_Nm: NonNegative = 5.0e-4
-    force_white_N: NonNegative = 0.015
-    force_slow_N: NonNegative = 0.008
+    force_white_N: NonNegative = 0.010
+    force_slow_N: NonNegative = 0.006
     noise_time_ms: Annotated[float, Field(ge=1.0, le=1e4)] = 12.0
     handle_force_limit_N: Positive = 60.0
     clock_drift_ppm: Annotated[float, Field(ge=-500, le=500)] = 30.0
