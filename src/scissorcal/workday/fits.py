@@ -137,7 +137,6 @@ def _fit(
     if path.is_file() and not force:
         stored = load_fit(path)
         if stored.inputs_hash == expected_hash(workspace, recipe, what, chosen, upstream):
-            progress(1.0, f"{what}: nothing changed since the last fit")
             return FitOutcome(what, stored, path, cached=True)
     rng = np.random.default_rng([seed, _ORDER.index(what)])
     if friction is None:

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import Recipe
 
 if TYPE_CHECKING:
     from scissorcal.device.link import PortLink
@@ -14,12 +13,12 @@ SIM = "sim"
 
 
 @contextmanager
-def open_rig(device: str, recipe: Recipe, seed: int = 0) -> "Iterator[PortLink]":
-    """Open a link to ``device``; "sim" starts a virtual rig with the recipe's specimen.
+def open_rig(device: str, specimen: str | None, seed: int = 0) -> "Iterator[PortLink]":
+    """Open a link to ``device``; "sim" starts a virtual rig with ``specimen`` between its blades.
 
     The virtual rig runs in a process of its own, behind a real pseudo-terminal, and ends with
-    the block. Raises InputError where the recipe names no specimen to simulate, DeviceError where
-    the rig cannot be reached.
+    the block. Raises InputError where there is no specimen to simulate, DeviceError where the rig
+    cannot be reached.
     """
     from scissorcal.device.link import open_link
 
@@ -29,10 +28,10 @@ def open_rig(device: str, recipe: Recipe, seed: int = 0) -> "Iterator[PortLink]"
         return
     from scissorcal.device.sim.process import SimProcess
 
-    if recipe.specimen is None:
+    if specimen is None:
         raise InputError(
-            f'The recipe "{recipe.name}" names no specimen, so there is nothing to simulate: add '
+            "The recipe names no specimen, so there is nothing to simulate: add "
             'specimen = "office-paper" at its top, or name a port with --device.'
         )
-    with SimProcess(recipe.specimen, seed) as sim, open_link(sim.port) as link:
+    with SimProcess(specimen, seed) as sim, open_link(sim.port) as link:
         yield link

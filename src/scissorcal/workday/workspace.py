@@ -50,7 +50,7 @@ class Workspace:
 
     def recordings(self, kind: RecordingKind) -> tuple[Path, ...]:
         """Return the recordings of one kind, oldest first."""
-        return tuple(sorted(self.captures_dir.glob(f"{kind}-*.mcap")))
+        return tuple(sorted(self.captures_dir.glob(f"{kind}-*.mcap"), key=lambda path: path.stem))
 
     def new_recording(self, kind: RecordingKind, now: datetime | None = None) -> Path:
         """Return a file name for a new recording that no file has yet; makes the folder."""
@@ -58,7 +58,7 @@ class Workspace:
         self.captures_dir.mkdir(parents=True, exist_ok=True)
         path = self.captures_dir / f"{kind}-{stamp}.mcap"
         number = 1
-        while path.exists():
+        while any(self.captures_dir.glob(f"{path.name}*")):
             number += 1
             path = self.captures_dir / f"{kind}-{stamp}-{number}.mcap"
         return path

@@ -1,0 +1,44 @@
+"""``scissorcal device doctor``"""
+
+import click
+
+from scissorcal.cli.options import device_option, seed_option
+from scissorcal.cli.output import Answer, command
+from scissorcal.cli.progress import progress
+
+
+@click.command("doctor")
+@device_option
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.2, 600.0),
+    default=5.0,
+    show_default=True,
+    help="How long to listen to the rig.",
+)
+@seed_option
+@command
+def doctor(device: str, seconds: float, seed: int) -> Answer:
+    """Measure the port, the timer and the scheduler, and name the mend for what is wrong.
+
+    No motor is enabled.
+
+    \b
+    Example:
+      $ scissorcal device doctor --device /dev/ttyUSB0
+      scissors-rig, serial 0042, firmware 3, one frame each 1 ms
+      pass  device  round trip  ...
+    """
+    from scissorcal.device.doctor import examine
+    from scissorcal.workday.rigs import open_rig
+
+    with open_rig(device, "office-paper", seed) as link:
+        identity = link.identity
+        with progress() as tell:
+            found = examine(link, seconds, tell)
+    text = (
+        f"{identity.name}, serial {identity.serial}, firmware {identity.firmware_version}, "
+        f"one frame each {identity.tick_us * 1e-3:g} ms"
+    )
+    result = {"identity": identity._asdict(), "measurements": found.measurements}
+    return Answer(result, text, found.verdicts)
