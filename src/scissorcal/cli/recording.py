@@ -1,0 +1,74 @@
+"""``scissorcal recording``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.output import Answer, command, note, table
+
+if TYPE_CHECKING:
+    from scissorcal.recording import RecordingSummary
+
+_COMMANDS = {
+    "show": ("scissorcal.cli.recording:show", "What a recording holds: strokes, ranges, gaps."),
+}
+
+
+@click.group("recording", cls=LazyGroup, lazy=_COMMANDS)
+def recording() -> None:
+    """Look into recordings."""
+
+
+@click.command("show")
+@click.argument("path", type=click.Path(path_type=Path, dir_okay=False))
+@command
+def show(path: Path) -> Answer:
+    """Show what the recording at PATH holds.
+
+    A capture that was interrupted (PATH.part) is recovered first.
+
+    \b
+    Example:
+      $ scissorcal recording show captures/friction-20260102T030405Z.mcap
+      friction, rotary joint: 110341 samples in 110.3 s at 1000 Hz, nothing missing
+      channel  unit  lowest  highest
+    """
+    from scissorcal.recording import read_recording, recover, summary
+
+    half = path.with_name(path.name + ".part")
+    if half.exists():
+        for recovered in recover(path.parent):
+            note(recovered.sentence)
+    found = summary(read_recording(path))
+    return Answer({"recording": found}, _text(found))
+
+
+def _text(found: "RecordingSummary") -> str:
+    gaps = found.gaps
+    missing = "nothing missing"
+    if gaps.missing:
+        missing = f"{gaps.missing} frames missing in {gaps.places} places"
+    lines = [
+        f"{found.kind}, {found.joint} joint: {found.samples} samples in {found.duration_s:.1f} s "
+        f"at {found.rate_Hz:.0f} Hz, {missing}",
+        "",
+    ]
+    ranges = [["channel", "unit", "lowest", "highest"]]
+    ranges += [
+        [channel.channel, channel.unit, f"{channel.low:.6g}", f"{channel.high:.6g}"]
+        for channel in found.ranges
+    ]
+    lines += [table(ranges, right=[2, 3]), ""]
+    if found.strokes:
+        strokes = [["stroke", "kind", "speed", "sheet", "samples", "travel"]]
+        for row in found.strokes:
+            stroke = row.stroke
+            speed = f"{stroke.speed:.4g}" if stroke.speed == stroke.speed else "-"
+            sheet = str(stroke.sheet) if stroke.sheet >= 0 else "-"
+            name = [str(stroke.index), stroke.kind, speed, sheet]
+            strokes.append([*name, str(row.samples), f"{row.travel:.4g}"])
+        lines += [table(strokes, right=[0, 2, 3, 4, 5]), ""]
+    lines += [f"note: {sentence}" for sentence in found.notes]
+    return "\n".join(lines)
