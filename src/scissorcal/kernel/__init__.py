@@ -18,12 +18,25 @@ from scissorcal.kernel.frames import (
     decode,
     encode,
 )
+from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.servo import (
+    SAMPLE_DTYPE,
+    EnergyLedger,
+    Mode,
+    SampleFlag,
+    Servo,
+    ServoConfig,
+    ServoCounters,
+    StopReason,
+)
+from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.tables import ModelTables, Table
 from scissorcal.kernel.wire import FrameDecoder, crc16, encode_frame
 
 __all__ = [
     "PROTOCOL_VERSION",
+    "SAMPLE_DTYPE",
     "SCHEMA_HASH",
     "STEP_DTYPE",
     "Capability",
@@ -33,19 +46,31 @@ __all__ = [
     "ConfigEcho",
     "ConfigKey",
     "ConfigStatus",
+    "EnergyLedger",
     "FrameDecoder",
     "Hello",
+    "Histogram",
     "Identity",
     "Kernel",
+    "LoopBlock",
+    "LoopCounters",
     "Message",
+    "Mode",
     "ModelTables",
+    "SampleFlag",
+    "Servo",
+    "ServoConfig",
+    "ServoCounters",
     "State",
     "StateFlag",
     "StepFlag",
     "StepOutput",
+    "StopReason",
     "Table",
+    "c_sources",
     "crc16",
     "decode",
     "encode",
     "encode_frame",
+    "run_loop",
 ]

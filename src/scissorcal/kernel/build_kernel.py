@@ -9,7 +9,16 @@ from pathlib import Path
 from cffi import FFI
 
 C = Path("src/scissorcal/kernel/c")  # relative: setuptools refuses absolute source paths
-HEADERS = ("sc_wire.h", "sc_table.h", "sc_model.h")
+HEADERS = (
+    "sc_wire.h",
+    "sc_table.h",
+    "sc_edge.h",
+    "sc_model.h",
+    "sc_motion.h",
+    "sc_servo.h",
+    "sc_block.h",
+    "sc_loop.h",
+)
 
 
 def declarations() -> str:

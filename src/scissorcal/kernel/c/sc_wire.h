@@ -101,7 +101,7 @@ typedef struct {
     uint32_t garbled;
     uint16_t fill;
     uint8_t overrun;
-    uint8_t buffer[254]; /* SC_FRAME_MAX */
+    uint8_t buffer[SC_FRAME_MAX];
 } sc_decoder;
 
 /* First 8 bytes, little-endian, of SHA-256 over the canonical form of wire.json. */

@@ -1,0 +1,165 @@
+#include "sc_block.h"
+
+#include <string.h>
+
+uint64_t sc_block_size(uint32_t reference_capacity)
+{
+    return sizeof(sc_block) + (uint64_t)reference_capacity * 4u * sizeof(float);
+}
+
+void sc_block_init(sc_block *block, uint32_t reference_capacity)
+{
+    memset(block, 0, (size_t)sc_block_size(reference_capacity));
+    block->magic = SC_BLOCK_MAGIC;
+    block->version = SC_BLOCK_VERSION;
+    block->size = sc_block_size(reference_capacity);
+    block->reference_capacity = reference_capacity;
+    block->silence_limit_ms = 1000;
+}
+
+int sc_block_is_sound(const sc_block *block, uint64_t size)
+{
+    return size >= sizeof(sc_block) && block->magic == SC_BLOCK_MAGIC &&
+           block->version == SC_BLOCK_VERSION && block->size <= size &&
+           block->size == sc_block_size(block->reference_capacity) &&
+           block->reference_size <= block->reference_capacity;
+}
+
+static void view_table(const sc_table_store *store, sc_table *table)
+{
+    table->x = store->x;
+    table->y = store->y;
+    table->slope = store->slope;
+    table->area = store->area;
+    table->size = store->size;
+}
+
+int sc_block_model(const sc_block *block, sc_model *model)
+{
+    if (!block->has_model) {
+        return 0;
+    }
+    *model = block->model;
+    view_table(&block->edge, &model->edge);
+    view_table(&block->response, &model->response);
+    view_table(&block->friction_opening, &model->friction_opening);
+    view_table(&block->friction_closing, &model->friction_closing);
+    view_table(&block->friction_angle, &model->friction_angle);
+    return sc_model_is_sound(model);
+}
+
+void sc_block_reference(const sc_block *block, sc_reference *reference)
+{
+    const float *first = (const float *)(const void *)(block + 1);
+    const uint32_t capacity = block->reference_capacity;
+    reference->opening = first;
+    reference->opening_rate = first + capacity;
+    reference->advance = first + 2 * (size_t)capacity;
+    reference->stroke = (const int32_t *)(const void *)(first + 3 * (size_t)capacity);
+    const uint32_t size = __atomic_load_n(&block->reference_size, __ATOMIC_ACQUIRE);
+    reference->size = size < capacity ? size : capacity;
+}
+
+void sc_block_order(sc_block *block, uint32_t mode)
+{
+    __atomic_store_n(&block->orders.mode, mode, __ATOMIC_RELAXED);
+    __atomic_add_fetch(&block->orders.order, 1u, __ATOMIC_RELEASE);
+}
+
+void sc_block_fresh_sheet(sc_block *block, float crack)
+{
+    __atomic_store(&block->orders.crack, &crack, __ATOMIC_RELAXED);
+    __atomic_add_fetch(&block->orders.sheet, 1u, __ATOMIC_RELEASE);
+}
+
+void sc_block_beat(sc_block *block)
+{
+    __atomic_add_fetch(&block->orders.heartbeat, 1u, __ATOMIC_RELAXED);
+}
+
+void sc_block_stop(sc_block *block)
+{
+    __atomic_store_n(&block->orders.stop, 1u, __ATOMIC_RELEASE);
+}
+
+uint32_t sc_block_request(sc_block *block, uint32_t key, float value)
+{
+    block->mailbox.key = key;
+    block->mailbox.value = value;
+    return __atomic_add_fetch(&block->mailbox.wanted, 1u, __ATOMIC_RELEASE);
+}
+
+int sc_block_answered(const sc_block *block, uint32_t request)
+{
+    return __atomic_load_n(&block->mailbox.answered, __ATOMIC_ACQUIRE) == request;
+}
+
+void sc_block_read_orders(const sc_block *block, sc_orders *orders)
+{
+    const sc_orders *shared = &block->orders;
+    orders->order = __atomic_load_n(&shared->order, __ATOMIC_ACQUIRE);
+    orders->mode = __atomic_load_n(&shared->mode, __ATOMIC_RELAXED);
+    orders->sheet = __atomic_load_n(&shared->sheet, __ATOMIC_ACQUIRE);
+    __atomic_load(&shared->crack, &orders->crack, __ATOMIC_RELAXED);
+    orders->heartbeat = __atomic_load_n(&shared->heartbeat, __ATOMIC_RELAXED);
+    orders->stop = __atomic_load_n(&shared->stop, __ATOMIC_ACQUIRE);
+}
+
+void sc_block_push(sc_block *block, const sc_sample *sample)
+{
+    block->ring[block->written % SC_RING_SAMPLES] = *sample;
+    __atomic_store_n(&block->written, block->written + 1, __ATOMIC_RELEASE);
+}
+
+/* Oldest sample that a reader may still touch: the writer may be busy with the one after the last. */
+static uint64_t oldest_kept(const sc_block *block)
+{
+    const uint64_t written = __atomic_load_n(&block->written, __ATOMIC_ACQUIRE);
+    return written < SC_RING_SAMPLES ? 0 : written - SC_RING_SAMPLES + 1;
+}
+
+uint64_t sc_block_read(const sc_block *block, uint64_t *cursor, sc_sample *samples, uint64_t n,
+                       uint64_t *lost)
+{
+    const uint64_t oldest = oldest_kept(block);
+    const uint64_t written = __atomic_load_n(&block->written, __ATOMIC_ACQUIRE);
+    if (*cursor < oldest) {
+        *lost += oldest - *cursor;
+        *cursor = oldest;
+    }
+    uint64_t count = 0;
+    while (count < n && *cursor + count < written) {
+        samples[count] = block->ring[(*cursor + count) % SC_RING_SAMPLES];
+        count++;
+    }
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    const uint64_t kept = oldest_kept(block);
+    uint64_t torn = kept > *cursor ? kept - *cursor : 0;
+    torn = torn < count ? torn : count;
+    memmove(samples, samples + torn, (size_t)(count - torn) * sizeof *samples);
+    *lost += torn;
+    *cursor += count;
+    return count - torn;
+}
+
+static uint32_t bin_of(uint64_t us_8)
+{
+    uint32_t octave = 0; /* us_8: eighths of a microsecond, at least 8 */
+    while (us_8 >= 16 && octave < SC_HISTOGRAM_BINS / SC_BINS_PER_OCTAVE) {
+        us_8 >>= 1;
+        octave++;
+    }
+    const uint32_t bin = octave * SC_BINS_PER_OCTAVE + (uint32_t)(us_8 - 8);
+    return bin < SC_HISTOGRAM_BINS ? bin : SC_HISTOGRAM_BINS - 1;
+}
+
+void sc_histogram_add(sc_histogram *histogram, int64_t time_ns)
+{
+    const uint64_t ns = time_ns > 0 ? (uint64_t)time_ns : 0;
+    const uint64_t us_8 = ns / 125u;
+    histogram->count[us_8 < 8 ? 0 : bin_of(us_8)]++;
+    histogram->total++;
+    if (ns > histogram->largest_ns) {
+        histogram->largest_ns = ns;
+    }
+}

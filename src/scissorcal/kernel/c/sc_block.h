@@ -1,0 +1,107 @@
+/* The block of shared memory through which a supervisor steers the loop and reads what it did.
+ *
+ * One process runs the loop on the block, another holds the same memory. Orders and counters pass
+ * through GCC's __atomic builtins, in this file and sc_loop only; the rest of the core needs none.
+ * The reference arrays (opening, opening_rate, advance, stroke) follow the struct, each with
+ * reference_capacity entries.
+ */
+#ifndef SC_BLOCK_H
+#define SC_BLOCK_H
+
+#include "sc_servo.h"
+
+enum {
+    SC_BLOCK_MAGIC = 0x4B4C4253,
+    SC_BLOCK_VERSION = 1, /* of this layout; both sides must agree */
+    SC_RING_SAMPLES = 32768,
+    SC_HISTOGRAM_BINS = 192,
+    SC_BINS_PER_OCTAVE = 8
+};
+
+typedef struct {
+    float x[SC_TABLE_MAX];
+    float y[SC_TABLE_MAX];
+    float slope[SC_TABLE_MAX];
+    float area[SC_TABLE_MAX];
+    int32_t size;
+} sc_table_store;
+
+/* Bin i counts times from (8 + i % 8) * 2^(i / 8) / 8 microseconds on, the first everything below,
+ * the last everything above: 8 bins to the octave, from 1 us to 16 s. */
+typedef struct {
+    uint64_t count[SC_HISTOGRAM_BINS];
+    uint64_t largest_ns;
+    uint64_t total;
+} sc_histogram;
+
+/* A CONFIG that the supervisor wants sent while the loop holds the line. */
+typedef struct {
+    uint32_t wanted;   /* counts requests */
+    uint32_t answered; /* number of the request that the echo below answers */
+    uint32_t key;
+    float value;
+    uint32_t status;
+    float value_in_force;
+} sc_mailbox;
+
+typedef struct {
+    uint32_t magic;
+    uint32_t version;
+    uint64_t size;
+    uint32_t reference_capacity;
+    uint32_t reference_size;
+    uint32_t has_model;
+    uint32_t silence_limit_ms; /* without a sound STATE, after which the loop gives up */
+    uint32_t running;
+    uint32_t exit_reason; /* SC_STOP_... once the loop has ended */
+    int32_t exit_errno;
+    uint32_t garbled;
+    uint64_t bytes_received;
+    uint64_t other_frames; /* sound, but no STATE */
+    uint64_t answers;      /* commands written */
+    uint64_t unsent;       /* commands that the line did not take in time */
+    uint64_t stalls;       /* more than 5 ticks between two STATE by the host's clock */
+    int64_t started_ns;
+    sc_orders orders;
+    sc_mailbox mailbox;
+    sc_servo_config config;
+    sc_servo servo;
+    sc_model model; /* its tables point nowhere; see sc_block_model */
+    sc_table_store edge, response, friction_opening, friction_closing, friction_angle;
+    sc_histogram latency;  /* from a frame's arrival to its command's departure */
+    sc_histogram interval; /* between arrivals */
+    uint64_t written;      /* samples ever written to the ring */
+    sc_sample ring[SC_RING_SAMPLES];
+} sc_block;
+
+uint64_t sc_block_size(uint32_t reference_capacity);
+
+/* Zero the memory and state its layout. */
+void sc_block_init(sc_block *block, uint32_t reference_capacity);
+
+/* 1 if memory of this many bytes holds a block of this layout. */
+int sc_block_is_sound(const sc_block *block, uint64_t size);
+
+/* Views into the block: the model, 0 if it has none or an unsound one; the reference. */
+int sc_block_model(const sc_block *block, sc_model *model);
+void sc_block_reference(const sc_block *block, sc_reference *reference);
+
+/* The supervisor's side. */
+void sc_block_order(sc_block *block, uint32_t mode);
+void sc_block_fresh_sheet(sc_block *block, float crack);
+void sc_block_beat(sc_block *block);
+void sc_block_stop(sc_block *block);
+uint32_t sc_block_request(sc_block *block, uint32_t key, float value);
+int sc_block_answered(const sc_block *block, uint32_t request);
+
+/* Copy up to n samples from *cursor on and move it; adds to *lost those that were overwritten. */
+uint64_t sc_block_read(const sc_block *block, uint64_t *cursor, sc_sample *samples, uint64_t n,
+                       uint64_t *lost);
+
+/* The loop's side. */
+void sc_block_read_orders(const sc_block *block, sc_orders *orders);
+void sc_block_push(sc_block *block, const sc_sample *sample);
+
+void sc_histogram_add(sc_histogram *histogram, int64_t time_ns);
+
+#endif

@@ -1,0 +1,285 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "sc_loop.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum {
+    POLL_MS = 5,
+    WRITE_PATIENCE_MS = 20,
+    READ_BYTES = 4096,
+    FAREWELLS = 3,
+    TICKS_OF_A_STALL = 5,
+    FRAMES_UNTIL_ASKED_AGAIN = 50,
+    EMPTY_READS_OF_AN_END = 10 /* some ports give one now and then while all is well */
+};
+
+/* What the loop knows besides the block; lives on its stack. */
+typedef struct {
+    int fd;
+    sc_block *block;
+    const sc_model *model;
+    sc_reference reference;
+    sc_decoder decoder;
+    sc_command command;
+    int64_t epoch_ns; /* CLOCK_REALTIME at the start, less CLOCK_MONOTONIC then */
+    int64_t arrived_ns;
+    int64_t last_state_ns;
+    int has_state; /* any since the start */
+    int unanswered;
+    int empty_reads;
+    uint32_t asked_frames;
+    uint32_t asked;
+    size_t pending; /* bytes of a frame that the line has not taken yet */
+    uint8_t out[SC_FRAME_MAX];
+} loop;
+
+static int64_t clock_ns(clockid_t clock)
+{
+    struct timespec now;
+    clock_gettime(clock, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+static void fail(loop *self, uint32_t reason, int error)
+{
+    if (self->block->servo.stop_reason == SC_STOP_NONE) {
+        self->block->exit_errno = error;
+    }
+    sc_servo_stop(&self->block->servo, reason);
+}
+
+/* Write what is pending, waiting a little where the line is full. A frame is never cut short: what
+ * remains goes out before anything else. Returns 1 once all is written. */
+static int flush_pending(loop *self)
+{
+    while (self->pending > 0) {
+        const ssize_t wrote = write(self->fd, self->out, self->pending);
+        if (wrote > 0) {
+            self->pending -= (size_t)wrote;
+            memmove(self->out, self->out + wrote, self->pending);
+        } else if (wrote < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+            struct pollfd line = {self->fd, POLLOUT, 0};
+            if (poll(&line, 1, WRITE_PATIENCE_MS) == 0) {
+                return 0;
+            }
+            if (line.revents & (POLLHUP | POLLERR | POLLNVAL)) {
+                fail(self, SC_STOP_HANGUP, 0);
+                return 0;
+            }
+        } else if (wrote < 0 && errno != EINTR) {
+            fail(self, errno == EIO || errno == ENXIO || errno == EPIPE ? SC_STOP_HANGUP
+                                                                         : SC_STOP_LINE_ERROR,
+                 errno);
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int send_payload(loop *self, const uint8_t *payload, size_t size)
+{
+    if (!flush_pending(self)) {
+        self->block->unsent++;
+        return 0;
+    }
+    self->pending = sc_encode_frame(payload, size, self->out, sizeof self->out);
+    return flush_pending(self);
+}
+
+static void send_command(loop *self)
+{
+    uint8_t payload[SC_SIZE_COMMAND];
+    const size_t size = sc_pack_command(&self->command, payload);
+    if (send_payload(self, payload, size)) {
+        self->block->answers++;
+    }
+}
+
+static void say_farewell(loop *self)
+{
+    const uint32_t echo = self->command.echo_sequence;
+    memset(&self->command, 0, sizeof self->command);
+    self->command.echo_sequence = echo;
+    for (int i = 0; i < FAREWELLS; i++) {
+        send_command(self);
+    }
+}
+
+/* Pass a CONFIG on, again now and then until its echo comes back. */
+static void serve_mailbox(loop *self)
+{
+    const sc_mailbox *mailbox = &self->block->mailbox;
+    const uint32_t wanted = __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE);
+    if (wanted == mailbox->answered ||
+        (wanted == self->asked && ++self->asked_frames < FRAMES_UNTIL_ASKED_AGAIN)) {
+        return;
+    }
+    uint8_t payload[SC_SIZE_CONFIG];
+    const sc_config config = {0, (uint16_t)mailbox->key, wanted, mailbox->value};
+    self->asked = wanted;
+    self->asked_frames = 0;
+    (void)send_payload(self, payload, sc_pack_config(&config, SC_TYPE_CONFIG, payload));
+}
+
+static void take_other(loop *self, const uint8_t *payload, size_t size)
+{
+    sc_mailbox *mailbox = &self->block->mailbox;
+    sc_config echo;
+    self->block->other_frames++;
+    if (sc_unpack_config(payload, size, SC_TYPE_CONFIG_ECHO, &echo) &&
+        echo.nonce == __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE) &&
+        echo.nonce != mailbox->answered && echo.key == mailbox->key) {
+        mailbox->status = echo.status;
+        mailbox->value_in_force = echo.value;
+        __atomic_store_n(&mailbox->answered, echo.nonce, __ATOMIC_RELEASE);
+    }
+}
+
+static void note_interval(loop *self)
+{
+    sc_block *block = self->block;
+    if (self->has_state) {
+        const int64_t interval = self->arrived_ns - self->last_state_ns;
+        sc_histogram_add(&block->interval, interval);
+        if (interval > (int64_t)block->config.tick_us * 1000 * TICKS_OF_A_STALL) {
+            block->stalls++;
+        }
+    }
+    self->has_state = 1;
+    self->last_state_ns = self->arrived_ns;
+}
+
+/* Step the servo; the sample waits until its command is out or the next state comes. */
+static void take_state(loop *self, const sc_state *state)
+{
+    sc_block *block = self->block;
+    sc_orders orders;
+    if (self->unanswered) {
+        sc_block_push(block, &block->servo.sample);
+        self->unanswered = 0;
+    }
+    note_interval(self);
+    sc_block_read_orders(block, &orders);
+    sc_block_reference(block, &self->reference);
+    if (sc_servo_step(&block->config, self->model, &self->reference, &orders, &block->servo, state,
+                      &self->command)) {
+        block->servo.sample.host_time_ns = self->epoch_ns + self->arrived_ns;
+        self->unanswered = 1;
+    }
+}
+
+static void answer_newest(loop *self)
+{
+    sc_block *block = self->block;
+    send_command(self);
+    const int64_t latency = clock_ns(CLOCK_MONOTONIC) - self->arrived_ns;
+    sc_histogram_add(&block->latency, latency);
+    if (self->unanswered) {
+        block->servo.sample.latency_ns =
+            latency < (int64_t)UINT32_MAX ? (uint32_t)latency : UINT32_MAX;
+        sc_block_push(block, &block->servo.sample);
+        self->unanswered = 0;
+    }
+    serve_mailbox(self);
+}
+
+static void take_bytes(loop *self, const uint8_t *bytes, size_t size)
+{
+    size_t taken = 0;
+    int states = 0;
+    int got;
+    while ((got = sc_decoder_feed(&self->decoder, bytes, size, &taken)) > 0) {
+        sc_state state;
+        if (sc_unpack_state(self->decoder.buffer, (size_t)got, &state)) {
+            take_state(self, &state);
+            states++;
+        } else {
+            take_other(self, self->decoder.buffer, (size_t)got);
+        }
+    }
+    self->block->garbled = self->decoder.garbled;
+    self->block->bytes_received = self->decoder.bytes_received;
+    if (states > 0) {
+        answer_newest(self);
+    }
+}
+
+/* Read once; what the line says about its own end becomes a stop. */
+static void read_line(loop *self, short events)
+{
+    uint8_t bytes[READ_BYTES];
+    if (!(events & POLLIN)) {
+        fail(self, SC_STOP_HANGUP, 0);
+        return;
+    }
+    const ssize_t size = read(self->fd, bytes, sizeof bytes);
+    if (size > 0) {
+        self->arrived_ns = clock_ns(CLOCK_MONOTONIC);
+        self->empty_reads = 0;
+        take_bytes(self, bytes, (size_t)size);
+    } else if (size == 0) {
+        if ((events & POLLHUP) || ++self->empty_reads >= EMPTY_READS_OF_AN_END) {
+            fail(self, SC_STOP_HANGUP, 0);
+        }
+    } else if (errno == EIO || errno == ENXIO) {
+        fail(self, SC_STOP_HANGUP, errno);
+    } else if (errno != EINTR && errno != EAGAIN && errno != EWOULDBLOCK) {
+        fail(self, SC_STOP_LINE_ERROR, errno);
+    }
+}
+
+static void wait_and_serve(loop *self)
+{
+    sc_orders orders;
+    struct pollfd line = {self->fd, POLLIN, 0};
+    const int ready = poll(&line, 1, POLL_MS);
+    if (ready > 0) {
+        read_line(self, line.revents);
+    } else if (ready < 0 && errno != EINTR) {
+        fail(self, SC_STOP_LINE_ERROR, errno);
+    }
+    sc_block_read_orders(self->block, &orders);
+    if (orders.stop) {
+        sc_servo_stop(&self->block->servo, SC_STOP_ASKED);
+    }
+    const int64_t silence = clock_ns(CLOCK_MONOTONIC) - self->last_state_ns;
+    if (silence > (int64_t)self->block->silence_limit_ms * 1000000) {
+        sc_servo_stop(&self->block->servo, SC_STOP_SILENCE);
+    }
+}
+
+uint32_t sc_loop_run(int fd, sc_block *block)
+{
+    sc_model model;
+    loop self;
+    memset(&self, 0, sizeof self);
+    self.fd = fd;
+    self.block = block;
+    if (!sc_servo_config_is_sound(&block->config) ||
+        (block->has_model && !sc_block_model(block, &model))) {
+        block->exit_reason = SC_STOP_BAD_BLOCK;
+        return SC_STOP_BAD_BLOCK;
+    }
+    self.model = block->has_model ? &model : NULL;
+    sc_decoder_init(&self.decoder);
+    self.last_state_ns = clock_ns(CLOCK_MONOTONIC);
+    self.epoch_ns = clock_ns(CLOCK_REALTIME) - self.last_state_ns;
+    block->started_ns = self.epoch_ns + self.last_state_ns;
+    __atomic_store_n(&block->running, 1u, __ATOMIC_RELEASE);
+    const int line_flags = fcntl(fd, F_GETFL);
+    (void)fcntl(fd, F_SETFL, line_flags | O_NONBLOCK); /* a full line must not hold the loop */
+    while (block->servo.stop_reason == SC_STOP_NONE) {
+        wait_and_serve(&self);
+    }
+    say_farewell(&self);
+    (void)fcntl(fd, F_SETFL, line_flags);
+    block->exit_reason = block->servo.stop_reason;
+    __atomic_store_n(&block->running, 0u, __ATOMIC_RELEASE);
+    return block->exit_reason;
+}

@@ -1,0 +1,13 @@
+/* The servo loop on a file descriptor: POSIX only. */
+#ifndef SC_LOOP_H
+#define SC_LOOP_H
+
+#include "sc_block.h"
+
+/* Run until a stop, a hangup, silence or an error; returns the reason, which block->exit_reason
+ * keeps too. Paced by the device's frames: the loop sleeps in poll(), decodes what came, steps the
+ * servo once per STATE, answers the newest, and records a sample for each. On the way out it sends
+ * commands of zero without ENABLE. The descriptor stays open. */
+uint32_t sc_loop_run(int fd, sc_block *block);
+
+#endif

@@ -1,0 +1,338 @@
+#include "sc_servo.h"
+
+#include <math.h>
+#include <string.h>
+
+static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors read more */
+static const float LONGEST_TICK_S = 0.01f;       /* a gap does not widen the slew without bound */
+
+enum { SILENCE_UNTIL_STOP = 5, FRAMES_TO_CLEAR = 100 };
+
+typedef struct {
+    float torque;
+    float force;
+} effort;
+
+void sc_servo_stop(sc_servo *servo, uint32_t reason)
+{
+    if (servo->stop_reason == SC_STOP_NONE) {
+        servo->stop_reason = reason;
+    }
+}
+
+static int is_level(float value)
+{
+    return isfinite(value) && value >= 0.0f;
+}
+
+int sc_servo_config_is_sound(const sc_servo_config *config)
+{
+    return is_level(config->torque_limit) && is_level(config->torque_slew) &&
+           is_level(config->force_limit) && is_level(config->force_slew) &&
+           is_level(config->ramp_s) && is_level(config->damping_Nm_s_per_rad) &&
+           is_level(config->rate_cutoff_Hz) && is_level(config->opening_kp) &&
+           is_level(config->opening_kd) && is_level(config->opening_ki) &&
+           is_level(config->advance_kp) && is_level(config->advance_kd) &&
+           is_level(config->advance_ki) && config->opening_error_limit > 0.0f &&
+           config->advance_error_limit > 0.0f && config->tick_us > 0;
+}
+
+/* Begin a mode afresh. What the model's material still stored goes with the mode that held it. */
+static void engage(sc_servo *servo, uint32_t mode)
+{
+    servo->ledger.arrest_J += servo->ledger.stored_J;
+    servo->ledger.stored_J = 0.0;
+    memset(&servo->step, 0, sizeof servo->step);
+    servo->mode = mode;
+    servo->engaged_at = servo->sequence;
+    servo->engaged_s = 0.0f;
+    servo->opening_integral = 0.0f;
+    servo->advance_integral = 0.0f;
+    servo->track_index = 0;
+}
+
+/* Follow the supervisor: a new order engages its mode; silence falls back to damping, then stops. */
+static void obey(const sc_servo_config *config, const sc_orders *orders, sc_servo *servo)
+{
+    if (orders->stop) {
+        sc_servo_stop(servo, SC_STOP_ASKED);
+    }
+    if (orders->order != servo->order) {
+        servo->order = orders->order;
+        servo->fallback = 0;
+        engage(servo, orders->mode <= SC_MODE_DAMP ? orders->mode : SC_MODE_IDLE);
+    }
+    if (orders->sheet != servo->sheet) {
+        servo->sheet = orders->sheet;
+        servo->crack.crack = isfinite(orders->crack) ? orders->crack : 0.0f;
+        servo->crack.detached = 0;
+    }
+    if (config->supervisor_ticks == 0) {
+        return;
+    }
+    if (orders->heartbeat != servo->heartbeat) {
+        servo->heartbeat = orders->heartbeat;
+        servo->silent_frames = 0;
+        return;
+    }
+    servo->silent_frames++;
+    if (servo->silent_frames / SILENCE_UNTIL_STOP >= config->supervisor_ticks) {
+        sc_servo_stop(servo, SC_STOP_SUPERVISOR_LOST);
+    } else if (servo->silent_frames >= config->supervisor_ticks && !servo->fallback) {
+        servo->fallback = 1;
+        if (servo->mode != SC_MODE_IDLE) {
+            engage(servo, SC_MODE_DAMP);
+        }
+    }
+}
+
+/* A latched fault is cleared at the start and then a bounded number of times; else it stops us.
+ * Returns 1 while it stands. */
+static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
+{
+    if (state->flags & SC_STATE_ENCODER_FAULT) {
+        sc_servo_stop(servo, SC_STOP_ENCODER_FAULT);
+        return 1;
+    }
+    if (!(state->flags & SC_STATE_FAULT_LATCHED)) {
+        servo->fault_seen = 0;
+        return 0;
+    }
+    if (!servo->fault_seen) {
+        servo->fault_seen = 1;
+        servo->fault_frames = 0;
+        servo->faults += servo->enabled_once;
+        servo->engaged_s = 0.0f;
+        servo->opening_integral = 0.0f;
+        servo->advance_integral = 0.0f;
+    }
+    servo->fault_frames++;
+    if (servo->faults > config->fault_clearings || servo->fault_frames > FRAMES_TO_CLEAR) {
+        sc_servo_stop(servo, SC_STOP_DEVICE_FAULT);
+    }
+    return 1;
+}
+
+static effort track(const sc_servo_config *config, const sc_reference *reference, sc_servo *servo,
+                    float dt)
+{
+    effort wanted = {0.0f, 0.0f};
+    servo->track_index = servo->sequence - servo->engaged_at;
+    if (reference == NULL || reference->size == 0) {
+        return wanted;
+    }
+    const uint32_t last = reference->size - 1;
+    const uint32_t at = servo->track_index < last ? servo->track_index : last;
+    const sc_motion *motion = &servo->motion;
+    float opening_rate = reference->opening_rate[at];
+    float advance_rate = 0.0f;
+    if (at < last) {
+        advance_rate =
+            (reference->advance[at + 1] - reference->advance[at]) * 1e6f / (float)config->tick_us;
+        servo->sample.stroke = reference->stroke[at];
+    } else {
+        opening_rate = 0.0f;
+    }
+    const float opening_error = reference->opening[at] - motion->opening;
+    const float advance_error = reference->advance[at] - motion->advance;
+    if (fabsf(opening_error) > config->opening_error_limit ||
+        fabsf(advance_error) > config->advance_error_limit) {
+        sc_servo_stop(servo, SC_STOP_TRACKING_LOST);
+        return wanted;
+    }
+    const sc_pid_gains opening = {config->opening_kp, config->opening_kd, config->opening_ki,
+                                  config->torque_limit};
+    const sc_pid_gains advance = {config->advance_kp, config->advance_kd, config->advance_ki,
+                                  config->force_limit};
+    wanted.torque = sc_pid(&opening, &servo->opening_integral, opening_error,
+                           opening_rate - motion->opening_rate, dt);
+    wanted.force = sc_pid(&advance, &servo->advance_integral, advance_error,
+                          advance_rate - motion->advance_rate, dt);
+    return wanted;
+}
+
+static effort render(const sc_servo_config *config, const sc_model *model, sc_servo *servo)
+{
+    effort wanted = {0.0f, 0.0f};
+    if (model == NULL) {
+        return wanted;
+    }
+    const sc_motion *motion = &servo->motion;
+    sc_model_step(model, &servo->crack, motion->opening, motion->opening_rate, motion->advance,
+                  &servo->step);
+    servo->ledger.stored_J = (double)servo->step.stored_J;
+    servo->ledger.fracture_J += (double)servo->step.fracture_J;
+    servo->ledger.arrest_J += (double)servo->step.arrest_J;
+    servo->sample.flags |= servo->step.flags << SC_SAMPLE_STEP_SHIFT;
+    const float share =
+        servo->engaged_s < config->ramp_s ? servo->engaged_s / config->ramp_s : 1.0f;
+    wanted.torque = share * servo->step.torque;
+    wanted.force = share * servo->step.force;
+    return wanted;
+}
+
+/* Bring an effort to what may leave: finite, within the limit, and no faster than the slew. */
+static float limited(float wanted, float last, float limit, float most_change, uint64_t *at_limit,
+                     uint64_t *slewed)
+{
+    float given = isfinite(wanted) ? wanted : 0.0f;
+    if (given > limit || given < -limit) {
+        given = given > 0.0f ? limit : -limit;
+        (*at_limit)++;
+    }
+    if (given > last + most_change || given < last - most_change) {
+        given = given > last ? last + most_change : last - most_change;
+        (*slewed)++;
+    }
+    return fminf(fmaxf(given, -limit), limit);
+}
+
+static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort wanted, float dt)
+{
+    const uint64_t torque_before = servo->torque_limited;
+    const uint64_t force_before = servo->force_limited;
+    dt = fminf(dt, LONGEST_TICK_S);
+    servo->torque = limited(wanted.torque, servo->torque, config->torque_limit,
+                            config->torque_slew * dt, &servo->torque_limited,
+                            &servo->torque_slewed);
+    servo->force = limited(wanted.force, servo->force, config->force_limit,
+                           config->force_slew * dt, &servo->force_limited, &servo->force_slewed);
+    if (servo->torque_limited != torque_before) {
+        servo->sample.flags |= SC_SAMPLE_TORQUE_LIMITED;
+    }
+    if (servo->force_limited != force_before && config->force_limit > 0.0f) {
+        servo->sample.flags |= SC_SAMPLE_FORCE_LIMITED;
+    }
+}
+
+/* Work of the last command over the way that was made since, if the motors were on. */
+static void book_work(sc_servo *servo, const sc_motion *before, const sc_state *state)
+{
+    if (!before->started || !(state->flags & SC_STATE_MOTOR_ENABLED)) {
+        return;
+    }
+    const double turned = (double)state->opening - (double)before->opening;
+    const double moved = (double)state->advance - (double)before->advance;
+    servo->ledger.delivered_J += (double)servo->torque * turned + (double)servo->force * moved;
+    if (servo->mode == SC_MODE_RENDER) {
+        servo->ledger.friction_J -= (double)servo->step.friction_torque * turned;
+    }
+}
+
+static void count_frame(sc_servo *servo, const sc_state *state)
+{
+    const uint32_t passed = state->sequence - servo->sequence;
+    servo->frames++;
+    if (servo->started && passed > 1 && passed < 0x80000000u) {
+        servo->misses += passed - 1;
+        servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
+    }
+    servo->sequence = state->sequence;
+    servo->started = 1;
+    if (state->flags & SC_STATE_TORQUE_SATURATED) {
+        servo->device_saturated++;
+    }
+}
+
+static void begin_sample(sc_servo *servo, const sc_state *state)
+{
+    sc_sample *sample = &servo->sample;
+    memset(sample, 0, sizeof *sample);
+    sample->sequence = state->sequence;
+    sample->flags = state->flags;
+    sample->opening = (double)state->opening;
+    sample->advance = (double)state->advance;
+    sample->motor_torque = (double)state->motor_torque;
+    sample->handle_force = (double)state->handle_force;
+    sample->stroke = -1;
+}
+
+static void write_command(sc_servo *servo, uint16_t flags, sc_command *command)
+{
+    command->flags = flags;
+    command->echo_sequence = servo->sequence;
+    command->torque = servo->torque;
+    command->force = servo->force;
+    servo->sample.torque_command = (double)servo->torque;
+    servo->sample.force_command = (double)servo->force;
+    servo->command_flags = flags;
+    if (flags & SC_COMMAND_ENABLE) {
+        servo->enabled_once = 1;
+    }
+}
+
+static void release_motors(sc_servo *servo, uint16_t flags, sc_command *command)
+{
+    servo->torque = 0.0f;
+    servo->force = 0.0f;
+    write_command(servo, flags, command);
+}
+
+static effort effort_of_mode(const sc_servo_config *config, const sc_model *model,
+                             const sc_reference *reference, sc_servo *servo, float dt)
+{
+    effort wanted = {0.0f, 0.0f};
+    if (servo->mode == SC_MODE_TRACK) {
+        wanted = track(config, reference, servo, dt);
+    } else if (servo->mode == SC_MODE_RENDER) {
+        wanted = render(config, model, servo);
+    } else if (servo->mode == SC_MODE_DAMP) {
+        wanted.torque = -config->damping_Nm_s_per_rad * servo->motion.opening_rate;
+    }
+    return wanted;
+}
+
+/* Choose what the command says: released motors unless all is well. */
+static void answer(const sc_servo_config *config, sc_servo *servo, int valid, int faulty,
+                   effort wanted, float dt, sc_command *command)
+{
+    const uint16_t clear = faulty ? SC_COMMAND_CLEAR_FAULT : 0;
+    if (servo->stop_reason != SC_STOP_NONE) {
+        release_motors(servo, 0, command);
+    } else if (servo->mode == SC_MODE_IDLE) {
+        release_motors(servo, clear, command);
+    } else if (faulty || !valid) {
+        release_motors(servo, SC_COMMAND_ENABLE | clear, command);
+    } else {
+        apply_limits(config, servo, wanted, dt);
+        write_command(servo, SC_COMMAND_ENABLE, command);
+    }
+}
+
+int sc_servo_step(const sc_servo_config *config, const sc_model *model,
+                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                  const sc_state *state, sc_command *command)
+{
+    if (servo->started && state->sequence == servo->sequence) {
+        servo->duplicates++;
+        write_command(servo, (uint16_t)servo->command_flags, command);
+        return 0;
+    }
+    begin_sample(servo, state);
+    count_frame(servo, state);
+    obey(config, orders, servo);
+    const int valid = fabsf(state->opening) <= WIDEST_OPENING && isfinite(state->advance);
+    float dt = 0.0f;
+    if (valid) {
+        const sc_motion before = servo->motion;
+        dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
+                              state->device_us, state->opening, state->advance);
+        book_work(servo, &before, state);
+        servo->engaged_s += dt;
+    } else {
+        servo->invalid_frames++;
+        servo->sample.flags |= SC_SAMPLE_INVALID;
+    }
+    servo->sample.device_time_us = servo->motion.device_time_us;
+    if (servo->fallback) {
+        servo->fallback_frames++;
+        servo->sample.flags |= SC_SAMPLE_FALLBACK;
+    }
+    const int faulty = handle_fault(config, servo, state);
+    effort wanted = {0.0f, 0.0f};
+    if (valid && !faulty && servo->stop_reason == SC_STOP_NONE) {
+        wanted = effort_of_mode(config, model, reference, servo, dt);
+    }
+    answer(config, servo, valid, faulty, wanted, dt, command);
+    return 1;
+}

@@ -1,0 +1,164 @@
+/* The servo: one STATE in, one COMMAND out. Modes, limits, ramps, watchdog, energy ledger.
+ *
+ * IDLE    motors off (commands of zero without ENABLE keep the device's watchdog quiet)
+ * TRACK   opening and advance follow a reference by PID
+ * RENDER  torque and force come from the model, ramped up from 0 when it engages
+ * DAMP    torque = -damping * rate, no force
+ *
+ * Everything leaves through the same limits: never more than torque_limit and force_limit, never
+ * faster than the slews. What is not finite never leaves: it becomes 0.
+ */
+#ifndef SC_SERVO_H
+#define SC_SERVO_H
+
+#include "sc_model.h"
+#include "sc_motion.h"
+#include "sc_wire.h"
+
+enum { SC_MODE_IDLE = 0, SC_MODE_TRACK = 1, SC_MODE_RENDER = 2, SC_MODE_DAMP = 3 };
+
+/* Why the servo stopped; once it has, it stays stopped. */
+enum {
+    SC_STOP_NONE = 0,
+    SC_STOP_ASKED = 1,
+    SC_STOP_SUPERVISOR_LOST = 2,
+    SC_STOP_DEVICE_FAULT = 3,
+    SC_STOP_ENCODER_FAULT = 4,
+    SC_STOP_TRACKING_LOST = 5,
+    SC_STOP_HANGUP = 6,
+    SC_STOP_SILENCE = 7,
+    SC_STOP_LINE_ERROR = 8,
+    SC_STOP_BAD_BLOCK = 9
+};
+
+/* What a sample's flags say above the 16 bits that come from the device. */
+enum {
+    SC_SAMPLE_TORQUE_LIMITED = 0x10000,
+    SC_SAMPLE_FORCE_LIMITED = 0x20000,
+    SC_SAMPLE_FALLBACK = 0x40000,
+    SC_SAMPLE_INVALID = 0x80000,
+    SC_SAMPLE_AFTER_GAP = 0x100000,
+    SC_SAMPLE_STEP_SHIFT = 24 /* a rendered step's own flags stand from this bit on */
+};
+
+typedef struct {
+    float torque_limit;        /* [N m] */
+    float torque_slew;         /* [N m/s] */
+    float force_limit;         /* [N]; 0 renders and drives no force at all */
+    float force_slew;          /* [N/s] */
+    float ramp_s;              /* from engaging RENDER to its full force */
+    float damping_Nm_s_per_rad; /* of DAMP */
+    float rate_cutoff_Hz;      /* of the rate estimator; 0: none */
+    float opening_kp, opening_kd, opening_ki;
+    float advance_kp, advance_kd, advance_ki;
+    float opening_error_limit; /* TRACK stops beyond this error [rad] ... */
+    float advance_error_limit; /* ... or this [m] */
+    uint32_t supervisor_ticks; /* silent frames until only damping is left, five times as many
+                                  until the stop; 0: no supervision */
+    uint32_t fault_clearings;  /* latched faults of the device that are cleared, not obeyed */
+    uint32_t tick_us;
+} sc_servo_config;
+
+typedef struct {
+    const float *opening;
+    const float *opening_rate;
+    const float *advance;
+    const int32_t *stroke;
+    uint32_t size;
+} sc_reference;
+
+/* What the supervisor wants. `order` and `sheet` count up: a new number makes the mode engage
+ * afresh, or puts the crack at `crack`. `heartbeat` just has to change now and then. */
+typedef struct {
+    uint32_t mode;
+    uint32_t order;
+    uint32_t sheet;
+    float crack;
+    uint32_t heartbeat;
+    uint32_t stop;
+} sc_orders;
+
+/* One record of telemetry; layout as in a recording. */
+typedef struct {
+    uint32_t sequence;
+    uint32_t flags;
+    int64_t host_time_ns;
+    int64_t device_time_us;
+    double opening;
+    double advance;
+    double motor_torque;
+    double handle_force;
+    double torque_command;
+    double force_command;
+    int32_t stroke;
+    uint32_t latency_ns;
+} sc_sample;
+
+/* Joules since the start. delivered: work of the commanded torque and force on the mechanism. The
+ * model's own books: what the material stores now, what cutting took, what arrests lost, what
+ * rendered friction took. A passive rendering has delivered + stored + fracture + arrest + friction
+ * <= 0, up to what sampling adds. */
+typedef struct {
+    double delivered_J;
+    double stored_J;
+    double fracture_J;
+    double arrest_J;
+    double friction_J;
+} sc_ledger;
+
+typedef struct {
+    sc_motion motion;
+    sc_crack crack;
+    sc_ledger ledger;
+    sc_sample sample; /* of the last frame; host time and latency are the loop's to fill */
+    sc_step_output step;
+    uint32_t started;
+    uint32_t mode; /* in force, which may be DAMP by fallback */
+    uint32_t order;
+    uint32_t sheet;
+    uint32_t heartbeat;
+    uint32_t silent_frames;
+    uint32_t fallback;
+    uint32_t stop_reason;
+    uint32_t sequence;
+    uint32_t engaged_at; /* sequence at which the mode engaged */
+    float engaged_s;     /* time since then */
+    float opening_integral;
+    float advance_integral;
+    float torque; /* last command */
+    float force;
+    uint32_t track_index;
+    uint32_t fault_seen;
+    uint32_t fault_frames;
+    uint32_t enabled_once;
+    uint32_t command_flags;
+    uint64_t frames;
+    uint64_t misses;
+    uint64_t duplicates;
+    uint64_t invalid_frames;
+    uint64_t torque_limited;
+    uint64_t force_limited;
+    uint64_t torque_slewed;
+    uint64_t force_slewed;
+    uint64_t device_saturated;
+    uint64_t fallback_frames;
+    uint64_t faults;
+} sc_servo;
+
+/* Answer a state. Returns 1, and servo->sample tells of this frame; or 0 for a frame that repeats the
+ * last sequence, which gets the last command again and changes nothing else.
+ *
+ * model and reference may be null: RENDER and TRACK then give no torque. A state whose opening or
+ * advance is no usable number gets zero torque. A device whose clock fell back has restarted: its
+ * rates start again from 0. */
+int sc_servo_step(const sc_servo_config *config, const sc_model *model,
+                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                  const sc_state *state, sc_command *command);
+
+/* Latch the stop; the first reason stands. */
+void sc_servo_stop(sc_servo *servo, uint32_t reason);
+
+/* 1 if every limit and gain is a finite number >= 0 and the mode of the orders exists. */
+int sc_servo_config_is_sound(const sc_servo_config *config);
+
+#endif

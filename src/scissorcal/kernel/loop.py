@@ -1,0 +1,319 @@
+"""The loop on a file descriptor, and the block of shared memory that steers it.
+
+One process creates a LoopBlock and hands its ``fileno()`` to another, which attaches it and calls
+:func:`run_loop`; that one runs in C without the GIL until it stops. The creator gives orders, keeps
+the heart beating and reads samples, all without touching the line.
+"""
+
+import mmap
+import os
+import tempfile
+import time
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.frames import ConfigEcho
+from scissorcal.kernel.servo import (
+    SAMPLE_DTYPE,
+    EnergyLedger,
+    Mode,
+    ServoConfig,
+    ServoCounters,
+    StopReason,
+    counters_of,
+    ledger_of,
+    reference_arrays,
+)
+from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
+
+RING_SAMPLES = int(lib.SC_RING_SAMPLES)
+_BINS = int(lib.SC_HISTOGRAM_BINS)
+_PER_OCTAVE = int(lib.SC_BINS_PER_OCTAVE)
+
+
+def run_loop(fd: int, block: "LoopBlock") -> StopReason:
+    """Serve the device on ``fd`` until a stop, a hangup, silence or an error; say which.
+
+    Runs in C with the GIL released. ``fd`` stays open, and is non-blocking meanwhile. A block is
+    run once; make a new one to start again.
+    """
+    return StopReason(lib.sc_loop_run(fd, block.pointer))
+
+
+@dataclass(frozen=True)
+class LoopCounters:
+    """What happened on the line.
+
+    ``garbled`` frames were thrown away, ``other_frames`` were sound but no STATE, ``answers`` are
+    commands written and ``unsent`` those the line did not take in time. ``stalls`` are pauses of
+    more than five ticks between two STATE by the host's clock; ``lost_samples`` were overwritten
+    in the ring before this process read them.
+    """
+
+    garbled: int
+    bytes_received: int
+    other_frames: int
+    answers: int
+    unsent: int
+    stalls: int
+    lost_samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class Histogram:
+    """Times in bins of equal width in the logarithm, eight to the octave.
+
+    ``edges_us`` has shape (n + 1,): the first is 0 and the last infinite. ``counts``: (n,).
+    """
+
+    edges_us: NDArray[np.float64]
+    counts: NDArray[np.uint64]
+    largest_us: float
+
+    @property
+    def total(self) -> int:
+        """How many times were counted."""
+        return int(self.counts.sum())
+
+    def quantile(self, share: float) -> float:
+        """Time in us that ``share`` of all do not exceed: its bin's upper edge, NaN if empty.
+
+        So it is at most 12.5 % too long, never too short.
+        """
+        if not 0 <= share <= 1:
+            raise ValueError(f"A share lies between 0 and 1, not at {share}.")
+        if self.total == 0:
+            return float("nan")
+        rank = max(1, int(np.ceil(share * self.total - 1e-9)))
+        index = int(np.searchsorted(np.cumsum(self.counts), rank))
+        return float(min(self.edges_us[index + 1], self.largest_us))
+
+
+class LoopBlock:
+    """Shared memory between the loop and its supervisor.
+
+    It has no name in the system: the memory lives as long as a process holds it, so that a killed
+    process leaves nothing behind.
+    """
+
+    def __init__(self, fd: int, size: int) -> None:
+        """Map ``size`` bytes of ``fd``; meant for :meth:`create` and :meth:`attach`."""
+        self._fd = fd
+        self._memory = mmap.mmap(fd, size)
+        self._keep = ffi.from_buffer(self._memory, require_writable=True)
+        self.pointer = ffi.cast("sc_block *", self._keep)
+        self._cursor = ffi.new("uint64_t *")
+        self._lost = ffi.new("uint64_t *")
+
+    @classmethod
+    def create(
+        cls,
+        config: ServoConfig,
+        tables: ModelTables | None = None,
+        *,
+        reference_capacity: int = 0,
+        silence_limit_ms: int = 1000,
+    ) -> Self:
+        """Make a block with everything the loop needs.
+
+        ``reference_capacity``: longest reference in ticks that TRACK will get.
+        ``silence_limit_ms``: how long the device may send no STATE before the loop gives up.
+        """
+        size = int(lib.sc_block_size(reference_capacity))
+        fd = _anonymous_file()
+        os.ftruncate(fd, size)
+        block = cls(fd, size)
+        lib.sc_block_init(block.pointer, reference_capacity)
+        block.pointer.silence_limit_ms = silence_limit_ms
+        config.fill(block.pointer.config)
+        if tables is not None:
+            _store_tables(block.pointer, tables)
+        return block
+
+    @classmethod
+    def attach(cls, fd: int) -> Self:
+        """Map the block that another process created; ValueError if ``fd`` holds no such block."""
+        size = os.fstat(fd).st_size
+        if size < ffi.sizeof("sc_block"):
+            raise ValueError(f"Descriptor {fd} holds {size} bytes, too few for a loop's block.")
+        block = cls(fd, size)
+        if not lib.sc_block_is_sound(block.pointer, size):
+            raise ValueError(
+                f"Descriptor {fd} holds no block of this version of scissorcal; both processes "
+                "must run the same one."
+            )
+        return block
+
+    def fileno(self) -> int:
+        """The descriptor to hand to the other process (``pass_fds``)."""
+        return self._fd
+
+    def close(self) -> None:
+        """Let go of the memory; the block cannot be used any more."""
+        if self._fd >= 0:
+            ffi.release(self._keep)
+            self._memory.close()
+            os.close(self._fd)
+            self._fd = -1
+            self.pointer = ffi.NULL
+
+    def engage(self, mode: Mode) -> None:
+        """Order a mode; it engages with the next frame (RENDER from zero force)."""
+        if mode is Mode.RENDER and not self.pointer.has_model:
+            raise ValueError("RENDER needs the tables of a model, and this block has none.")
+        if mode is Mode.TRACK and self.pointer.reference_size == 0:
+            raise ValueError("TRACK needs a reference: call set_reference first.")
+        lib.sc_block_order(self.pointer, int(mode))
+
+    def set_reference(
+        self, opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
+    ) -> None:
+        """Set what TRACK follows, as :meth:`Servo.set_reference`; not while TRACK is engaged."""
+        block = self.pointer
+        if Mode.TRACK in (block.orders.mode, block.servo.mode):
+            raise ValueError("The reference cannot change while TRACK follows it.")
+        arrays = reference_arrays(opening, opening_rate, advance, stroke)
+        n, capacity = len(arrays[0]), int(block.reference_capacity)
+        if n > capacity:
+            raise ValueError(
+                f"A reference of {n} ticks does not fit this block: it was made for {capacity}."
+            )
+        start = ffi.sizeof("sc_block")
+        for row, array in enumerate(arrays):
+            at = start + row * capacity * 4
+            self._memory[at : at + 4 * n] = array.tobytes()
+        block.reference_size = n
+
+    def fresh_sheet(self, crack: float = 0.0) -> None:
+        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
+        lib.sc_block_fresh_sheet(self.pointer, crack)
+
+    def beat(self) -> None:
+        """Tell the loop that its supervisor lives; at least every supervisor_ticks ticks."""
+        lib.sc_block_beat(self.pointer)
+
+    def stop(self) -> None:
+        """Ask the loop to release the motors and return."""
+        lib.sc_block_stop(self.pointer)
+
+    def configure(self, key: int, value: float, timeout_s: float = 1.0) -> ConfigEcho | None:
+        """Have the loop send a CONFIG; give the device's echo, None if none came in time.
+
+        The heart keeps beating meanwhile.
+        """
+        mailbox = self.pointer.mailbox
+        request = lib.sc_block_request(self.pointer, int(key), value)
+        until = time.monotonic() + timeout_s
+        while not lib.sc_block_answered(self.pointer, request):
+            if time.monotonic() > until:
+                return None
+            self.beat()
+            time.sleep(0.001)
+        return ConfigEcho(mailbox.status, int(key), request, mailbox.value_in_force)
+
+    def read(self, most: int = RING_SAMPLES) -> NDArray[np.void]:
+        """Samples that came since the last call, oldest first: shape (n,), SAMPLE_DTYPE.
+
+        The ring holds 32767 (half a minute at 1 kHz); what was overwritten before it was read is
+        counted as lost.
+        """
+        waiting = int(self.pointer.written) - int(self._cursor[0])
+        samples = np.empty(max(0, min(most, waiting, RING_SAMPLES)), dtype=SAMPLE_DTYPE)
+        place = ffi.from_buffer("sc_sample[]", samples, require_writable=True)
+        count = lib.sc_block_read(self.pointer, self._cursor, place, len(samples), self._lost)
+        return samples[:count]
+
+    @property
+    def running(self) -> bool:
+        """Whether a loop is on this block now."""
+        return bool(self.pointer.running)
+
+    @property
+    def mode(self) -> Mode:
+        """The mode in force, DAMP where silence of the supervisor fell back to it."""
+        return Mode(self.pointer.servo.mode)
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """Why the loop ended or is about to; NONE while it runs."""
+        return StopReason(self.pointer.exit_reason or self.pointer.servo.stop_reason)
+
+    @property
+    def exit_errno(self) -> int:
+        """The system's error number behind HANGUP or LINE_ERROR, 0 if there was none."""
+        return int(self.pointer.exit_errno)
+
+    @property
+    def track_index(self) -> int:
+        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
+        return int(self.pointer.servo.track_index)
+
+    @property
+    def crack(self) -> float:
+        """The rendered crack tip X (m, plate frame)."""
+        return float(self.pointer.servo.crack.crack)
+
+    @property
+    def ledger(self) -> EnergyLedger:
+        return ledger_of(self.pointer.servo)
+
+    @property
+    def counters(self) -> ServoCounters:
+        return counters_of(self.pointer.servo)
+
+    @property
+    def line(self) -> LoopCounters:
+        """What happened on the line so far."""
+        block = self.pointer
+        names = [field.name for field in fields(LoopCounters) if field.name != "lost_samples"]
+        counts = {name: int(getattr(block, name)) for name in names}
+        return LoopCounters(**counts, lost_samples=int(self._lost[0]))
+
+    @property
+    def latency(self) -> Histogram:
+        """From a frame's arrival in the loop to its command's departure."""
+        return _histogram(self.pointer.latency)
+
+    @property
+    def interval(self) -> Histogram:
+        """Between the arrivals of two STATE, by the host's clock."""
+        return _histogram(self.pointer.interval)
+
+
+def _anonymous_file() -> int:
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("scissorcal-loop")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
+
+
+def _store_tables(block: Any, tables: ModelTables) -> None:
+    fill_numbers(block.model, tables)
+    for name in ("edge", "response", "friction_opening", "friction_closing", "friction_angle"):
+        _store_table(getattr(block, name), getattr(tables, name))
+    block.has_model = 1
+    if not lib.sc_block_model(block, ffi.new("sc_model *")):
+        raise ValueError("The kernel refuses these tables: their numbers do not fit float32.")
+
+
+def _store_table(store: Any, table: Table) -> None:
+    n = len(table.x)
+    for name in ("x", "y", "slope"):
+        ffi.memmove(getattr(store, name), getattr(table, name), 4 * n)
+    store.size = n
+    view = ffi.new("sc_table *")
+    view.x, view.y, view.slope, view.size = store.x, store.y, store.slope, n
+    lib.sc_table_accumulate(view, store.area)
+
+
+def _histogram(histogram: Any) -> Histogram:
+    bins = np.arange(_BINS)
+    lower = (_PER_OCTAVE + bins % _PER_OCTAVE) * 2.0 ** (bins // _PER_OCTAVE) / _PER_OCTAVE
+    edges = np.append(lower, np.inf)
+    edges[0] = 0.0
+    counts = np.frombuffer(bytes(ffi.buffer(histogram.count)), dtype=np.uint64)
+    return Histogram(edges, counts, histogram.largest_ns * 1e-3)

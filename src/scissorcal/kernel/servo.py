@@ -1,0 +1,349 @@
+"""The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
+
+import math
+from dataclasses import dataclass, fields
+from enum import IntEnum, IntFlag
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.frames import Command, State
+from scissorcal.kernel.layout import dtype_of
+from scissorcal.kernel.tables import ModelTables, model_struct
+from scissorcal.kernel.wire import encode_frame
+
+SAMPLE_DTYPE = dtype_of("sc_sample")
+"""One frame's telemetry, as the loop's ring and a recording hold it: 80 bytes."""
+
+U32 = 0xFFFFFFFF
+
+
+class Mode(IntEnum):
+    """IDLE: motors off. TRACK: follow the reference. RENDER: the model. DAMP: damping only."""
+
+    IDLE = 0
+    TRACK = 1
+    RENDER = 2
+    DAMP = 3
+
+
+class StopReason(IntEnum):
+    """Why a servo or a loop stopped; ``sentence`` says it to people."""
+
+    NONE = 0
+    ASKED = 1
+    SUPERVISOR_LOST = 2
+    DEVICE_FAULT = 3
+    ENCODER_FAULT = 4
+    TRACKING_LOST = 5
+    HANGUP = 6
+    SILENCE = 7
+    LINE_ERROR = 8
+    BAD_BLOCK = 9
+
+    @property
+    def sentence(self) -> str:
+        """What happened and what to look at, as a whole sentence."""
+        return _STOP_SENTENCES[self]
+
+
+_STOP_SENTENCES = {
+    StopReason.NONE: "The loop has not stopped.",
+    StopReason.ASKED: "The loop stopped because it was asked to.",
+    StopReason.SUPERVISOR_LOST: (
+        "The loop stopped because its supervising process fell silent; see why that one hung or "
+        "died, then start again."
+    ),
+    StopReason.DEVICE_FAULT: (
+        "The device latched a fault and it was not cleared; remove its cause, raise BRAKE_AFTER_MS "
+        "if the host answers late, and start again."
+    ),
+    StopReason.ENCODER_FAULT: (
+        "The device reports a fault of its encoder; check the encoder and its cable."
+    ),
+    StopReason.TRACKING_LOST: (
+        "The blades did not follow the motion that was asked for; look for an obstacle, a stuck "
+        "encoder or gains that are too weak."
+    ),
+    StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
+    StopReason.SILENCE: (
+        "The device stopped sending STATE frames; check its power and the cable, then start again."
+    ),
+    StopReason.LINE_ERROR: "Reading or writing the port failed; check the port and start again.",
+    StopReason.BAD_BLOCK: (
+        "The loop refused its parameters: a limit, gain or table is not a usable number."
+    ),
+}
+
+
+class SampleFlag(IntFlag):
+    """What a sample's ``flags`` say above bit 15; below stand the device's own (StateFlag).
+
+    A rendered step's flags (StepFlag) follow from bit 24 on.
+    """
+
+    TORQUE_LIMITED = 0x10000
+    FORCE_LIMITED = 0x20000
+    FALLBACK = 0x40000
+    INVALID = 0x80000
+    AFTER_GAP = 0x100000
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoConfig:
+    """Limits and gains of the servo, in SI units and radians.
+
+    Nothing leaves beyond ``torque_limit`` (N m) and ``force_limit`` (N; 0 switches the advance
+    motor off) or faster than the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
+    full force. ``damping_Nm_s_per_rad`` acts in DAMP. ``rate_cutoff_Hz``: low-pass of the rate
+    estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
+    ``supervisor_ticks`` frames without a heartbeat leave damping only, five times as many stop;
+    0 switches that off. ``fault_clearings``: so many latched faults of the device are cleared;
+    one more stops. Raises ValueError for a number that is not finite or below 0.
+    """
+
+    torque_limit: float
+    torque_slew: float
+    force_limit: float
+    force_slew: float
+    ramp_s: float = 0.5
+    damping_Nm_s_per_rad: float = 0.02
+    rate_cutoff_Hz: float = 100.0
+    opening_kp: float = 0.0
+    opening_kd: float = 0.0
+    opening_ki: float = 0.0
+    advance_kp: float = 0.0
+    advance_kd: float = 0.0
+    advance_ki: float = 0.0
+    opening_error_limit: float = 0.5
+    advance_error_limit: float = 0.1
+    supervisor_ticks: int = 200
+    fault_clearings: int = 3
+    tick_us: int = 1000
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0 <= value <= U32:  # NaN and infinity fail this too
+                raise ValueError(
+                    f"{field.name} = {value} is no usable number: give one from 0 to 2**32 - 1."
+                )
+        for name in ("opening_error_limit", "advance_error_limit", "tick_us"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be above 0.")
+
+    def fill(self, struct: Any) -> None:
+        """Copy every number into the C struct of the same field names."""
+        for field in fields(self):
+            setattr(struct, field.name, getattr(self, field.name))
+
+
+@dataclass(frozen=True)
+class EnergyLedger:
+    """Joules since the start.
+
+    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest are the
+    model's books while rendering: what the material stores now, what the cut took
+    (kappa J_c h dX), what arresting cracks lost, what rendered friction took.
+    """
+
+    delivered_J: float
+    stored_J: float
+    fracture_J: float
+    arrest_J: float
+    friction_J: float
+
+    @property
+    def created_J(self) -> float:  # noqa: N802  (J is the unit)
+        """What a rendering put out beyond what its model took up; above 0 it was not passive.
+
+        Meant for runs whose motors only rendered: tracking a reference delivers work as well.
+        """
+        return self.delivered_J + self.stored_J + self.fracture_J + self.arrest_J + self.friction_J
+
+
+@dataclass(frozen=True)
+class ServoCounters:
+    """How many frames: taken, missed (gaps in the sequence), repeated, without usable numbers;
+    and in how many the torque or force met a limit or slew, the device saturated, or only
+    damping was left. ``faults`` counts faults of the device after the motors were first on.
+    """
+
+    frames: int
+    misses: int
+    duplicates: int
+    invalid_frames: int
+    torque_limited: int
+    force_limited: int
+    torque_slewed: int
+    force_slewed: int
+    device_saturated: int
+    fallback_frames: int
+    faults: int
+
+
+class Servo:
+    """The servo on its own, for lockstep runs, tests and other people's loops.
+
+    ``tables`` is needed for RENDER only. It starts in IDLE with a fresh sheet (crack at 0).
+
+    >>> servo = Servo(None, ServoConfig(torque_limit=1, torque_slew=200, force_limit=0,
+    ...                                 force_slew=0, damping_Nm_s_per_rad=0.1))
+    >>> servo.engage(Mode.DAMP)
+    >>> for tick in range(100):
+    ...     command = servo.step(State(1, tick, 1000 * tick, 0.5 - 1e-3 * tick, 0, 0, 0))
+    >>> round(command.torque, 3)  # closing at 1 rad/s
+    0.1
+    """
+
+    def __init__(self, tables: ModelTables | None, config: ServoConfig) -> None:
+        self.config = config
+        self._config = ffi.new("sc_servo_config *")
+        config.fill(self._config)
+        self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
+        self._has_model = tables is not None
+        self._orders = ffi.new("sc_orders *")
+        self._reference = ffi.new("sc_reference *")
+        self._reference_arrays: tuple[NDArray[Any], ...] = ()
+        self._servo = ffi.new("sc_servo *")
+        self._state = ffi.new("sc_state *")
+        self._command = ffi.new("sc_command *")
+        self._payload = ffi.new("uint8_t[]", int(lib.SC_SIZE_COMMAND))
+
+    def engage(self, mode: Mode) -> None:
+        """Order a mode; it engages with the next frame (RENDER from zero force)."""
+        if mode is Mode.RENDER and not self._has_model:
+            raise ValueError("RENDER needs the tables of a model, and this servo has none.")
+        if mode is Mode.TRACK and self._reference.size == 0:
+            raise ValueError("TRACK needs a reference: call set_reference first.")
+        self._orders.mode = int(mode)
+        self._orders.order = (self._orders.order + 1) & U32
+
+    def set_reference(
+        self, opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
+    ) -> None:
+        """Set what TRACK follows, one entry per device tick: rad, rad/s, m, stroke's index.
+
+        The index moves with the device's sequence number, so lost frames do not shift it. At the
+        end the last place is held. Not while TRACK is engaged.
+        """
+        if self.mode is Mode.TRACK:
+            raise ValueError("The reference cannot change while TRACK follows it.")
+        arrays = reference_arrays(opening, opening_rate, advance, stroke)
+        self._reference_arrays = arrays
+        self._reference.opening = ffi.from_buffer("float[]", arrays[0])
+        self._reference.opening_rate = ffi.from_buffer("float[]", arrays[1])
+        self._reference.advance = ffi.from_buffer("float[]", arrays[2])
+        self._reference.stroke = ffi.from_buffer("int32_t[]", arrays[3])
+        self._reference.size = len(arrays[0])
+
+    def fresh_sheet(self, crack: float = 0.0) -> None:
+        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
+        self._orders.crack = crack
+        self._orders.sheet = (self._orders.sheet + 1) & U32
+
+    def stop(self) -> None:
+        """Release the motors from the next frame on, for good."""
+        self._orders.stop = 1
+
+    def step(self, state: State, *, heartbeat: bool = True, host_time_ns: int = 0) -> Command:
+        """Take a state, give the command. ``heartbeat=False`` plays a silent supervisor."""
+        c = self._state
+        c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
+        c.opening, c.advance = state.opening, state.advance
+        c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
+        self._step(heartbeat, host_time_ns)
+        command = self._command
+        return Command(command.flags, command.echo_sequence, command.torque, command.force)
+
+    def answer(self, payload: bytes, *, heartbeat: bool = True, host_time_ns: int = 0) -> bytes:
+        """Take a STATE payload, give the whole COMMAND frame: :meth:`step` for bytes, faster.
+
+        Raises ValueError if the payload is no STATE.
+        """
+        if not lib.sc_unpack_state(ffi.from_buffer(payload), len(payload), self._state):
+            raise ValueError(f"A payload of {len(payload)} bytes is no STATE.")
+        self._step(heartbeat, host_time_ns)
+        size = lib.sc_pack_command(self._command, self._payload)
+        return encode_frame(bytes(ffi.buffer(self._payload, size)))
+
+    def _step(self, heartbeat: bool, host_time_ns: int) -> None:
+        if heartbeat:
+            self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
+        fresh = lib.sc_servo_step(
+            self._config,
+            self._model,
+            self._reference,
+            self._orders,
+            self._servo,
+            self._state,
+            self._command,
+        )
+        if fresh:
+            self._servo.sample.host_time_ns = host_time_ns
+
+    def telemetry(self) -> NDArray[np.void]:
+        """The last frame's sample, shape (1,), SAMPLE_DTYPE; a copy."""
+        data = bytes(ffi.buffer(ffi.addressof(self._servo, "sample")))
+        return np.frombuffer(data, dtype=SAMPLE_DTYPE)
+
+    @property
+    def mode(self) -> Mode:
+        """The mode in force, DAMP where silence of the supervisor fell back to it."""
+        return Mode(self._servo.mode)
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """Why it stopped; NONE while it has not."""
+        return StopReason(self._servo.stop_reason)
+
+    @property
+    def track_index(self) -> int:
+        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
+        return int(self._servo.track_index)
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """Estimated rates of opening (rad/s) and advance (m/s)."""
+        return float(self._servo.motion.opening_rate), float(self._servo.motion.advance_rate)
+
+    @property
+    def crack(self) -> float:
+        """The rendered crack tip X (m, plate frame)."""
+        return float(self._servo.crack.crack)
+
+    @property
+    def ledger(self) -> EnergyLedger:
+        return ledger_of(self._servo)
+
+    @property
+    def counters(self) -> ServoCounters:
+        return counters_of(self._servo)
+
+
+def reference_arrays(
+    opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Check a reference and give it as the C core takes it; ValueError says what is wrong."""
+    places = [np.ascontiguousarray(a, dtype=np.float32) for a in (opening, opening_rate, advance)]
+    strokes = np.ascontiguousarray(stroke, dtype=np.int32)
+    n = places[0].size
+    if n == 0 or any(a.shape != (n,) for a in (*places, strokes)):
+        raise ValueError("A reference needs four arrays of one shape (N,), N >= 1.")
+    if not all(np.isfinite(a).all() for a in places):
+        raise ValueError("A reference must be finite throughout.")
+    if np.any(np.abs(places[0]) > math.pi):
+        raise ValueError("A reference's opening must stay within half a turn.")
+    return places[0], places[1], places[2], strokes
+
+
+def ledger_of(servo: Any) -> EnergyLedger:
+    """Read the ledger out of a C servo."""
+    return EnergyLedger(*(getattr(servo.ledger, field.name) for field in fields(EnergyLedger)))
+
+
+def counters_of(servo: Any) -> ServoCounters:
+    """Read the counters out of a C servo."""
+    return ServoCounters(*(int(getattr(servo, field.name)) for field in fields(ServoCounters)))
