@@ -204,8 +204,11 @@ class VirtualRig:
         keep, offset = self._keep, self.specimen.mechanism.torque_offset_Nm
         actual, actual_force = self._torque, self._force
         for _ in range(SUBSTEPS):
+            motor, thrust = actual, actual_force
             actual = torque + keep * (actual - torque)
             actual_force = force + keep * (actual_force - force)
+            motor = 0.5 * (motor + actual) + cogging
+            thrust = 0.5 * (thrust + actual_force)
             joint.coast()
             sledge.coast()
             on_joint = on_sledge = drag_torque = drag_force = 0.0
@@ -216,10 +219,9 @@ class VirtualRig:
                     drag = damping * share * (slope * sledge.rate - lever * joint.rate / moving)
                     drag = max(drag, -on_joint / lever)
                     drag_torque, drag_force = drag * lever, -moving * drag * slope
-            motor = actual + cogging
             turned = joint.push(motor - grip - offset + on_joint + drag_torque, brakes[0])
-            slid = sledge.push(actual_force + shove + on_sledge + drag_force, brakes[1])
-            book.motor += motor * turned + actual_force * slid
+            slid = sledge.push(thrust + shove + on_sledge + drag_force, brakes[1])
+            book.motor += motor * turned + thrust * slid
             book.hand += shove * slid - grip * turned
             book.offset -= offset * turned
             book.blades += on_joint * turned + on_sledge * slid
