@@ -22,9 +22,9 @@ class Truth:
     viscous: float = 0.002
     edge_offset: float = -0.008
     taper: float = math.radians(2.0)
-    force: float = 2.0
+    force: float = 0.66
     exponent: float = 1.6
-    reference: float = 3e-4
+    reference: float = 1.5e-4
     fracture_energy: float = 0.5
     kappa: float = 1.0
     upper_face: float = 5e-5

@@ -1,5 +1,6 @@
 """Cuts made ready for a fit: conditioned, freed from friction, with the geometry they need."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -16,12 +17,25 @@ from scissorcal.recipe.schema import Recipe
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class CrackHistory:
+    """What the crack did at each bin of CutData.whole, all (n,).
+
+    ``advancing`` says whether it moved, ``last`` which bin moved it last (itself, while it
+    advances), ``begun`` whether the sheet has been cut into at all.
+    """
+
+    advancing: NDArray[np.bool_]
+    last: NDArray[np.int64]
+    begun: NDArray[np.bool_]
+
+
 class CutData:
     """Conditioned cuts with the friction they are to be freed from.
 
     ``whole`` has every bin with a sheet in place, which the crack's history needs; ``used``
-    (whole,) marks those within strokes and surely moving, ``bins`` holds them. ``begins`` (whole,) marks
-    the first bin of each sheet, ``strokes`` numbers the strokes of the used bins.
+    (whole,) marks those within strokes and surely moving, ``bins`` holds them. ``begins`` (whole,)
+    marks the first bin of each sheet, ``strokes`` numbers the strokes of the used bins.
     """
 
     def __init__(self, every: Bins, recipe: Recipe, friction: FitResult) -> None:
@@ -58,6 +72,14 @@ class CutData:
                 cutting, self.whole.opening[run], self.whole.advance[run], 0.0
             )
         return torque, tip
+
+    def history(self, cutting: Cutting) -> CrackHistory:
+        """When the crack advances, by a model of it."""
+        _, tip = self.along(cutting)
+        moved = np.where(self.begins, 0.0, np.diff(tip, prepend=tip[:1])) > 0
+        index = np.arange(len(tip))
+        last = np.maximum.accumulate(np.where(moved | self.begins, index, 0))
+        return CrackHistory(moved, last, tip > 0.0)
 
     def contact(self, cutting: Cutting) -> Array:
         """Contact x_c at every used bin."""

@@ -159,17 +159,14 @@ def _rung(bins: Bins, law: str, symmetric: bool, joint: Joint) -> Rung:
         offset = values.get("offset", np.asarray(0.0))
         return bins.drive - values["inertia"] * bins.acceleration - offset - predicted
 
-    def standardised(u: Array) -> Array:
-        return np.asarray(residuals(u) / np.exp(u[-1]))
-
-    def terms(u: Array) -> Array:
-        return np.asarray(-0.5 * standardised(u) ** 2 - u[-1])
+    def normal(u: Array) -> tuple[Array, Array]:
+        return np.asarray(residuals(u) / np.exp(u[-1])), np.full(len(bins.drive), u[-1])
 
     return Rung(
         name=law.replace("+", " + ") + (", symmetric" if symmetric else ", asymmetric"),
         key={"law": law, "symmetric": symmetric, "angle_center": center},
         layout=layout,
-        likelihood=Likelihood(terms, residuals, standardised),
+        likelihood=Likelihood(residuals, normal),
         starts=_starts(bins, layout, residuals),
         prior_mean=layout.mean,
         prior_precision=np.diag(1 / layout.sd**2),

@@ -13,7 +13,7 @@ from scissorcal.inference import (
     Problem,
     find_optimum,
     gradient,
-    hessian,
+    likelihood_information,
     ljung_box,
     natural_step,
 )
@@ -37,13 +37,21 @@ SEARCH_REACH = 8.0
 class Likelihood:
     """A law's likelihood before its prior.
 
-    ``terms`` (u) gives the log-likelihood by bin (n,), ``residuals`` (u) measured minus
-    predicted (n,), ``standardised`` (u) the same over each bin's standard deviation.
+    ``residuals`` (u) are measured minus predicted (n,). ``normal`` (u) gives them over each bin's
+    standard deviation, with the logarithm of the latter, both (n,).
     """
 
-    terms: Callable[[Array], Array]
     residuals: Callable[[Array], Array]
-    standardised: Callable[[Array], Array]
+    normal: Callable[[Array], tuple[Array, Array]]
+
+    def standardised(self, u: Array) -> Array:
+        """Residuals over their standard deviations (n,)."""
+        return self.normal(u)[0]
+
+    def terms(self, u: Array) -> Array:
+        """Log-likelihood by bin (n,), up to a constant."""
+        z, log_sd = self.normal(u)
+        return np.asarray(-0.5 * z**2 - log_sd)
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,10 @@ class Rung:
             every = self.likelihood.terms(u)
             return every if keep is None else every[keep]
 
+        def normal(u: Array) -> tuple[Array, Array]:
+            z, log_sd = self.likelihood.normal(u)
+            return (z, log_sd) if keep is None else (z[keep], log_sd[keep])
+
         sd = self.layout.sd
         return Problem(
             names=self.layout.names,
@@ -79,6 +91,7 @@ class Rung:
             starts=self.starts,
             lower=self.layout.mean - SEARCH_REACH * sd,
             upper=self.layout.mean + SEARCH_REACH * sd,
+            standardised=normal,
         )
 
 
@@ -145,7 +158,7 @@ def _without(
         return [point for _ in folds]
     step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
     scores = gradient(problem.log_likelihood_terms, point, step)
-    curvature = -hessian(problem.log_likelihood, point, step)
+    curvature = likelihood_information(problem, point, step)
     slope_prior = -rung.prior_precision @ (point - rung.prior_mean)
     reached = []
     for unseen in folds:

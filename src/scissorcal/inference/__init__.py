@@ -2,7 +2,7 @@
 
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
 from scissorcal.inference.curvature import gradient, hessian, natural_step
-from scissorcal.inference.infer import Posterior, infer
+from scissorcal.inference.infer import Posterior, infer, likelihood_information
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 
@@ -14,6 +14,7 @@ __all__ = [
     "gradient",
     "hessian",
     "infer",
+    "likelihood_information",
     "ljung_box",
     "natural_step",
     "robust_covariance_of_scores",

@@ -32,7 +32,7 @@ def hessian(function: Callable[[Array], float], point: Array, step: Array) -> Ar
 
 
 def natural_step(
-    function: Callable[[Array], float], point: Array, first: Array, fall: float = 0.05
+    function: Callable[[Array], float], point: Array, first: Array, fall: float = 0.3
 ) -> Array:
     """Steps (p,) over which ``function`` falls by about ``fall`` from its optimum at ``point``.
 

@@ -67,7 +67,7 @@ def infer(
     tell(0.4, "measuring the curvature")
     scale = problem.prior_sd
     step = natural_step(problem.log_likelihood, best.point, 0.1 * scale)
-    information = _positive(-hessian(problem.log_likelihood, best.point, step), scale)
+    information = likelihood_information(problem, best.point, step)
     scores = gradient(problem.log_likelihood_terms, best.point, step)
     spread = robust_covariance_of_scores(scores, problem.series)
     stretch, robust = _stretch(information, spread, scale)
@@ -108,6 +108,19 @@ def infer(
         null,
         best.evaluations,
     )
+
+
+def likelihood_information(problem: Problem, point: Array, step: Array) -> Array:
+    """Information of the likelihood at a point, shape (p, p), positive semi-definite.
+
+    For normal terms with residuals z and standard deviations s it is the sum of
+    dz dz' + dlog(s) dlog(s)', whose mean is Fisher's information; otherwise minus the Hessian.
+    """
+    if problem.standardised is None:
+        return _positive(-hessian(problem.log_likelihood, point, step), problem.prior_sd)
+    normal = problem.standardised
+    slopes = gradient(lambda u: np.concatenate(normal(u)), point, step)
+    return np.asarray(slopes.T @ slopes)
 
 
 def _positive(matrix: Array, scale: Array) -> Array:

@@ -18,6 +18,10 @@ class Problem:
     observation belongs to, so that autocorrelation is never taken across a gap. ``prior_sd`` (p,)
     is the size of each parameter before data. ``starts`` (k, p) are where the search begins; each
     must have a finite posterior. ``lower`` and ``upper`` (p,) bound the search.
+
+    Where the terms are normal, ``standardised`` gives the residuals over their standard deviations
+    and the logarithms of the latter, both (n,). The information then comes from first derivatives,
+    which a likelihood that is rough on a small scale still has.
     """
 
     names: tuple[str, ...]
@@ -28,6 +32,7 @@ class Problem:
     starts: Array
     lower: Array
     upper: Array
+    standardised: Callable[[Array], tuple[Array, Array]] | None = None
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""

@@ -156,8 +156,8 @@ class RippleSpread:
     """How far a rippling fracture takes torque from its average; all (N,).
 
     ``advancing`` (N m) is the standard deviation while the crack advances, after averaging over a
-    window. ``cycle_m`` is how far the crack runs in one cycle, ``torque_per_metre`` (N) what a crack
-    that rests a metre nearer would add.
+    window. ``cycle_m`` is how far the crack runs in one cycle, ``torque_per_metre`` (N) what a
+    crack that rests a metre nearer would add.
     """
 
     advancing: Array
@@ -172,9 +172,10 @@ def ripple_spread(
 
     While the crack advances, the force climbs between its runs as a saw-tooth. A moving average
     over r periods leaves of a saw-tooth's variance the share rho^2 (1 - rho)^2 / r^2 with rho = r
-    mod 1, by the autocovariance of its Fourier series; r is the window times the rate at which the
-    edge sinks in, over the indentation that one cycle takes. While the crack rests, nobody knows
-    in which phase of a cycle it stopped: its place is uncertain by one cycle's length.
+    mod 1, by the autocovariance of its Fourier series; beyond one period its mean over rho,
+    1 / (30 r^2), is taken, since the speed is never steady enough for the zeros between. r is the
+    window times the rate at which the edge sinks in, over what one cycle takes. While the crack
+    rests, nobody knows in which phase it stopped: its place is uncertain by one cycle's length.
     """
     reached = np.where(np.isfinite(contact), contact, 0.0)
     view = edge_height(cutting.edge, reached, opening / cutting.moving_blades)
@@ -185,8 +186,9 @@ def ripple_spread(
     lever = np.where(cuts, np.abs(view.lever), 0.0)
     sinking = np.abs(rate) * lever / cutting.moving_blades
     periods = np.maximum(window_s * sinking / np.maximum(moments.stroke_m, 1e-15), 1e-9)
-    part = periods % 1.0
-    kept = np.where(periods < 1.0, 1.0 - periods, part * (1.0 - part) / periods)
+    kept = np.sqrt(
+        np.maximum(1.0 - periods, 0.0) ** 2 + np.minimum(periods, 1.0 / periods) ** 2 / 30.0
+    )
     indentation = cutting.upper_face_m - view.height
     borne = np.minimum(indentation, cutting.response.indentation_at(peak))
     stiffness = np.minimum(

@@ -1,0 +1,209 @@
+"""The ladder of a cut's laws: response families, smooth and rippled fracture."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut_data import CrackHistory, CutData, cutting_from
+from scissorcal.calibration.cut_likelihood import MaterialModel
+from scissorcal.calibration.ladder import Climbed, Likelihood, Rung, climb
+from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+NUISANCE = ("noise", "variation", "ripple_visibility")
+"""Parameters that describe the noise of a cut, not the cut."""
+
+
+def climb_cut_ladder(data: CutData, recipe: Recipe, progress: Progress) -> list[Climbed]:
+    """Fit every rung that the recipe allows, cheapest first.
+
+    A rippled rung needs to know when the crack advanced and when it rested; that comes from the
+    smooth rung of the same family, once, so that the likelihood stays smooth in its parameters.
+    """
+    wanted = _allowed(recipe)
+    climbed: list[Climbed] = []
+    smooth: dict[str, Climbed] = {}
+    for index, (fracture, family) in enumerate(wanted):
+        if fracture == "rippled" and family not in smooth:
+            progress(index / len(wanted), f"finding the advances of the crack, {family}")
+            smooth[family] = _climb(data, _rung(data, recipe, family, "smooth", None), climbed)
+        history = _history(data, smooth[family]) if fracture == "rippled" else None
+        rung = _rung(data, recipe, family, fracture, history)
+        progress(index / len(wanted), f"trying {rung.name}")
+        climbed.append(_climb(data, rung, [*climbed, *smooth.values()]))
+        if fracture == "smooth":
+            smooth[family] = climbed[-1]
+    return climbed
+
+
+def _allowed(recipe: Recipe) -> list[tuple[str, str]]:
+    settings = recipe.fit.cut
+    families = ("power", "exponential") if settings.response == "auto" else (settings.response,)
+    fractures: tuple[str, ...] = ("smooth", "rippled")
+    if not recipe.scene.cut:
+        fractures = ("none",)
+    elif settings.fracture != "auto":
+        fractures = (settings.fracture,)
+    return [(fracture, family) for fracture in fractures for family in families]
+
+
+def _climb(data: CutData, rung: Rung, before: list[Climbed]) -> Climbed:
+    neighbour = _nearest(rung, before)
+    begun = _from_neighbour(rung, neighbour) if neighbour else rung
+    return climb(begun, data.bins.series, data.strokes)
+
+
+def _history(data: CutData, smooth: Climbed) -> CrackHistory:
+    values = smooth.rung.layout.natural(smooth.optimum.point)
+    return data.history(cutting_from({**smooth.rung.key, **data.geometry}, values))
+
+
+def _rung(
+    data: CutData, recipe: Recipe, family: str, fracture: str, history: CrackHistory | None
+) -> Rung:
+    material = _material_layout(data, recipe, fracture)
+    layout = Layout(material.parameters + data.friction_layout.parameters)
+    key = {"response": family, "fracture": fracture}
+    structure = {**key, **data.geometry}
+    own = len(material.parameters)
+    material_model = MaterialModel(data, structure, material, history)
+
+    def residuals(u: Array) -> Array:
+        return data.material_torque(u) - material_model(u[:own]).mean
+
+    def normal(u: Array) -> tuple[Array, Array]:
+        sd = material_model(u[:own]).sd
+        return residuals(u) / sd, np.log(sd)
+
+    precision = np.zeros((len(layout.names),) * 2)
+    precision[:own, :own] = np.diag(1 / material.sd**2)
+    precision[own:, own:] = data.friction_precision
+    return Rung(
+        name=f"{family} response, " + {"none": "no fracture"}.get(fracture, f"{fracture} fracture"),
+        key=key,
+        layout=layout,
+        likelihood=Likelihood(residuals, normal),
+        starts=_starts(data, material),
+        prior_mean=np.concatenate([material.mean, data.friction_mean]),
+        prior_precision=precision,
+    )
+
+
+def _material_layout(data: CutData, recipe: Recipe, fracture: str) -> Layout:
+    settings = recipe.fit.cut
+    force, exponent = settings.response_force_N, settings.response_exponent
+    rows = [
+        Parameter(
+            "response_force",
+            "N",
+            "log",
+            float(np.log(force.median)),
+            force.log_sd,
+            f"force at {settings.reference_indentation_mm:g} mm of indentation",
+        ),
+        Parameter(
+            "response_exponent",
+            "1",
+            "log",
+            float(np.log(exponent.median)),
+            exponent.log_sd,
+            "how the response stiffens",
+        ),
+    ]
+    if fracture != "none":
+        toughness = settings.toughness_J_per_m2
+        assert toughness is not None
+        energy = toughness.median * recipe.material.thickness_mm * 1e-3
+        rows.append(
+            Parameter(
+                "fracture_energy",
+                "J/m",
+                "log",
+                float(np.log(energy)),
+                toughness.log_sd,
+                "toughness times thickness: energy per length of cut",
+            )
+        )
+    if fracture == "rippled":
+        rows.append(
+            Parameter(
+                "kappa",
+                "1",
+                "logit",
+                0.85,
+                1.0,
+                "share of the fracture energy at which a running crack stops",
+            )
+        )
+    noise = float(np.std(data.bins.drive)) * 0.1
+    if fracture == "rippled":
+        rows.append(
+            Parameter(
+                "ripple_visibility",
+                "1",
+                "log",
+                0.0,
+                0.1,
+                "how much of the ripple the band-limited data show",
+            )
+        )
+    rows.append(Parameter("noise", "N m", "log", float(np.log(noise)), 2.8, "noise of the torque"))
+    rows.append(
+        Parameter(
+            "variation", "1", "log", float(np.log(0.03)), 1.0, "relative unevenness of the material"
+        )
+    )
+    return Layout(tuple(rows))
+
+
+def _nearest(rung: Rung, climbed: list[Climbed]) -> Climbed | None:
+    """The climbed rung that shares most discrete choices, the latest of equals."""
+    shared = [sum(c.rung.key[k] == v for k, v in rung.key.items()) for c in climbed]
+    return climbed[max(range(len(shared)), key=lambda i: (shared[i], i))] if climbed else None
+
+
+def _from_neighbour(rung: Rung, neighbour: Climbed) -> Rung:
+    """Start a rung where its neighbour ended, in the parameters that mean the same in both.
+
+    A ripple lowers the mean force for a given fracture energy, so that rungs with one start at
+    several strengths of it, each with the energy that keeps the mean.
+    """
+    names = list(neighbour.rung.layout.names)
+    same_family = rung.key["response"] == neighbour.rung.key["response"]
+    start = rung.starts[0].copy()
+    for index, name in enumerate(rung.layout.names):
+        if name in names and (same_family or name != "response_exponent"):
+            start[index] = neighbour.optimum.point[names.index(name)]
+    if "kappa" not in rung.layout.names or "kappa" in names:
+        return replace(rung, starts=start[None, :])
+    rows = []
+    where, energy = rung.layout.names.index("kappa"), rung.layout.names.index("fracture_energy")
+    for kappa in (0.9, 0.6):
+        row = start.copy()
+        row[where] = np.log(kappa) - np.log1p(-kappa)
+        row[energy] -= np.log(0.5 + 0.5 * kappa)
+        rows.append(row)
+    return replace(rung, starts=np.stack(rows))
+
+
+def _starts(data: CutData, material: Layout) -> Array:
+    """Starts that differ in stiffness and fracture energy; friction starts at its mean."""
+    torque = data.material_torque(data.friction_mean)
+    noise = np.log(max(float(np.median(np.abs(torque))) * 0.3, 1e-6))
+    rows = []
+    for sign_force, sign_energy in ((0.0, 0.0), (0.8, -0.8), (-0.8, 0.8)):
+        point = material.mean.copy()
+        for index, parameter in enumerate(material.parameters):
+            if parameter.name == "response_force":
+                point[index] += sign_force * parameter.sd
+            elif parameter.name == "fracture_energy":
+                point[index] += sign_energy * parameter.sd
+            elif parameter.name == "noise":
+                point[index] = noise
+        rows.append(np.concatenate([point, data.friction_mean]))
+    return np.stack(rows)
