@@ -20,6 +20,9 @@ from scissorcal.recording.recording import Recording
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
+CUTOFF_HZ = 300.0
+"""High enough to leave the ripple to the averaging over bins, whose effect is known exactly."""
+
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
 """Torque counts as contact from this many standard deviations of the empty sweeps' noise."""
@@ -45,7 +48,7 @@ def fit_cut(
     Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
-    every = condition(recordings, recipe.fit.friction.cutoff_Hz)
+    every = condition(recordings, CUTOFF_HZ)
     data = CutData(every, recipe, friction)
     _refuse_no_contact(data, recordings)
     climbed = climb_cut_ladder(
