@@ -59,13 +59,14 @@ class RecordingMetadata(BaseModel):
 
 
 def recording_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a recording's metadata, as ``data_schemas/recording.json`` has it.
+    """Return the JSON Schema of a recording's metadata, as ``data_schemas`` has it.
 
     The schema describes the object that the entries of the metadata record spell: text stands
     there as it is, everything else as JSON.
     """
-    schema = RecordingMetadata.model_json_schema(mode="validation")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    schema = RecordingMetadata.model_json_schema()
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, "$id": "recording.schema.json", **schema}
 
 
 def stroke_records(strokes: tuple[Stroke, ...]) -> tuple[StrokeRecord, ...]:
@@ -92,14 +93,14 @@ def to_entries(metadata: RecordingMetadata) -> dict[str, str]:
         key: value if isinstance(value, str) else json.dumps(value, sort_keys=True)
         for key, value in plain.items()
     }
-    return {**entries, "crc32": _checksum(entries)}
+    return {**entries, "crc32": checksum(entries)}
 
 
 def from_entries(entries: Mapping[str, str]) -> RecordingMetadata:
     """Read the metadata back; ValueError with a sentence if it is damaged or of another format."""
     body = {key: value for key, value in entries.items() if key != "crc32"}
     stated = body.get("format", "")
-    if entries.get("crc32") != _checksum(body):
+    if entries.get("crc32") != checksum(body):
         raise ValueError("its description does not match its checksum; restore it from a copy")
     if stated != RecordingMetadata.model_fields["format"].default:
         raise ValueError(
@@ -141,6 +142,7 @@ def _is_text(annotation: Any) -> bool:
     return bool(arguments) and all(isinstance(argument, str) for argument in arguments)
 
 
-def _checksum(entries: Mapping[str, str]) -> str:
+def checksum(entries: Mapping[str, str]) -> str:
+    """Return the CRC-32, in hexadecimal, of all entries but the checksum itself."""
     text = json.dumps(dict(entries), sort_keys=True, ensure_ascii=False)
     return f"{zlib.crc32(text.encode()):08x}"

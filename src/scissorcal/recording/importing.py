@@ -1,0 +1,210 @@
+"""Bring in what others logged: CSV, Parquet and MATLAB files become recordings."""
+
+import difflib
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.quantities import Quantity, describe, quantity
+from scissorcal.recording.reader import content_hash
+from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
+from scissorcal.recording.strokes import label_strokes
+from scissorcal.recording.summarising import CHANNELS, gap_note
+from scissorcal.recording.tables import Table, read_table
+
+GAP_FACTOR = 1.5
+"""A step longer than this many usual ones is a gap: a sample is missing."""
+
+TRAVEL_SHARE = 0.05
+LEAST_TRAVEL = {"rotary": 5e-3, "linear": 5e-4}
+"""Where ``min_travel`` is not given, a stroke covers 5 % of the range, and 5 mrad or 0.5 mm."""
+
+
+def import_table(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str | int],
+    units: Mapping[str, str] | None = None,
+    scale: Mapping[str, str | float] | None = None,
+    rate_Hz: float | None = None,
+    joint: Joint | None = None,
+    kind: Kind = "friction",
+    handle_radius_m: float = math.nan,
+    min_travel: float | None = None,
+    allow_gaps: bool = False,
+    delimiter: str | None = None,
+) -> Recording:
+    """Read a table as a recording, in SI, with strokes found from the motion.
+
+    ``columns`` says which column holds which channel: ``time``, ``opening``, ``advance``,
+    ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
+    number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
+    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``). Time is a column
+    or ``rate_Hz``, not both. What is not named is 0 throughout, which a note says.
+
+    ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
+    may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
+    of the .mat file joined by * and /, as in ``{"motor_torque": "gtau"}`` for a gain in N/V.
+
+    A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
+    it and notes it. ``device_time_us`` is rounded to 1 us, the clock of a recording; it and
+    ``host_time_ns`` begin at 0.
+
+    Raises InputError, naming the line (or row), the column and the mend: text, empty cells, NaN,
+    time that stands still or goes back, gaps, unknown columns and units.
+
+    >>> recording = import_table(  # doctest: +SKIP
+    ...     "DATA_EMPS.mat",
+    ...     columns={"time": "t", "opening": "qm", "motor_torque": "vir"},
+    ...     units={"time": "s", "opening": "m", "motor_torque": "V"},
+    ...     scale={"motor_torque": "gtau"},
+    ...     joint=Joint("linear"),
+    ... )
+    """
+    path, joint = Path(path), joint or Joint()
+    units, scale = units or {}, scale or {}
+    _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel)
+    table = read_table(path, columns, delimiter)
+    quantities = {
+        channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
+        for channel in columns
+    }
+    samples = empty_samples(table.length)
+    for channel in columns:
+        if channel != "time":
+            samples[channel] = table.columns[channel].values * quantities[channel].factor
+    if rate_Hz is not None:
+        _set_regular_clock(samples, rate_Hz)
+    else:
+        _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
+    strokes = _label(samples, joint, min_travel)
+    return Recording(
+        kind=kind,
+        samples=samples,
+        strokes=strokes,
+        joint=joint,
+        handle_radius_m=handle_radius_m,
+        source=str(path),
+        content_hash=content_hash(path),
+        notes=_notes(path, columns, quantities, samples, moved=bool(strokes)),
+    )
+
+
+def _check_request(
+    path: Path,
+    columns: Mapping[str, str | int],
+    units: Mapping[str, str],
+    scale: Mapping[str, str | float],
+    rate_Hz: float | None,
+    handle_radius_m: float,
+    min_travel: float | None,
+) -> None:
+    known = ("time", *CHANNELS)
+    for name in (*columns, *units, *scale):
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"Did you mean {near[0]!r}? " if near else ""
+            raise InputError(f"{name!r} is no channel. {hint}Channels are {', '.join(known)}.")
+        if name not in columns:
+            raise InputError(
+                f"A unit or scale is given for {name}, but no column. Name its column."
+            )
+    if "opening" not in columns:
+        raise InputError(f"{path}: no column is named for opening. Say which one holds it.")
+    if "motor_torque" not in columns and "handle_force" not in columns:
+        raise InputError(
+            f"{path}: no column is named for motor_torque or handle_force. Say which one holds it."
+        )
+    if "handle_force" in columns and not handle_radius_m > 0:
+        raise InputError(
+            f"{path}: handle_force acts at a radius that is not known. Give the handle radius."
+        )
+    if ("time" in columns) == (rate_Hz is not None):
+        raise InputError(f"{path}: name the column for time, or give the rate; one of them.")
+    if rate_Hz is not None and not 0 < rate_Hz <= 1e6:
+        raise InputError(f"A rate of {rate_Hz} Hz is not possible; give 1 MHz or less.")
+    if min_travel is not None and not 0 < min_travel < math.inf:
+        raise InputError(f"A least travel of {min_travel} is not possible; give a positive one.")
+
+
+def _set_regular_clock(samples: NDArray[np.void], rate_Hz: float) -> None:
+    index = np.arange(len(samples))
+    samples["sequence"] = index
+    _set_times(samples, np.rint(index * (1e6 / rate_Hz)).astype(np.int64))
+
+
+def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_gaps: bool) -> None:
+    """Set clocks and sequence from the time column; refuse what is no clock."""
+    values = table.columns["time"].values
+    seconds = (values - values[0]) * factor
+    if not np.abs(seconds).max() < 1e9:
+        raise InputError(
+            f"{table.path}, column {table.columns['time'].heading!r} spans more than 30 years. "
+            "Check the unit of time."
+        )
+    microseconds = np.rint(seconds * 1e6).astype(np.int64)
+    steps = np.diff(microseconds)
+    bad = np.flatnonzero(steps <= 0)
+    if len(bad):
+        raise InputError(_not_a_clock(table, values * factor, int(bad[0]) + 1))
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP_FACTOR * usual)
+    if len(gaps) and not allow_gaps:
+        row = int(gaps[0]) + 1
+        raise InputError(
+            f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s pass since the row "
+            f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
+            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps to keep it as it is, with a note, "
+            "or export the log without losses."
+        )
+    counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
+    samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
+    _set_times(samples, microseconds)
+
+
+def _not_a_clock(table: Table, seconds: NDArray[np.float64], row: int) -> str:
+    before, here = seconds[row - 1], seconds[row]
+    if here < before:
+        return (
+            f"{table.place(row, 'time')}: time goes back from {before:.9g} s to {here:.9g} s. "
+            "Sort the rows by time, or cut the table there."
+        )
+    return (
+        f"{table.place(row, 'time')}: {here:.9g} s stands there a second time. Remove the "
+        "repeated row; if time has too few digits (1 us is needed), give the rate instead."
+    )
+
+
+def _set_times(samples: NDArray[np.void], microseconds: NDArray[np.int64]) -> None:
+    samples["device_time_us"] = microseconds
+    samples["host_time_ns"] = microseconds * 1000
+
+
+def _label(samples: NDArray[np.void], joint: Joint, min_travel: float | None) -> tuple[Stroke, ...]:
+    if min_travel is None:
+        span = float(np.ptp(samples["opening"]))
+        min_travel = max(TRAVEL_SHARE * span, LEAST_TRAVEL[joint.kind])
+    labels = label_strokes(samples["opening"], samples["device_time_us"] * 1e-6, min_travel)
+    samples["stroke"] = labels.stroke_of_sample
+    return labels.strokes
+
+
+def _notes(
+    path: Path,
+    columns: Mapping[str, str | int],
+    quantities: Mapping[str, Quantity],
+    samples: NDArray[np.void],
+    *,
+    moved: bool,
+) -> tuple[str, ...]:
+    missing = [channel for channel in CHANNELS if channel not in columns]
+    notes = [f"Imported from {path.name}: {describe(quantities)}."]
+    notes += [f"Not in that file, and 0 throughout: {', '.join(missing)}."] if missing else []
+    notes += [entry.note for entry in quantities.values() if entry.note]
+    notes += [] if moved else ["No stroke was found: the joint does not move enough."]
+    return (*notes, *gap_note(samples))

@@ -1,0 +1,164 @@
+"""From a column's numbers to SI: units, and scales such as a motor's newtons per volt."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.units import conversion, parse_unit, split_unit
+from scissorcal.recording.layout import unit_of
+from scissorcal.recording.recording import Joint
+from scissorcal.recording.tables import Table
+
+COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """How one channel's column becomes SI: multiply by ``factor``; ``sentence`` says why."""
+
+    factor: float
+    sentence: str
+    note: str = ""
+
+
+def quantity(
+    table: Table, channel: str, unit: str | None, scale: str | float | None, joint: Joint
+) -> Quantity:
+    """Find the factor from a column's numbers to the channel's SI unit.
+
+    ``unit`` is the unit of the column, also once it is multiplied by ``scale``; without it the
+    heading's unit counts ("angle [deg]", "angle_deg"). Volts, amperes and counts measure no
+    motion or force, so they need a scale, which then leads to SI, as does a scale where no unit
+    is known. Raises InputError if no unit is known, or one of another kind than the channel.
+    """
+    column = table.columns[channel]
+    target = "s" if channel == "time" else unit_of(channel, joint)
+    factor = 1.0 if scale is None else scale_factor(table, channel, scale)
+    heading_unit = _unit_in(column.heading)
+    stated = heading_unit if unit is None else unit
+    by = repr(column.heading)
+    if scale is not None:
+        by += f" times {factor:.9g}" if _is_number(scale) else f" times {scale} = {factor:.9g}"
+    if stated is None and scale is None:
+        raise InputError(
+            f"{table.path}, column {column.heading!r}: its unit is not known. Say it, for "
+            f"example {channel}={_plain(target)}."
+        )
+    if stated is None or _is_raw(stated):
+        if scale is None:
+            raise InputError(
+                f"{table.path}, column {column.heading!r} is in {stated}, and {channel} is in "
+                f"{target}. Give a scale for {channel}, in {target} per {stated}."
+            )
+        return Quantity(factor, f"{channel} [{target}] is {by}")
+    return Quantity(
+        factor * _conversion(table, channel, stated, target, joint),
+        f"{channel} is {by} [{stated}]",
+        _contradiction(table, channel, heading_unit, unit),
+    )
+
+
+def scale_factor(table: Table, channel: str, scale: str | float) -> float:
+    """Work out a scale: a number, or numbers and single variables of the file joined by * and /.
+
+    "gtau", "-1*gtau", "gtau/1000". Raises InputError where a name is unknown or the result is
+    zero or not finite.
+    """
+    text = str(scale).replace(" ", "")
+    sign = -1.0 if text.startswith("-") else 1.0
+    parts = re.split(r"([*/])", text.removeprefix("-"))
+    value = sign * _factor(table, channel, parts[0])
+    for operator, part in zip(parts[1::2], parts[2::2], strict=True):
+        number = _factor(table, channel, part)
+        value = value * number if operator == "*" else value / number if number else math.inf
+    if not math.isfinite(value) or value == 0:
+        raise InputError(
+            f"{table.path}: the scale {scale!r} of {channel} is {value}. Give one that is finite "
+            "and not zero."
+        )
+    return value
+
+
+def _factor(table: Table, channel: str, part: str) -> float:
+    try:
+        return float(part)
+    except ValueError:
+        if part in table.scalars:
+            return table.scalars[part]
+    listed = ", ".join(table.scalars) or "none"
+    raise InputError(
+        f"{table.path}: the scale of {channel} names {part!r}, which is no number and no single "
+        f"number in the file (those are: {listed}). Give a number, or join names and numbers by "
+        "* and /."
+    )
+
+
+def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joint) -> float:
+    unit, si = parse_unit(_plain(stated)), parse_unit(_plain(target))
+    heading = table.columns[channel].heading
+    if unit is None or si is None:
+        raise InputError(
+            f"{table.path}, column {heading!r}: {stated!r} is not a unit that is known here. "
+            f"{channel} takes {target} and its parts and multiples (m, k, ...)."
+        )
+    factor = conversion(unit, si)
+    if factor is None:
+        other = Joint("linear" if joint.kind == "rotary" else "rotary")
+        turned = parse_unit(_plain(unit_of(channel, other)))
+        fits = turned is not None and conversion(unit, turned) is not None
+        mend = f"Say that the joint is {other.kind}" if fits else f"Give a unit such as {target}"
+        raise InputError(
+            f"{table.path}, column {heading!r}: {stated} is no unit for {channel} of a "
+            f"{joint.kind} joint, which is in {target}. {mend}, or name another column."
+        )
+    return factor
+
+
+def _contradiction(table: Table, channel: str, heading: str | None, stated: str | None) -> str:
+    """Say where the heading names another unit than was stated (the stated one counts)."""
+    if heading is None or stated is None or parse_unit(_plain(heading)) is None:
+        return ""
+    if parse_unit(_plain(heading)) == parse_unit(_plain(stated)):
+        return ""
+    return (
+        f"Column {table.columns[channel].heading!r} was taken in {stated}, as stated, although "
+        f"its heading says {heading}."
+    )
+
+
+def _unit_in(heading: str) -> str | None:
+    """Return the unit that a heading names, in brackets or after its last words."""
+    brackets = re.search(r"[\[(]([^\])]*)[\])]\s*$", heading)
+    if brackets:
+        text = brackets[1].strip()
+        return text if _is_raw(text) or parse_unit(_plain(text)) else None
+    _, unit = split_unit(heading.strip())
+    return unit.name if unit else None
+
+
+def _is_number(scale: str | float) -> bool:
+    try:
+        float(scale)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_raw(unit: str) -> bool:
+    if unit.strip().lower() in COUNTS:
+        return True
+    known = parse_unit(_plain(unit))
+    return known is not None and {name for name, _ in known.dimension} & {"V", "A"} != set()
+
+
+def _plain(unit: str) -> str:
+    """Spell a unit as names do: ``mN m`` and ``mN*m`` are ``mNm``, micro is ``u``."""
+    text = re.sub(r"[\s*·⋅.]", "", unit).replace("µ", "u").replace("μ", "u")
+    return {"°": "deg", "sec": "s", "msec": "ms"}.get(text, text)
+
+
+def describe(quantities: Mapping[str, Quantity]) -> str:
+    """Say in one sentence what each channel was made of."""
+    return "; ".join(entry.sentence for entry in quantities.values())

@@ -1,0 +1,186 @@
+"""Tables in text: delimiter, comments and heading are found; every refusal names its line."""
+
+import csv
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scissorcal.errors import InputError
+from scissorcal.recording.tables import Column, Table, Wanted, find_column
+
+COMMENT_MARKS = ("%", "#")
+DELIMITERS = (",", ";", "\t", "|", None)
+"""Tried in this order, the first of equals wins; None is white space."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of text with its number, from 1."""
+
+    number: int
+    text: str
+
+
+def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
+    """Read the wanted columns of a text table.
+
+    Lines that begin with % or # are comments. The rows begin with the first line that is as wide
+    as they are and holds a number; headings stand in the last such wide line before them (also
+    a commented one), and a line of units may follow those. Decimal commas are understood where
+    the comma does not part the cells.
+    """
+    comments, lines = _lines(path)
+    delimiter = delimiter or _find_delimiter([line.text for line in lines[-20:]])
+    widths = Counter(len(_cells(line.text, delimiter)) for line in lines[-20:])
+    width = widths.most_common(1)[0][0] if widths else 0
+    start = next((i for i, line in enumerate(lines) if _is_row(line.text, delimiter, width)), None)
+    if start is None:
+        raise InputError(
+            f"{path} holds no row of numbers. Name a table in text, Parquet or MATLAB format."
+        )
+    rows = lines[start:]
+    _check_width(path, rows, delimiter, width)
+    commented = [line for line in comments if line.number < rows[0].number]
+    headings = _headings(lines[:start], commented, delimiter, width)
+    chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
+    values = _numbers(path, rows, delimiter, chosen, headings)
+    columns = {
+        channel: Column(headings[number], values[:, place])
+        for place, (channel, number) in enumerate(chosen.items())
+    }
+    return Table(path, columns, lines=np.array([line.number for line in rows], dtype=np.int64))
+
+
+def _lines(path: Path) -> tuple[list[Line], list[Line]]:
+    """Return the comment lines, without their mark, and the other lines that are not blank."""
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise InputError(
+            f"{path} is not a text table: it holds zero bytes. Save it as CSV in UTF-8, or give "
+            "it the ending of its format (.mat, .parquet)."
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    comments, lines = [], []
+    for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
+        line = raw.strip(" ")
+        if line.startswith(COMMENT_MARKS):
+            comments.append(Line(number, line.lstrip("".join(COMMENT_MARKS))))
+        elif line.strip():
+            lines.append(Line(number, line))
+    return comments, lines
+
+
+def _is_row(text: str, delimiter: str | None, width: int) -> bool:
+    """Tell a row of numbers from headings and remarks ("Rate, 1000").
+
+    A row has numbers only, or is as wide as the rows and has one at least: what is wrong with it
+    is then said, rather than passed over.
+    """
+    numbers = [_is_number(cell) for cell in _cells(text, delimiter)]
+    return all(numbers) or (len(numbers) == width and any(numbers))
+
+
+def _find_delimiter(rows: Sequence[str]) -> str | None:
+    """Return what parts most rows into numbers only, and into most numbers."""
+
+    def score(delimiter: str | None) -> tuple[int, int]:
+        numbers = [[_is_number(cell) for cell in _cells(row, delimiter)] for row in rows]
+        return sum(all(row) for row in numbers), sum(sum(row) for row in numbers)
+
+    return max(DELIMITERS, key=score)
+
+
+def _cells(text: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return text.split()
+    if '"' in text:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
+    return [cell.strip() for cell in text.split(delimiter)]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", ".", 1))
+    except ValueError:
+        return False
+    return True
+
+
+def _check_width(path: Path, rows: list[Line], delimiter: str | None, width: int) -> None:
+    for line in rows:
+        found = len(_cells(line.text, delimiter))
+        if found != width:
+            raise InputError(
+                f"{path}, line {line.number} has {found} cells where the others have {width}. "
+                "Complete or remove that line."
+            )
+
+
+def _headings(
+    before: list[Line], comments: list[Line], delimiter: str | None, width: int
+) -> list[str]:
+    """Return one heading a column; "column 3" where the file has none."""
+    rows = [cells for line in before if len(cells := _cells(line.text, delimiter)) == width]
+    if not rows:
+        rows = [cells for line in comments if len(cells := _cells(line.text, delimiter)) == width][
+            -1:
+        ]
+    if not rows:
+        return [f"column {number}" for number in range(width)]
+    if len(rows) == 1:
+        return rows[0]
+    return [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(*rows[-2:], strict=True)]
+
+
+def _numbers(
+    path: Path,
+    rows: list[Line],
+    delimiter: str | None,
+    chosen: dict[str, int],
+    headings: list[str],
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return the chosen columns, shape (N, len(chosen)), by NumPy's parser."""
+    texts = [line.text for line in rows]
+    if delimiter != "," and "," in texts[0]:
+        texts = [text.replace(",", ".") for text in texts]
+    try:
+        values: np.ndarray[tuple[int, int], np.dtype[np.float64]] = np.loadtxt(
+            texts,
+            delimiter=delimiter,
+            usecols=list(chosen.values()),
+            comments=None,
+            quotechar='"',
+            ndmin=2,
+        )
+    except ValueError as error:
+        raise InputError(_first_fault(path, rows, texts, delimiter, chosen, headings)) from error
+    return values
+
+
+def _first_fault(
+    path: Path,
+    rows: list[Line],
+    texts: list[str],
+    delimiter: str | None,
+    chosen: dict[str, int],
+    headings: list[str],
+) -> str:
+    """Find the first cell that is no number; the slow way, once something is known to be wrong."""
+    for line, text in zip(rows, texts, strict=True):
+        cells = _cells(text, delimiter)
+        for number in chosen.values():
+            try:
+                float(cells[number])
+            except ValueError:
+                what = f"{cells[number]!r} is not a number" if cells[number] else "it is empty"
+                return (
+                    f"{path}, line {line.number}, column {headings[number]!r}: {what}. Correct "
+                    "or remove that line."
+                )
+    return f"{path} cannot be read as numbers. Save it as plain CSV with a decimal point."

@@ -1,0 +1,409 @@
+"""Tables of others become recordings in SI, or a sentence says where they are wrong."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from scissorcal.errors import InputError
+from scissorcal.recording import (
+    Joint,
+    Recording,
+    content_hash,
+    import_table,
+    read_recording,
+    write_recording,
+)
+
+COLUMNS: dict[str, str | int] = {"time": "t", "opening": "angle", "motor_torque": "torque"}
+UNITS = {"time": "s", "opening": "rad", "motor_torque": "Nm"}
+
+
+def rows(count: int = 400) -> list[list[float]]:
+    """Half a turn each second between 0.2 and 0.8 rad, 100 samples a second."""
+    time = np.arange(count) / 100
+    opening = 0.5 + 0.3 * np.cos(np.pi * time)
+    torque = 0.1 * np.sin(3 * time) + 1e-3
+    return [list(row) for row in np.column_stack([time, opening, torque]).tolist()]
+
+
+def written(
+    path: Path, table: list[list[Any]], delimiter: str = ",", head: str | None = "t,angle,torque"
+) -> Path:
+    lines = [] if head is None else [head.replace(",", delimiter)]
+    lines += [delimiter.join(map(str, row)) for row in table]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def assert_holds(recording: Recording, table: list[list[float]]) -> None:
+    expected = np.array(table)
+    np.testing.assert_allclose(recording.device_time_s, expected[:, 0], rtol=0, atol=5e-7)
+    np.testing.assert_array_equal(recording.samples["opening"], expected[:, 1])
+    np.testing.assert_array_equal(recording.samples["motor_torque"], expected[:, 2])
+
+
+def refusal(path: Path, **options: Any) -> str:
+    chosen = {"columns": COLUMNS, "units": UNITS, **options}
+    with pytest.raises(InputError) as caught:
+        import_table(path, **chosen)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "|", ", ", " ; "])
+@pytest.mark.parametrize("head", ["t,angle,torque", None])
+def test_delimiters_and_headings_are_found(
+    tmp_path: Path, delimiter: str, head: str | None
+) -> None:
+    path = written(tmp_path / "log.csv", rows(), delimiter, head)
+    columns: dict[str, str | int] = (
+        COLUMNS if head else {"time": 0, "opening": "1", "motor_torque": 2}
+    )
+    recording = import_table(path, columns=columns, units=UNITS)
+    assert_holds(recording, rows())
+    assert recording.kind == "friction"
+    assert recording.source == str(path)
+    assert recording.content_hash == content_hash(path)
+    assert [stroke.kind for stroke in recording.strokes] == ["closing", "opening"] * 2
+    assert set(recording.samples["stroke"]) <= {-1, 0, 1, 2, 3}
+    assert recording.samples["sequence"].tolist() == list(range(400))
+    assert any("0 throughout: advance, handle_force" in note for note in recording.notes)
+
+
+def test_decimal_commas_quotes_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
+    lines = ['"t";"angle";"torque"']
+    lines += [";".join(f'"{value}"'.replace(".", ",") for value in row) for row in rows()]
+    (tmp_path / "log.csv").write_text("\r\n".join(lines), encoding="utf-8-sig", newline="")
+    assert_holds(import_table(tmp_path / "log.csv", columns=COLUMNS, units=UNITS), rows())
+
+
+def test_comments_preamble_units_line_and_blank_lines(tmp_path: Path) -> None:
+    body = [",".join(map(str, row)) for row in rows()]
+    text = ["# a log", "Rate,100", "Operator: A", "t,angle,torque", "s,rad,mNm", ""]
+    text += [*body[:100], "% the hand rested", "", *body[100:]]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(text), encoding="utf-8")
+    recording = import_table(path, columns=COLUMNS)
+    expected = np.array(rows())
+    np.testing.assert_array_equal(recording.samples["opening"], expected[:, 1])
+    np.testing.assert_allclose(recording.samples["motor_torque"], 1e-3 * expected[:, 2])
+    # The line number of a fault counts comments and blank lines.
+    text[6 + 150 + 2] = "1.5,abc,0"
+    path.write_text("\n".join(text), encoding="utf-8")
+    assert "line 159, column 'angle [rad]': 'abc' is not a number" in refusal(path, units={})
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit", "joint", "factor"),
+    [
+        ("opening", "deg", "rotary", math.pi / 180),
+        ("opening", "°", "rotary", math.pi / 180),
+        ("opening", "mrad", "rotary", 1e-3),
+        ("opening", "mm", "linear", 1e-3),
+        ("opening", "um", "linear", 1e-6),
+        ("opening", "µm", "linear", 1e-6),
+        ("motor_torque", "N m", "rotary", 1.0),
+        ("motor_torque", "mN m", "rotary", 1e-3),
+        ("motor_torque", "N mm", "rotary", 1e-3),
+        ("motor_torque", "mN", "linear", 1e-3),
+        ("motor_torque", "kN", "linear", 1e3),
+        ("time", "ms", "rotary", 1e-3),
+        ("time", "us", "rotary", 1e-6),
+    ],
+)
+def test_units(tmp_path: Path, channel: str, unit: str, joint: Any, factor: float) -> None:
+    table = np.array(rows())
+    place = list(COLUMNS).index(channel)
+    table[:, place] /= factor
+    units = {"time": "s", "opening": "rad", "motor_torque": "N m"}
+    if joint == "linear":
+        units = {"time": "s", "opening": "m", "motor_torque": "N"}
+    path = written(tmp_path / "log.csv", table.tolist())
+    recording = import_table(
+        path, columns=COLUMNS, units={**units, channel: unit}, joint=Joint(joint)
+    )
+    expected = np.array(rows())
+    found = recording.device_time_s if channel == "time" else recording.samples[channel]
+    np.testing.assert_allclose(found, expected[:, place], rtol=1e-12, atol=5e-7)
+    assert len(recording.strokes) == 4
+
+
+def test_units_in_headings_count_and_a_contradiction_is_noted(tmp_path: Path) -> None:
+    table = np.array(rows()) * [1e3, 180 / math.pi, 1.0]
+    path = written(tmp_path / "log.csv", table.tolist(), head="t [ms],angle (deg),torque_Nm")
+    columns: dict[str, str | int] = {"time": "T", "opening": "Angle", "motor_torque": "torque_Nm"}
+    recording = import_table(path, columns=columns)
+    np.testing.assert_allclose(recording.samples["opening"], np.array(rows())[:, 1], rtol=1e-12)
+    other = import_table(path, columns=columns, units={"time": "s"})
+    assert other.duration_s == pytest.approx(3990.0)
+    assert "Column 't [ms]' was taken in s, as stated, although its heading says ms." in other.notes
+
+
+def test_a_scale_keeps_the_unit_or_leads_to_si_from_counts(tmp_path: Path) -> None:
+    table = np.array(rows()) * [1, 180 / math.pi, 1e3]
+    path = written(tmp_path / "log.csv", table.tolist(), head="t,angle [deg],torque [counts]")
+    columns: dict[str, str | int] = {"time": "t", "opening": "angle", "motor_torque": "torque"}
+    recording = import_table(
+        path, columns=columns, units={"time": "s"}, scale={"opening": -1, "motor_torque": "1/1000"}
+    )
+    expected = np.array(rows())
+    np.testing.assert_allclose(recording.samples["opening"], -expected[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(recording.samples["motor_torque"], expected[:, 2], rtol=1e-12)
+
+
+def test_a_rate_in_place_of_a_time_column(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", rows())
+    columns = {channel: column for channel, column in COLUMNS.items() if channel != "time"}
+    units = {channel: unit for channel, unit in UNITS.items() if channel != "time"}
+    recording = import_table(path, columns=columns, units=units, rate_Hz=3000.0)
+    np.testing.assert_allclose(recording.device_time_s, np.arange(400) / 3000, atol=5e-7)
+    assert "or give the rate; one of them" in refusal(path, rate_Hz=100.0)
+    assert "or give the rate; one of them" in refusal(path, columns=columns, units=units)
+    for rate in (0.0, -1.0, math.nan, math.inf, 2e6):
+        assert "not possible" in refusal(path, columns=columns, units=units, rate_Hz=rate)
+
+
+BAD_ROWS = [
+    ([1.05, "abc", 0.0], "line 107, column 'angle': 'abc' is not a number"),
+    ([1.05, "", 0.0], "line 107, column 'angle': it is empty"),
+    ([1.05, "nan", 0.0], r"line 107, column 'angle': nan is no measurement (1 such cells"),
+    ([1.05, 0.5, "-inf"], "line 107, column 'torque': -inf is no measurement"),
+    ([1.04, 0.5, 0.0], "line 107, column 't': 1.04 s stands there a second time"),
+    ([1.0400001, 0.5, 0.0], "line 107, column 't': 1.0400001 s stands there a second time"),
+    ([1.02, 0.5, 0.0], "line 107, column 't': time goes back from 1.04 s to 1.02 s"),
+    ([1.05, 0.5], "line 107 has 2 cells where the others have 3"),
+    ([1.05, 0.5, 0.0, 9], "line 107 has 4 cells where the others have 3"),
+]
+
+
+@pytest.mark.parametrize(("bad", "words"), BAD_ROWS)
+@pytest.mark.parametrize("allow_gaps", [False, True])
+def test_faults_are_named_by_line_and_column(
+    tmp_path: Path, bad: list[Any], words: str, allow_gaps: bool
+) -> None:
+    table: list[list[Any]] = list(rows())
+    table[105] = bad
+    path = written(tmp_path / "log.csv", table)
+    message = refusal(path, allow_gaps=allow_gaps)
+    assert str(path) in message
+    assert words in message
+
+
+def test_a_last_line_that_was_cut_off_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", rows())
+    text = path.read_text().rstrip("\n")
+    path.write_text(text[: text.rindex(",")])
+    assert "line 401 has 2 cells where the others have 3" in refusal(path)
+
+
+def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
+    table = [row for i, row in enumerate(rows()) if i not in (50, 51, 52, 200)]
+    path = written(tmp_path / "log.csv", table)
+    message = refusal(path)
+    assert "line 52, column 't': 0.04 s pass since the row before" in message
+    assert "where 0.01 s are usual (2 such gaps in all, the longest 0.04 s)" in message
+    assert "Allow gaps" in message
+    recording = import_table(path, columns=COLUMNS, units=UNITS, allow_gaps=True)
+    assert_holds(recording, table)
+    note = "4 frames are missing in 2 places, the longest gap (3 frames) at 0.490 s."
+    assert note in recording.notes
+    stored = read_recording(write_recording(recording, tmp_path / "log.mcap"))
+    assert stored.notes == recording.notes
+    assert len(stored.strokes) == len(recording.strokes)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            {"columns": {"time": "t", "motor_torque": "torque"}, "units": {}},
+            "no column is named for opening",
+        ),
+        (
+            {"columns": {"time": "t", "opening": "angle"}, "units": {}},
+            "motor_torque or handle_force",
+        ),
+        ({"columns": {**COLUMNS, "openning": "angle"}}, "Did you mean 'opening'?"),
+        ({"columns": {**COLUMNS, "opening": "angel"}}, "no column 'angel' for opening. Name one"),
+        ({"columns": {**COLUMNS, "opening": 3}}, "numbered 0 to 2"),
+        ({"columns": {**COLUMNS, "opening": "7"}}, "numbered 0 to 2"),
+        ({"columns": {**COLUMNS, "handle_force": "torque"}}, "Give the handle radius"),
+        ({"units": {**UNITS, "advance": "m"}}, "given for advance, but no column"),
+        ({"units": {"time": "s", "opening": "rad"}}, "its unit is not known. Say it"),
+        ({"units": {**UNITS, "opening": "m"}}, "Say that the joint is linear"),
+        ({"units": {**UNITS, "opening": "N"}}, "Give a unit such as rad"),
+        ({"units": {**UNITS, "opening": "furlong"}}, "'furlong' is not a unit"),
+        ({"units": {**UNITS, "motor_torque": "V"}}, "Give a scale for motor_torque, in N m per V"),
+        ({"units": {**UNITS, "motor_torque": "counts"}}, "in N m per counts"),
+        ({"scale": {"motor_torque": "gain"}}, "names 'gain', which is no number"),
+        ({"scale": {"motor_torque": "0"}}, "finite and not zero"),
+        ({"scale": {"motor_torque": "1/0"}}, "finite and not zero"),
+        ({"scale": {"motor_torque": "2**3"}}, "names ''"),
+        ({"min_travel": -1.0}, "least travel"),
+    ],
+)
+def test_requests_that_cannot_be_met(tmp_path: Path, options: dict[str, Any], words: str) -> None:
+    message = refusal(written(tmp_path / "log.csv", rows()), **options)
+    assert words in message
+
+
+def test_headings_that_stand_twice(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", rows(), head="t,angle,angle")
+    assert "has 2 columns called 'angle'" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("log.csv", b"", "is empty"),
+        ("log.csv", b"t,angle,torque\n", "no row of numbers"),
+        ("log.csv", b"t,angle,torque\n0,1,2\n", "holds 1 rows"),
+        ("log.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text table"),
+        ("log.csv", "t,angle,torque\n0,1,2\n".encode("utf-16"), "Save it as CSV in UTF-8"),
+        ("log.csv", b"hello\nworld\n", "no row of numbers"),
+        ("log.mat", b"hello" * 100, "cannot be read as a MATLAB file"),
+        ("log.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "cannot be read as a MATLAB 7.3 file"),
+        ("log.parquet", b"PAR1" + bytes(60) + b"PAR1", "cannot be read as Parquet"),
+    ],
+)
+def test_files_that_are_no_tables(tmp_path: Path, name: str, data: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(data)
+    message = refusal(tmp_path / name)
+    assert words in message
+    assert name in message
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    assert "is no file" in refusal(tmp_path / "log.csv")
+
+
+def test_no_motion_is_noted(tmp_path: Path) -> None:
+    table = [[row[0], 0.5 + 1e-4 * (i % 2), row[2]] for i, row in enumerate(rows())]
+    recording = import_table(written(tmp_path / "log.csv", table), columns=COLUMNS, units=UNITS)
+    assert recording.strokes == ()
+    assert "No stroke was found: the joint does not move enough." in recording.notes
+
+
+@given(
+    data=st.binary(max_size=200)
+    | st.text(alphabet='0123,;.\t\n -eabn%#"', max_size=200).map(str.encode)
+)
+def test_random_text_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "random.csv"
+    path.write_bytes(data)
+    try:
+        found = import_table(
+            path,
+            columns={"opening": 0, "motor_torque": 0},
+            units={"opening": "rad", "motor_torque": "Nm"},
+            rate_Hz=10,
+        )
+    except InputError:
+        return
+    assert np.isfinite(found.samples["opening"]).all()
+
+
+def mat_variables() -> dict[str, Any]:
+    table = np.array(rows())
+    return {
+        "t": table[:, :1],
+        "angle": table[None, :, 1],
+        "volts": table[:, 2] / 0.25,
+        "gain": 0.25,
+        "log": {"q": table[:, 1], "both": table[:, 1:]},
+        "remark": "text",
+    }
+
+
+MAT_COLUMNS: dict[str, str | int] = {"time": "t", "opening": "angle", "motor_torque": "volts"}
+MAT_UNITS = {"time": "s", "opening": "rad", "motor_torque": "V"}
+
+
+def written_mat73(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+
+        def put(group: Any, variables: dict[str, Any]) -> None:
+            for name, value in variables.items():
+                if isinstance(value, dict):
+                    put(group.create_group(name), value)
+                elif isinstance(value, str):
+                    codes = np.array([list(value.encode("utf-16le")[::2])], dtype=np.uint16)
+                    group.create_dataset(name, data=codes.T).attrs["MATLAB_class"] = b"char"
+                else:
+                    # MATLAB knows matrices only, and HDF5 keeps them transposed.
+                    group.create_dataset(name, data=np.atleast_2d(np.asarray(value)).T)
+
+        put(file, mat_variables())
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_matlab_files(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "log.mat"
+    if version == "5":
+        savemat(path, mat_variables())
+    else:
+        written_mat73(path)
+    expected = np.array(rows())
+    scale: dict[str, str | float] = {"motor_torque": "gain"}
+    recording = import_table(path, columns=MAT_COLUMNS, units=MAT_UNITS, scale=scale)
+    np.testing.assert_array_equal(recording.samples["opening"], expected[:, 1])
+    np.testing.assert_allclose(recording.samples["motor_torque"], expected[:, 2], rtol=1e-15)
+    assert any("times gain = 0.25" in note for note in recording.notes)
+    for name, place in (("log.q", 1), ("log.both[0]", 1), ("log.both[1]", 2)):
+        found = import_table(
+            path, columns={**MAT_COLUMNS, "opening": name}, units=MAT_UNITS, scale=scale
+        )
+        np.testing.assert_array_equal(found.samples["opening"], expected[:, place])
+
+    def words(**options: Any) -> str:
+        chosen = {"columns": MAT_COLUMNS, "units": MAT_UNITS, "scale": scale, **options}
+        return refusal(path, **chosen)
+
+    assert "no variable 'q' for opening. Name one of these: " in words(
+        columns={**MAT_COLUMNS, "opening": "q"}
+    )
+    assert "is a matrix. Name the column" in words(columns={**MAT_COLUMNS, "opening": "log.both"})
+    assert "has no column 5" in words(columns={**MAT_COLUMNS, "opening": "log.both[5]"})
+    assert "no variable 0 for opening" in words(columns={**MAT_COLUMNS, "opening": 0})
+    assert "differ in length" in words(columns={**MAT_COLUMNS, "opening": "gain"})
+    assert "(those are: gain)" in words(scale={"motor_torque": "gian"})
+
+
+def test_parquet_files(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = np.array(rows())
+    path = tmp_path / "log.parquet"
+    stamps = pa.array((table[:, 0] * 1e9).round().astype("int64") + 1_700_000_000_000_000_000)
+    columns = {
+        "t": stamps.cast(pa.timestamp("ns")),
+        "angle": table[:, 1],
+        "torque": table[:, 2],
+        "counts": np.arange(400, dtype=np.int32),
+        "state": ["on"] * 400,
+        "holes": pa.array([None if i == 7 else float(i) for i in range(400)]),
+    }
+    pq.write_table(pa.table(columns), path)
+    units = {"opening": "rad", "motor_torque": "Nm"}
+    assert_holds(import_table(path, columns=COLUMNS, units=units), rows())
+    by_number = {"time": 0, "opening": 1, "motor_torque": 3}
+    found = import_table(path, columns=by_number, units=units)
+    assert found.samples["motor_torque"].tolist() == list(range(400))
+    assert "holds string, not numbers" in refusal(
+        path, columns={**COLUMNS, "opening": "state"}, units=units
+    )
+    assert "row 8, column 'holes': nan is no measurement" in refusal(
+        path, columns={**COLUMNS, "opening": "holes"}, units=units
+    )
