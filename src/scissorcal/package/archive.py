@@ -1,0 +1,253 @@
+"""The package file: one zip whose bytes follow from its content, read with suspicion.
+
+Nothing in a package is executed, unpickled or unpacked to disk. What its manifest does not name,
+or states otherwise, is refused before it is used.
+"""
+
+import hashlib
+import io
+import json
+import math
+import stat
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.package.manifest import (
+    FORMAT,
+    LARGEST_MEMBER,
+    Manifest,
+    Member,
+    canonical,
+    content_hash,
+)
+
+MANIFEST_FILE = "manifest.json"
+LARGEST_ARCHIVE = 16_000_000
+LARGEST_MANIFEST = 1_000_000
+MOST_MEMBERS = 32
+LARGEST_HEADER = 1_000
+
+MEND = "Build it again with 'scissorcal package build', or fetch an unchanged copy."
+
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+"""What the standard library raises on a damaged or foreign archive."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
+    """Write a package, complete or not at all. Equal manifest and arrays give equal bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(archive_bytes(manifest, arrays))
+    part.replace(path)
+
+
+def archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:
+    """The bytes of the package file: stored, in the manifest's order, without a date."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+        _add(archive, MANIFEST_FILE, manifest.model_dump_json(indent=2).encode("utf-8"))
+        for member in manifest.members:
+            _add(archive, member.file, array_bytes(arrays[member.file]))
+    return buffer.getvalue()
+
+
+def read_archive(path: Path) -> tuple[Manifest, dict[str, NDArray[Any]]]:
+    """Read and check a package: its manifest, and its arrays by file name.
+
+    Raises MissingError where there is no file, and InputError naming file, member and mend where
+    it is no package, or anything in it is not as its manifest states.
+    """
+    _check_file(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            infos = _entries(path, archive)
+            manifest = _read_manifest(path, archive, infos)
+            _check_members(path, manifest, infos)
+            arrays = {
+                member.file: _read_member(path, archive, infos[member.file], member)
+                for member in manifest.members
+            }
+    except _DAMAGE as error:
+        reason = str(error) or type(error).__name__
+        raise InputError(
+            f"{path} is not a readable package, or it is damaged ({reason}). {MEND}"
+        ) from error
+    return manifest, arrays
+
+
+def array_bytes(array: NDArray[Any]) -> bytes:
+    """An array as .npy bytes, never pickled."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def member_of(file: str, array: NDArray[Any]) -> Member:
+    """The manifest's entry of one array."""
+    data = array_bytes(array)
+    dtype = array.dtype.newbyteorder("<").str
+    return Member(
+        file=file,
+        dtype="<f4" if dtype == "<f4" else "<f8",
+        shape=(array.shape[0], array.shape[1]),
+        bytes=len(data),
+        sha256=hashlib.sha256(data).hexdigest(),
+    )
+
+
+def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+    info.create_system = 3
+    info.external_attr = (stat.S_IFREG | 0o644) << 16
+    archive.writestr(info, data, zipfile.ZIP_STORED)
+
+
+def _check_file(path: Path) -> None:
+    try:
+        facts = path.stat()
+    except FileNotFoundError:
+        raise MissingError(
+            f"{path} does not exist: build a package first with 'scissorcal package build'."
+        ) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read ({error}): check the path.") from None
+    if not stat.S_ISREG(facts.st_mode):
+        raise InputError(f"{path} is not a file: name the package's .zip file.")
+    if facts.st_size > LARGEST_ARCHIVE:
+        raise InputError(
+            f"{path} has {facts.st_size} bytes; a package has at most {LARGEST_ARCHIVE}, so this "
+            f"is another file. {MEND}"
+        )
+
+
+def _entries(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    infos = archive.infolist()
+    if len(infos) > MOST_MEMBERS:
+        raise InputError(f"{path} holds {len(infos)} files, too many for a package. {MEND}")
+    found: dict[str, zipfile.ZipInfo] = {}
+    for info in infos:
+        name, shown = info.filename, info.filename[:80]
+        where = f"{path}, member {shown!r}"
+        if _leaves_archive(info.orig_filename) or _leaves_archive(name):
+            raise InputError(f"{where}: its path leaves the archive. {MEND}")
+        if stat.S_ISLNK(info.external_attr >> 16):
+            raise InputError(f"{where} is a symbolic link, which no package has. {MEND}")
+        if name in found:
+            raise InputError(f"{where} is there twice. {MEND}")
+        if info.flag_bits & 1:
+            raise InputError(f"{where} is encrypted, which no package is. {MEND}")
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise InputError(f"{where} is compressed by a method that no package uses. {MEND}")
+        found[name] = info
+    return found
+
+
+def _leaves_archive(name: str) -> bool:
+    pure = PurePosixPath(name)
+    odd = any(character in name for character in "\\:\0")
+    return odd or pure.is_absolute() or ".." in pure.parts or name.startswith("~")
+
+
+def _read_manifest(
+    path: Path, archive: zipfile.ZipFile, infos: dict[str, zipfile.ZipInfo]
+) -> Manifest:
+    from pydantic import ValidationError
+
+    where = f"{path}, member {MANIFEST_FILE!r}"
+    if MANIFEST_FILE not in infos:
+        raise InputError(f"{path} has no {MANIFEST_FILE}, so it is not a package. {MEND}")
+    data = _read_bounded(where, archive, infos[MANIFEST_FILE], LARGEST_MANIFEST)
+    try:
+        facts = json.loads(data.decode("utf-8"))
+        plain = canonical(facts)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where} is not JSON ({error}). {MEND}") from None
+    stated = facts.get("format") if isinstance(facts, dict) else None
+    if stated != FORMAT:
+        raise InputError(
+            f"{where}: the format is {stated!r}, and this version of scissorcal reads {FORMAT!r}. "
+            "Build the package again with this version, or install the one that wrote it."
+        )
+    try:
+        manifest = Manifest.model_validate_json(plain)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "its content"
+        raise InputError(f"{where}: {place} is not valid: {first['msg']}. {MEND}") from None
+    if content_hash(facts) != manifest.content_hash:
+        raise InputError(f"{where} was changed: it does not have the hash it states. {MEND}")
+    return manifest
+
+
+def _check_members(path: Path, manifest: Manifest, infos: dict[str, zipfile.ZipInfo]) -> None:
+    stated = {member.file for member in manifest.members} | {MANIFEST_FILE}
+    for name in sorted(set(infos) - stated):
+        raise InputError(f"{path}, member {name[:80]!r} is not in the manifest. {MEND}")
+    for name in sorted(stated - set(infos)):
+        raise InputError(f"{path}: member {name!r} is missing. {MEND}")
+
+
+def _read_member(
+    path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, member: Member
+) -> NDArray[Any]:
+    where = f"{path}, member {member.file!r}"
+    if info.file_size != member.bytes:
+        raise InputError(
+            f"{where} claims {info.file_size} bytes, and the manifest states {member.bytes}. {MEND}"
+        )
+    data = _read_bounded(where, archive, info, member.bytes)
+    if len(data) != member.bytes or hashlib.sha256(data).hexdigest() != member.sha256:
+        raise InputError(f"{where} was changed: it does not have the hash that is stated. {MEND}")
+    try:
+        array = _parse_array(data, member)
+    except (ValueError, SyntaxError, TypeError, KeyError) as error:
+        raise InputError(
+            f"{where} is not an array as the manifest states: {error}. {MEND}"
+        ) from None
+    if not np.isfinite(array).all():
+        raise InputError(f"{where} holds a number that is not finite. {MEND}")
+    return array
+
+
+def _read_bounded(where: str, archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
+    """Read one member, but never unpack more than ``most`` bytes and one."""
+    with archive.open(info) as stream:
+        data = stream.read(min(most, LARGEST_MEMBER) + 1)
+    if len(data) > most:
+        raise InputError(f"{where} unpacks to more than the {most} bytes it may have. {MEND}")
+    return data
+
+
+def _parse_array(data: bytes, member: Member) -> NDArray[Any]:
+    """Give the array in .npy bytes, if its header says just what the manifest does."""
+    stream = io.BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise ValueError(f"its .npy version is {version}, not (1, 0)")
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(
+        stream, max_header_size=LARGEST_HEADER
+    )
+    if dtype.str != member.dtype or shape != member.shape or fortran:
+        raise ValueError(f"it has shape {shape} and type {dtype.str}")
+    body = data[stream.tell() :]
+    if len(body) != math.prod(shape) * dtype.itemsize:
+        raise ValueError(f"it has {len(body)} bytes of numbers for shape {shape}")
+    return np.frombuffer(body, dtype=dtype).reshape(shape)

@@ -1,0 +1,116 @@
+"""How far the kernel may be from the exact model: measured where no table has a knot."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.model import edge_height, settled_contact
+from scissorcal.package.average import AverageTorque
+from scissorcal.package.compile import STRONGEST_N
+from scissorcal.package.exact import ExactModel
+from scissorcal.package.grid import Box, Points, nearby_points, spread_points
+
+Array = NDArray[np.float64]
+
+STATED_OVER_SEEN = 2.0
+"""The bound that is stated, over the largest error that was found."""
+
+SHARE_OF_TOLERANCE = 0.1
+"""Tables may use up this share of the scene's tolerance."""
+
+TIP_CLEARANCE = 1e-4
+PARALLEL = 1e-5
+"""The model itself jumps where the crack reaches the blade's tip, and where the edges become
+parallel. Points nearer than this (m along the blade, tan(psi)) to either are left out."""
+
+SEAM_OPENINGS = 400
+SEAM_OFFSETS_m = np.concatenate([-np.geomspace(1e-9, 1e-3, 13), np.geomspace(1e-9, 1e-3, 13)])
+TOUCH_N = 1e-30
+
+
+WORST = 100
+NEIGHBOURS = 40
+ROUNDS = 3
+"""Around the worst points it is looked again, in ever smaller neighbourhoods."""
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Float32 kernel against float64 model, in N m, over points of a scene.
+
+    ``largest`` deviation, where it was (opening, rate, contact), ``scene_torque``, the largest
+    torque of the exact model, and on how many points.
+    """
+
+    largest: float
+    where: tuple[float, float, float]
+    scene_torque: float
+    points: int
+
+
+def deviation(
+    model: ExactModel, average: AverageTorque, box: Box, limit: float, count: int, slowest: float
+) -> Deviation:
+    """Compare kernel and exact model as they are rendered: both within the torque limit.
+
+    First on ``count`` points and more spread through the box, none of them slower than
+    ``slowest``, and beside the seams of the model; then in shrinking neighbourhoods of the worst.
+    """
+    points = spread_points(box, count, slowest).joined(_seams(model, box, count, slowest))
+    away, torque = _away(model, average, points, limit)
+    scene_torque, total = float(np.max(np.abs(torque))), len(away)
+    reach = count ** (-1.0 / 3.0)
+    for _ in range(ROUNDS):
+        worst = np.argsort(-away, kind="stable")[:WORST]
+        near = nearby_points(box, points.at(worst), NEIGHBOURS, reach, slowest)
+        points = points.at(worst).joined(near)
+        away, _ = _away(model, average, points, limit)
+        total += len(near.opening)
+        reach *= 0.2
+    first = int(np.argmax(away))
+    where = (
+        float(points.opening[first]),
+        float(points.opening_rate[first]),
+        float(points.contact[first]),
+    )
+    return Deviation(float(away[first]), where, scene_torque, total)
+
+
+def _seams(model: ExactModel, box: Box, count: int, slowest: float) -> Points:
+    """Points close beside where the edge begins to touch, and where the crack begins to run.
+
+    There the torque bends or, for a power below one, rises infinitely steeply, in regions so thin
+    that points spread evenly would miss them.
+    """
+    shift = (count % 97) / 97.0
+    low, high = box.opening
+    opening = low + (high - low) * (np.arange(SEAM_OPENINGS) + shift) / SEAM_OPENINGS
+    cutting = model.cutting
+    seams = [settled_contact(replace(cutting, fracture_energy=TOUCH_N, kappa=1.0), opening)]
+    if cutting.fracture_energy is not None:
+        seams.append(settled_contact(cutting, opening))
+    contact = (np.concatenate(seams)[:, None] + SEAM_OFFSETS_m).ravel()
+    opening = np.repeat(np.tile(opening, len(seams)), len(SEAM_OFFSETS_m))
+    inside = (contact >= box.contact[0]) & (contact <= box.contact[1])
+    rate = np.full(contact.shape, -max(box.opening_rate[0], slowest))
+    return Points(opening[inside], rate[inside], contact[inside])
+
+
+def _away(
+    model: ExactModel, average: AverageTorque, points: Points, limit: float
+) -> tuple[Array, Array]:
+    """Deviation and exact torque at each point, 0 where the model itself jumps."""
+    where = points.opening, points.opening_rate, points.contact
+    place = model.settled(points.opening, points.contact)
+    view = edge_height(model.cutting.edge, place, model.blade_angle(points.opening))
+    indentation = model.cutting.upper_face_m - view.height
+    clear = model.cutting.response.force_at(indentation) < STRONGEST_N
+    clear &= np.abs(view.station - model.cutting.edge.length_m) > TIP_CLEARANCE
+    if model.cutting.fracture_energy is not None:
+        strongest = STRONGEST_N * model.cutting.moving_blades
+        parallel = np.maximum(PARALLEL, 2.0 * model.cutting.fracture_energy / strongest)
+        clear &= (view.slope > parallel) | (view.slope < -PARALLEL)
+    exact = np.where(clear, np.clip(model.torque(*where), -limit, limit), 0.0)
+    table = np.where(clear, np.clip(average.torque(*where), -limit, limit), 0.0)
+    return np.abs(table - exact), exact

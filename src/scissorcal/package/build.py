@@ -1,0 +1,288 @@
+"""Build a package from a recipe and its fits."""
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import scissorcal
+from scissorcal.calibration import FitResult
+from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.package.archive import archive_bytes, member_of, write_archive
+from scissorcal.package.average import AverageTorque
+from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
+from scissorcal.package.check import package_verdicts
+from scissorcal.package.compile import (
+    TOLERANCE,
+    Compiled,
+    compile_model,
+    scene_box,
+)
+from scissorcal.package.exact import ExactModel, FitDraws, central_model
+from scissorcal.package.manifest import (
+    FORMAT,
+    UNITS,
+    Bound,
+    CutRecord,
+    CutStructure,
+    FrictionRecord,
+    FrictionStructure,
+    Limits,
+    Manifest,
+    Parameter,
+    Provenance,
+    Ranges,
+    canonical,
+    content_hash,
+)
+from scissorcal.package.model_package import ModelPackage
+from scissorcal.recipe.schema import Recipe
+from scissorcal.verdicts import Verdict, failed
+
+MOST_DRAWS = 200
+GRID_POINTS = 40_000
+UNHASHED = "0" * 64
+
+
+@dataclass(frozen=True)
+class PackageSummary:
+    """What was built: where, how large, its manifest, and the verdicts on it.
+
+    ``table_knots`` counts the knots of each table, ``warnings`` are sentences for the user.
+    """
+
+    path: Path
+    manifest: Manifest
+    size_bytes: int
+    table_knots: dict[str, int]
+    verdicts: tuple[Verdict, ...]
+    warnings: tuple[str, ...]
+
+
+def build_package(
+    recipe: Recipe,
+    friction: FitResult | None,
+    cut: FitResult | None,
+    path: Path,
+    rng: np.random.Generator,
+    *,
+    tolerance: float = TOLERANCE,
+) -> PackageSummary:
+    """Compile the fits that a scene needs, check the result, and write it to ``path``.
+
+    The tables hold the law at the MAP point (docs/decisions/020-package-centre.md). ``rng`` picks
+    which posterior draws travel along for the band, at most 200; the same fits, recipe and seed
+    give the same bytes. ``tolerance`` is each table's, as a share of its value.
+
+    Raises MissingError where a fit that the scene needs is not given, InputError where a fit
+    belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the
+    tables are further from the model than the scene bears.
+    """
+    cut, friction = _wanted(recipe, friction, cut)
+    record = _provenance(recipe, cut, friction)
+    draws = _pick_draws(cut, friction, rng)
+    model = central_model(_centre(cut), _centre(friction) if friction else None)
+    compiled = compile_model(model, recipe, tolerance=tolerance)
+    ranges = Ranges(
+        opening_rad=recipe.scene.opening_rad,
+        opening_rate_rad_per_s=recipe.scene.opening_rate_rad_per_s,
+        contact_m=recipe.scene.contact_m,
+    )
+    bound = _bound(model, compiled, ranges, recipe, tolerance)
+    arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
+    manifest = _hashed(
+        Manifest(
+            format="scissorcal-package/1",
+            name=recipe.name,
+            units=UNITS,
+            ranges=ranges,
+            limits=_limits(recipe),
+            mechanics=compiled.mechanics,
+            bound=bound,
+            provenance=record,
+            members=tuple(member_of(file, array) for file, array in arrays.items()),
+            signature=None,
+            content_hash=UNHASHED,
+        )
+    )
+    package = ModelPackage(manifest, arrays, str(path))
+    verdicts = package_verdicts(package)
+    _refuse_failed(path, verdicts)
+    write_archive(path, manifest, arrays)
+    return PackageSummary(
+        path=path,
+        manifest=manifest,
+        size_bytes=len(archive_bytes(manifest, arrays)),
+        table_knots={name: len(array[0]) for name, array in compiled.arrays.items()},
+        verdicts=verdicts,
+        warnings=package.warnings,
+    )
+
+
+def package_inputs_hash(recipe: Recipe, friction: FitResult | None, cut: FitResult | None) -> str:
+    """Hash of all that a package depends on: equal to its manifest's, there is nothing to build."""
+    if not recipe.scene.render_friction:
+        friction = None
+    facts = {
+        "format": FORMAT,
+        "version": scissorcal.__version__,
+        "recipe": json.loads(recipe.model_dump_json()),
+        "fits": [fit.inputs_hash if fit else None for fit in (cut, friction)],
+    }
+    return hashlib.sha256(canonical(facts)).hexdigest()
+
+
+def _wanted(
+    recipe: Recipe, friction: FitResult | None, cut: FitResult | None
+) -> tuple[FitResult, FitResult | None]:
+    """The fits that the scene needs, no more, made sure that they belong to it."""
+    if recipe.rig.joint == "linear":
+        raise InputError(
+            f'The recipe "{recipe.name}" has rig.joint = "linear": a linear joint carries no '
+            "blades, so there is no package to build from it."
+        )
+    if cut is None:
+        raise MissingError(
+            f'The scene of "{recipe.name}" renders {recipe.material.name}, and there is no fit of '
+            "it yet: run 'scissorcal fit cut' first."
+        )
+    if not recipe.scene.render_friction:
+        friction = None
+    elif friction is None:
+        raise MissingError(
+            f'The scene of "{recipe.name}" renders friction, and there is no fit of it yet: run '
+            "'scissorcal fit friction' first, or set scene.render_friction = false."
+        )
+    structure = cut.structure
+    edge = recipe.rig.edge
+    stated = {
+        "scene.cut": (structure["fracture"] != "none", recipe.scene.cut),
+        "scene.closure": (structure["closure"], recipe.scene.closure),
+        "rig.moving": (structure["moving_blades"], recipe.rig.moving_blades),
+        "material.thickness_mm": (structure["upper_face_m"], recipe.upper_face_m),
+        "rig.edge.family": (structure["edge"]["family"], edge.family),
+        "rig.edge.offset_mm": (structure["edge"]["offset_m"], edge.offset_mm * 1e-3),
+        "rig.edge.taper_deg": (structure["edge"]["taper_rad"], math.radians(edge.taper_deg)),
+        "rig.edge.length_mm": (structure["edge"]["length_m"], edge.length_mm * 1e-3),
+        "rig.edge.curvature_per_m": (structure["edge"]["curvature_per_m"], edge.curvature_per_m),
+    }
+    for key, (fitted, wanted) in stated.items():
+        same = math.isclose(fitted, wanted) if isinstance(wanted, float) else fitted == wanted
+        if not same:
+            raise InputError(
+                f"The fit of the cut was made with another {key} than the recipe now has: run "
+                "'scissorcal fit' again."
+            )
+    return cut, friction
+
+
+def _provenance(recipe: Recipe, cut: FitResult, friction: FitResult | None) -> Provenance:
+    text = canonical(json.loads(recipe.model_dump_json()))
+    keys = CutStructure.model_fields.keys()
+    return Provenance(
+        scissorcal_version=scissorcal.__version__,
+        recipe=text.decode("utf-8"),
+        recipe_sha256=hashlib.sha256(text).hexdigest(),
+        inputs_hash=package_inputs_hash(recipe, friction, cut),
+        cut=CutRecord(
+            **_record(cut), structure=CutStructure(**{key: cut.structure[key] for key in keys})
+        ),
+        friction=None
+        if friction is None
+        else FrictionRecord(
+            **_record(friction),
+            structure=FrictionStructure(
+                **{key: friction.structure[key] for key in FrictionStructure.model_fields}
+            ),
+        ),
+    )
+
+
+def _record(fit: FitResult) -> dict[str, Any]:
+    parameters = tuple(
+        Parameter(
+            name=parameter.name,
+            unit=parameter.unit,
+            value=float(value),
+            mean=float(parameter.mean),
+            sd=float(parameter.sd),
+            q05=float(parameter.q05),
+            q50=float(parameter.q50),
+            q95=float(parameter.q95),
+        )
+        for parameter, value in zip(fit.parameters, fit.map_point, strict=True)
+    )
+    return {
+        "rung": fit.rung,
+        "effort": fit.effort,
+        "inputs_hash": fit.inputs_hash,
+        "sources": fit.sources,
+        "parameters": parameters,
+        "warnings": tuple(f"{v.scope}, {v.check}: {v.why}" for v in failed(fit.verdicts)),
+    }
+
+
+def _centre(fit: FitResult) -> FitDraws:
+    names = tuple(parameter.name for parameter in fit.parameters)
+    return FitDraws(fit.structure, names, fit.map_point[None, :])
+
+
+def _pick_draws(
+    cut: FitResult, friction: FitResult | None, rng: np.random.Generator
+) -> dict[str, NDArray[Any]]:
+    """As many draws of each fit as the smaller one has, at most 200, paired at random."""
+    fits = {"cut": cut} | ({"friction": friction} if friction else {})
+    count = min(MOST_DRAWS, *(len(fit.draws) for fit in fits.values()))
+    picked = {}
+    for what, fit in fits.items():
+        rows = rng.permutation(len(fit.draws))[:count]
+        picked[f"draws/{what}.npy"] = np.asarray(fit.draws[rows], dtype=np.float64)
+    return picked
+
+
+def _bound(
+    model: ExactModel, compiled: Compiled, ranges: Ranges, recipe: Recipe, tolerance: float
+) -> Bound:
+    eps = compiled.mechanics.friction.rate_eps_rad_per_s if compiled.mechanics.friction else 0.0
+    average = AverageTorque(compiled.mechanics, ranges, compiled.arrays)
+    box = scene_box(recipe)
+    found = deviation(model, average, box, recipe.limits.torque_Nm, GRID_POINTS, eps)
+    stated = STATED_OVER_SEEN * found.largest
+    return Bound(
+        largest_seen_Nm=found.largest,
+        stated_Nm=stated,
+        scene_torque_Nm=found.scene_torque,
+        share=stated / found.scene_torque if found.scene_torque > 0 else 0.0,
+        allowed_share=SHARE_OF_TOLERANCE * recipe.scene.tolerance_percent / 100.0,
+        points=found.points,
+        table_tolerance=tolerance,
+        from_rate_rad_per_s=eps,
+    )
+
+
+def _limits(recipe: Recipe) -> Limits:
+    limits = recipe.limits
+    return Limits(
+        torque_Nm=limits.torque_Nm,
+        torque_slew_Nm_per_s=limits.torque_slew_Nm_per_s,
+        force_N=limits.force_N,
+        force_slew_N_per_s=limits.force_slew_N_per_s,
+        engagement_ramp_s=limits.engagement_ramp_s,
+    )
+
+
+def _hashed(manifest: Manifest) -> Manifest:
+    facts = json.loads(manifest.model_dump_json())
+    return manifest.model_copy(update={"content_hash": content_hash(facts)})
+
+
+def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
+    own = [verdict for verdict in failed(verdicts) if verdict.check != "fits"]
+    if own:
+        reasons = " ".join(verdict.why for verdict in own)
+        raise VerdictError(f"{path} was not written: {reasons}")

@@ -1,0 +1,121 @@
+"""Check a package as a stranger would: open it, and hold it to what it states."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scissorcal.package.bound import deviation
+from scissorcal.package.grid import Box, spread_points
+from scissorcal.package.model_package import ModelPackage, open_package
+from scissorcal.verdicts import Status, Verdict
+
+SCOPE = "package"
+GRID_POINTS = 13_337
+"""Another count, so other points than those that the bound was measured on."""
+
+CENTRE_POINTS = 300
+IN_BAND = 0.9
+EXTREME_STEPS = 4_000
+
+
+def check_package(path: Path | str) -> tuple[Verdict, ...]:
+    """Open a package and judge it: the stated bound, the extremes, the centre, the fits.
+
+    Raises MissingError or InputError where the file cannot even be opened as a package.
+    """
+    return package_verdicts(open_package(path))
+
+
+def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
+    """Judge a package in memory; each verdict says what was asked and why it came out so."""
+    return (
+        *_bound(package),
+        _extremes(package),
+        _centre(package),
+        _fits(package),
+        _signature(package),
+    )
+
+
+def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
+    manifest, stated = package.manifest, package.manifest.bound
+    ranges = manifest.ranges
+    box = Box(ranges.opening_rad, ranges.opening_rate_rad_per_s, ranges.contact_m)
+    found = deviation(
+        package.exact,
+        package.average,
+        box,
+        manifest.limits.torque_Nm,
+        GRID_POINTS,
+        stated.from_rate_rad_per_s,
+    )
+    holds = found.largest <= stated.stated_Nm
+    opening, rate, contact = found.where
+    why = (
+        f"On {found.points} places of its own the kernel is at most {found.largest:.2g} N m from "
+        f"the exact model (opening {np.degrees(opening):.1f} deg, rate {rate:.2g} rad/s, contact "
+        f"{contact * 1e3:.1f} mm); the package states {stated.stated_Nm:.2g} N m."
+    )
+    kept = Verdict(
+        SCOPE, "bound", "pass" if holds else "fail", found.largest, stated.stated_Nm, why
+    )
+    small = stated.share <= stated.allowed_share
+    why = (
+        f"The stated bound is {stated.share:.3%} of the scene's largest torque "
+        f"({stated.scene_torque_Nm:.3g} N m); the tables may use {stated.allowed_share:.2%}."
+    )
+    if not small:
+        why += " Narrow the scene's ranges in the recipe, or raise its tolerance."
+    share = Verdict(
+        SCOPE, "bound share", "pass" if small else "fail", stated.share, stated.allowed_share, why
+    )
+    return kept, share
+
+
+def _extremes(package: ModelPackage) -> Verdict:
+    """Step the kernel through what a broken rig might send, and count what is not a number."""
+    kernel = package.kernel()
+    rng = np.random.default_rng(1)
+    size = rng.choice([0.0, 1e-30, 1e-6, 1e-3, 0.03, 0.5, 3.0, 1e3, 1e30], (3, EXTREME_STEPS))
+    inputs = size * rng.choice([-1.0, 1.0], size.shape)
+    inputs[rng.integers(0, 3, 60), rng.integers(0, EXTREME_STEPS, 60)] = np.nan
+    inputs[rng.integers(0, 3, 60), rng.integers(0, EXTREME_STEPS, 60)] = np.inf
+    out = kernel.step_many(*inputs)
+    bad = int(np.sum(~np.isfinite(out["torque"]) | ~np.isfinite(out["force"])))
+    status: Status = "pass" if bad == 0 else "fail"
+    why = f"{bad} of {EXTREME_STEPS} steps through absurd inputs gave something not finite."
+    return Verdict(SCOPE, "extremes", status, float(bad), 0.0, why)
+
+
+def _centre(package: ModelPackage) -> Verdict:
+    """Whether what is rendered lies inside what the posterior holds."""
+    manifest = package.manifest
+    ranges = manifest.ranges
+    box = Box(ranges.opening_rad, ranges.opening_rate_rad_per_s, ranges.contact_m)
+    points = spread_points(box, CENTRE_POINTS, slowest=manifest.bound.from_rate_rad_per_s)
+    where = (points.opening, points.opening_rate, points.contact)
+    torque = package.exact.torque(*where)
+    low, high = package.band(*where, probability=0.98)
+    slack = manifest.bound.stated_Nm
+    inside = float(np.mean((torque >= low - slack) & (torque <= high + slack)))
+    status: Status = "pass" if inside >= IN_BAND else "fail"
+    why = (
+        f"The torque that the tables stand for lies within the posterior's 98 % band on "
+        f"{inside:.0%} of the scene ({package.draws} draws)."
+    )
+    if status == "fail":
+        why += " The fit's best point is not typical of its posterior: fit with more effort."
+    return Verdict(SCOPE, "centre", status, inside, IN_BAND, why)
+
+
+def _fits(package: ModelPackage) -> Verdict:
+    reasons = package.fit_warnings
+    if not reasons:
+        return Verdict(SCOPE, "fits", "pass", 0.0, 0.0, "No fit in it failed a verdict.")
+    why = f"{len(reasons)} verdicts on its fits failed: " + " ".join(reasons)
+    return Verdict(SCOPE, "fits", "fail", float(len(reasons)), 0.0, why)
+
+
+def _signature(package: ModelPackage) -> Verdict:
+    why = "Nobody has signed this package yet."
+    return Verdict(SCOPE, "signature", "not_evaluated", None, None, why)

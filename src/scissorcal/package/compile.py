@@ -1,0 +1,308 @@
+"""From the fits' central law to the arrays and scalars that a kernel evaluates."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.kernel import ModelTables, Table
+from scissorcal.model import (
+    FrictionLaw,
+    edge_height,
+    friction_torque,
+    ripple_moments,
+    settled_contact,
+)
+from scissorcal.model.friction import angle_factor
+from scissorcal.package.exact import ExactModel
+from scissorcal.package.grid import Box, Points, spread_points
+from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
+from scissorcal.package.tables import fit_table
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-4
+"""Of each table, as a share of its value; what that makes in torque is measured, see bound.py."""
+
+SCOUTS = 8_000
+BEYOND_LIMIT = 1.25
+MARGIN = 1.05
+
+STRONGEST_N = 1e5
+"""No response is tabulated beyond this force."""
+
+LEAST_TORQUE_Nm = 1e-6
+LEAST_SLOPE = 1e-6
+STEP_rad = 1e-4
+
+SLOWEST_EPS = 0.02
+"""Below this rate (rad/s) friction is linear in it, even where the scene begins at rest: a measured
+rate is never quite 0."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Tables by file name, each (3, knots) of float32, and the scalars that go with them.
+
+    ``errors`` gives each table's largest deviation as a share of its tolerance.
+    """
+
+    arrays: dict[str, NDArray[np.float32]]
+    mechanics: Mechanics
+    errors: dict[str, float]
+
+
+def scene_box(recipe: Recipe) -> Box:
+    """The ranges of a recipe's scene, in SI."""
+    return Box(
+        recipe.scene.opening_rad, recipe.scene.opening_rate_rad_per_s, recipe.scene.contact_m
+    )
+
+
+def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLERANCE) -> Compiled:
+    """Compile edge, response, ripple and friction to tables over what the scene can reach.
+
+    ``tolerance`` is each table's, as a share of its value. Raises InputError where the scene
+    never touches the material, where friction would drive the motion, or where a law cannot be
+    held by a table.
+    """
+    points = spread_points(scene_box(recipe), SCOUTS)
+    reach = _reach(model, points, recipe.limits.torque_Nm)
+    cutting = model.cutting
+    edge, response = cutting.edge, cutting.response
+    laws: dict[str, dict[str, Any]] = {
+        "edge": {
+            "law": edge.offset_at,
+            "derivative": edge.slope_at,
+            "low": reach.lowest_station,
+            "high": reach.highest_station,
+        },
+        "response": {
+            "law": response.force_at,
+            "derivative": response.stiffness_at,
+            "low": 0.0,
+            "high": reach.indentation,
+            "monotone": True,
+            "scale": reach.force_N,
+        },
+    }
+    friction = fracture = None
+    if cutting.fracture_energy is not None:
+        fracture = Fracture(
+            energy_J_per_m=float(cutting.fracture_energy), kappa=float(cutting.kappa)
+        )
+    if model.friction is not None:
+        laws |= _friction_laws(model.friction, recipe)
+        slowest = recipe.scene.opening_rate_rad_per_s[0]
+        friction = Friction(rate_eps_rad_per_s=max(SLOWEST_EPS, slowest))
+    if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
+        laws["mean_energy"] = _mean_energy_law(model, recipe)
+    arrays: dict[str, NDArray[np.float32]] = {}
+    errors: dict[str, float] = {}
+    for name, arguments in laws.items():
+        try:
+            fitted = fit_table(tolerance=tolerance, **arguments)
+        except ValueError as error:
+            raise InputError(
+                f"The fitted {name.replace('_', ' ')} cannot be made into a table: {error}. "
+                "Narrow the scene's ranges in the recipe to what was captured, or fit again."
+            ) from error
+        table = fitted.table
+        arrays[f"tables/{name}.npy"] = np.stack([table.x, table.y, table.slope])
+        errors[name] = fitted.error
+    scene = recipe.scene
+    mechanics = Mechanics(
+        moving_blades=2 if cutting.moving_blades == 2 else 1,
+        upper_face_m=cutting.upper_face_m,
+        handle_radius_m=recipe.rig.handle_radius_mm * 1e-3,
+        tip_station_m=edge.length_m,
+        closure=cutting.closure,
+        rate_damping_s_per_m=0.0,
+        loop_rate_Hz=scene.loop_rate_Hz,
+        render=scene.render,
+        fracture=fracture,
+        friction=friction,
+    )
+    return Compiled(arrays, mechanics, errors)
+
+
+def kernel_tables(
+    mechanics: Mechanics,
+    ranges: Ranges,
+    arrays: Arrays,
+    *,
+    mean_energy: float | None = None,
+) -> ModelTables:
+    """What the kernel evaluates, from a package's parts.
+
+    As the loop renders it the crack runs from the energy that starts it to kappa times that. With
+    ``mean_energy`` (J/m) it is smooth and costs that much, see average.py. Raises ValueError where
+    the parts make no model.
+    """
+    fracture, friction = mechanics.fracture, mechanics.friction
+    energy, kappa = 0.0, 1.0
+    if mean_energy is not None:
+        energy = mean_energy
+    elif fracture is not None:
+        energy, kappa = fracture.energy_J_per_m, fracture.kappa
+
+    def table(name: str) -> Table:
+        array = arrays.get(f"tables/{name}.npy")
+        return _NOTHING if array is None else Table(*array)
+
+    return ModelTables(
+        edge=table("edge"),
+        response=table("response"),
+        friction_opening=table("friction_opening"),
+        friction_closing=table("friction_closing"),
+        friction_angle=table("friction_angle"),
+        moving_blades=mechanics.moving_blades,
+        upper_face=mechanics.upper_face_m,
+        fracture_energy=energy,
+        kappa=kappa,
+        closure=mechanics.closure,
+        rate_damping=mechanics.rate_damping_s_per_m,
+        render_friction=friction is not None,
+        friction_rate_eps=friction.rate_eps_rad_per_s if friction else SLOWEST_EPS,
+        handle_radius=mechanics.handle_radius_m,
+        tip_station=mechanics.tip_station_m,
+        opening_min=ranges.opening_rad[0],
+        opening_max=ranges.opening_rad[1],
+        contact_min=ranges.contact_m[0],
+        contact_max=ranges.contact_m[1],
+    )
+
+
+_NOTHING = Table(*np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]], dtype=np.float32))
+"""What the kernel is given for friction where a package has none."""
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """How much of the edge and of the response a scene uses.
+
+    Stations and indentation in metres; ``force_N`` makes the scene's largest torque at its longest
+    lever, and so says which forces matter.
+    """
+
+    lowest_station: float
+    highest_station: float
+    indentation: float
+    force_N: float
+
+
+def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
+    """Stations and indentations between which the scene moves.
+
+    Where the crack stands still and the torque exceeds its limit, the response need not be known,
+    as the limit is what is rendered: the kernel goes on as a straight line from there. Where the
+    crack has run, the response decides how far, and whether past the blade's tip: there it is
+    needed whatever the torque.
+    """
+    peaks = ExactModel(replace(model.cutting, kappa=1.0), None)
+    cutting = peaks.cutting
+    edge = cutting.edge
+    beta = peaks.blade_angle(points.opening)
+    place = peaks.settled(points.opening, points.contact)
+    view = edge_height(edge, place, beta)
+    station = np.minimum(view.station, edge.length_m)
+    height = station * np.sin(beta) + edge.offset_at(station) * np.cos(beta)
+    ran = place > points.contact
+    indentation = np.where(ran | (view.station < edge.length_m), cutting.upper_face_m - height, 0.0)
+    touching = indentation > 0
+    if not np.any(touching):
+        raise InputError(
+            "Nowhere in the scene do the blades touch the material, so there is nothing to "
+            "render: check scene.opening_deg and scene.contact_mm against rig.edge in the recipe."
+        )
+    lever = np.abs(view.lever)
+    if cutting.closure == "eq4":
+        lever = np.abs(place) / np.sqrt(1.0 + edge.slope_at(station) ** 2)
+    enough = BEYOND_LIMIT * limit / np.maximum(lever, BEYOND_LIMIT * limit / STRONGEST_N)
+    enough = np.where(ran, STRONGEST_N, enough)
+    needed = np.minimum(indentation, cutting.response.indentation_at(enough))
+    torque = np.minimum(peaks.torque(points.opening, points.opening_rate, points.contact), limit)
+    within = view.station < edge.length_m
+    room = (MARGIN - 1.0) * edge.length_m
+    return _Reach(
+        lowest_station=min(0.0, float(np.min(view.station, where=within, initial=0.0)) - room),
+        highest_station=edge.length_m + room,
+        indentation=MARGIN * float(np.max(needed[touching])),
+        force_N=max(float(np.max(torque)), LEAST_TORQUE_Nm) / float(np.max(lever[touching])),
+    )
+
+
+def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
+    """What the crack costs on average over its ripple, against the opening, in J/m.
+
+    Its share of the energy that starts the crack depends on the peak force there (not at all for
+    a power law), and that on how the edge is inclined where the crack settles.
+    """
+    cutting = model.cutting
+    energy = float(cutting.fracture_energy or 0.0)
+
+    def law(opening: Array) -> Array:
+        place = settled_contact(cutting, opening)
+        cuts = np.isfinite(place)
+        view = edge_height(
+            cutting.edge, np.where(cuts, place, 0.0), opening / cutting.moving_blades
+        )
+        slope = np.where(cuts, np.maximum(view.slope, LEAST_SLOPE), LEAST_SLOPE)
+        peak = energy / (cutting.moving_blades * slope)
+        return np.asarray(energy * ripple_moments(cutting, peak).mean_share)
+
+    def derivative(opening: Array) -> Array:
+        return (law(opening + STEP_rad) - law(opening - STEP_rad)) / (2.0 * STEP_rad)
+
+    low, high = recipe.scene.opening_rad
+    return {"law": law, "derivative": derivative, "low": low, "high": high}
+
+
+def _friction_laws(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any]]:
+    """Level of friction against speed for both directions, and the factor over the opening."""
+    fastest = recipe.scene.opening_rate_rad_per_s[1]
+    low, high = recipe.scene.opening_rad
+    factors = angle_factor(law, np.linspace(low, high, 201))
+    if factors.min() <= 0:
+        where = np.degrees(np.linspace(low, high, 201)[int(np.argmin(factors))])
+        raise InputError(
+            f"The friction fit says that friction drives the motion at {where:.0f} degrees of "
+            "opening, which no friction does: capture friction over the whole of "
+            "scene.opening_deg, or choose a rung without angle in fit.friction.rung."
+        )
+    laws: dict[str, dict[str, Any]] = {}
+    for name, sign in (("friction_opening", 1.0), ("friction_closing", -1.0)):
+        viscous = float(np.asarray(law.viscous_pos if sign > 0 else law.viscous_neg))
+        laws[name] = {
+            "law": lambda speed, sign=sign: _level(law, sign, speed),
+            "derivative": lambda speed, viscous=viscous: _level_slope(law, viscous, speed),
+            "low": 0.0,
+            "high": fastest,
+        }
+    laws["friction_angle"] = {
+        "law": lambda opening: angle_factor(law, opening),
+        "derivative": lambda opening: (
+            law.angle_slope + 2.0 * law.angle_curvature * (opening - law.angle_center)
+        ),
+        "low": low,
+        "high": high,
+    }
+    return laws
+
+
+def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:
+    """Friction's magnitude at the law's centre; at rest its limit from that side."""
+    moving = np.maximum(speed, np.finfo(np.float64).tiny)
+    return np.abs(friction_torque(law, law.angle_center, sign * moving))
+
+
+def _level_slope(law: FrictionLaw, viscous: float, speed: Array) -> Array:
+    relative = speed / law.stribeck_rate
+    fall = 2.0 * law.stribeck * relative / law.stribeck_rate * np.exp(-(relative**2))
+    return np.asarray(viscous - fall)

@@ -1,0 +1,122 @@
+"""The exact law that a package's tables stand for: float64, no tables, any number of draws."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.calibration import cutting_from, friction_law
+from scissorcal.model import (
+    Cutting,
+    FrictionLaw,
+    edge_height,
+    friction_torque,
+    settled_contact,
+)
+from scissorcal.model.cutting import torque_at
+
+Array = NDArray[np.float64]
+
+MOST_AT_ONCE = 500_000
+"""Draws times points evaluated in one sweep, so that a large grid does not fill the memory."""
+
+
+@dataclass(frozen=True)
+class ExactModel:
+    """Cutting (or pressing) and friction as fitted; ``friction`` is None where it is not rendered.
+
+    Both may hold draws: then their parameters have shape (draws, 1).
+    """
+
+    cutting: Cutting
+    friction: FrictionLaw | None
+
+    def torque(self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike) -> Array:
+        """Average torque felt in N m: cutting resists closing, friction resists any motion.
+
+        Arguments (rad, rad/s, m) broadcast; shape (draws, points) with draws and flat arguments.
+        Material beyond the blade's tip is out of reach and gives no torque.
+        """
+        place = self.settled(opening, contact)
+        view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
+        reached = view.station < self.cutting.edge.length_m
+        felt = np.where(reached, torque_at(self.cutting, opening, place), 0.0)
+        if self.friction is None:
+            return felt
+        return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))
+
+    def settled(self, opening: ArrayLike, contact: ArrayLike) -> Array:
+        """Contact x_c after the crack has run outwards as far as it must, in metres."""
+        place = np.asarray(contact, dtype=np.float64)
+        if self.cutting.fracture_energy is None:
+            return place
+        return np.asarray(np.maximum(place, settled_contact(self.cutting, opening)))
+
+    def blade_angle(self, opening: ArrayLike) -> Array:
+        """Rotation beta of one moving blade, in radians."""
+        return np.asarray(opening, dtype=np.float64) / self.cutting.moving_blades
+
+
+@dataclass(frozen=True)
+class FitDraws:
+    """What of one fit defines its law: discrete choices, and parameter draws (draws, names)."""
+
+    structure: Mapping[str, Any]
+    names: tuple[str, ...]
+    draws: Array
+
+    def columns(self) -> dict[str, Array]:
+        """Parameters by name, each of shape (draws, 1)."""
+        return {name: self.draws[:, [index]] for index, name in enumerate(self.names)}
+
+    def row(self, index: int) -> dict[str, Array]:
+        """Parameters of one draw by name, as scalars."""
+        return {name: self.draws[index, column] for column, name in enumerate(self.names)}
+
+
+def exact_model(cut: FitDraws, friction: FitDraws | None) -> ExactModel:
+    """Join draws of a cut fit with as many of a friction fit, one by one."""
+    return _join(cut, cut.columns(), friction, friction.columns() if friction else {})
+
+
+def central_model(cut: FitDraws, friction: FitDraws | None) -> ExactModel:
+    """The model at the first draw alone, with scalar parameters."""
+    return _join(cut, cut.row(0), friction, friction.row(0) if friction else {})
+
+
+def torque_quantiles(
+    model: ExactModel,
+    opening: ArrayLike,
+    opening_rate: ArrayLike,
+    contact: ArrayLike,
+    probabilities: tuple[float, ...],
+) -> Array:
+    """Quantiles over the draws of a model's torque, shape (probabilities, *broadcast shape)."""
+    arrays = np.broadcast_arrays(
+        *(np.asarray(a, dtype=np.float64) for a in (opening, opening_rate, contact))
+    )
+    flat = [array.ravel() for array in arrays]
+    draws = np.shape(model.cutting.response.force)[0]
+    chunk = max(1, MOST_AT_ONCE // draws)
+    result = np.empty((len(probabilities), flat[0].size))
+    for start in range(0, flat[0].size, chunk):
+        part = slice(start, start + chunk)
+        torque = model.torque(*(array[part] for array in flat))
+        result[:, part] = np.quantile(torque, probabilities, axis=0)
+    return result.reshape(len(probabilities), *arrays[0].shape)
+
+
+def _join(
+    cut: FitDraws,
+    cut_values: dict[str, Array],
+    friction: FitDraws | None,
+    friction_values: dict[str, Array],
+) -> ExactModel:
+    return ExactModel(
+        cutting_from(dict(cut.structure), cut_values),
+        None
+        if friction is None
+        else friction_law(friction_values, float(friction.structure["angle_center"])),
+    )

@@ -1,0 +1,299 @@
+"""The manifest: everything a package states about itself, and nothing it does not know."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+FORMAT = "scissorcal-package/1"
+
+LARGEST_MEMBER = 4_000_000
+"""Bytes; a package of 200 draws and five tables has some 40 kB."""
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+Text = Annotated[str, Field(max_length=10_000)]
+Range = tuple[Finite, Finite]
+
+UNITS = {
+    "opening": "rad",
+    "opening_rate": "rad/s",
+    "contact": "m",
+    "station": "m",
+    "edge_offset": "m",
+    "indentation": "m",
+    "force": "N",
+    "torque": "N m",
+    "fracture_energy": "J/m",
+    "energy": "J",
+}
+
+
+class Section(BaseModel):
+    """Base of every object in the manifest: frozen, no unknown keys, no conversions, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class Member(Section):
+    """One file of the archive besides the manifest: an array as .npy.
+
+    Tables have shape (3, knots): x, y and slope. Draws have shape (draws, parameters).
+    """
+
+    file: Annotated[str, Field(pattern=r"^(tables|draws)/[a-z_]{1,40}\.npy$")]
+    dtype: Literal["<f4", "<f8"]
+    shape: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
+    bytes: Annotated[int, Field(ge=1, le=LARGEST_MEMBER)]
+    sha256: Digest
+
+
+class Ranges(Section):
+    """The scene: where the package may be used, and where its bound was checked.
+
+    ``opening_rate_rad_per_s`` is a magnitude, for closing and opening alike.
+    """
+
+    opening_rad: Range
+    opening_rate_rad_per_s: Range
+    contact_m: Range
+
+    @model_validator(mode="after")
+    def _ascend(self) -> Ranges:
+        for name in ("opening_rad", "opening_rate_rad_per_s", "contact_m"):
+            low, high = getattr(self, name)
+            if not 0 <= low < high:
+                raise ValueError(f"{name} must be [low, high] with 0 <= low < high")
+        return self
+
+
+class Limits(Section):
+    """What the loop never exceeds, whatever the model says."""
+
+    torque_Nm: Positive
+    torque_slew_Nm_per_s: Positive
+    force_N: Positive
+    force_slew_N_per_s: Positive
+    engagement_ramp_s: Positive
+
+
+class Fracture(Section):
+    """When the crack advances. Absent from a package that only presses.
+
+    The crack starts at ``energy_J_per_m`` (toughness times thickness) and stops at kappa times
+    that. Where kappa < 1, ``tables/mean_energy.npy`` holds what it costs on average over such
+    cycles, in J/m against the opening.
+    """
+
+    energy_J_per_m: Positive
+    kappa: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+
+
+class Friction(Section):
+    """Rendered friction. Absent from a package that renders none.
+
+    Below ``rate_eps_rad_per_s`` friction is linear in the rate, so that it cannot chatter.
+    """
+
+    rate_eps_rad_per_s: Positive
+
+
+class Mechanics(Section):
+    """The scalars that the kernel needs besides the tables."""
+
+    moving_blades: Literal[1, 2]
+    upper_face_m: NonNegative
+    handle_radius_m: Positive
+    tip_station_m: Positive
+    closure: Literal["work", "eq4"]
+    rate_damping_s_per_m: NonNegative
+    loop_rate_Hz: Positive
+    render: tuple[Literal["torque", "handle_force", "translation_force"], ...]
+    fracture: Fracture | None
+    friction: Friction | None
+
+
+class Bound(Section):
+    """How far the kernel's float32 tables may be from the exact model in float64.
+
+    ``largest_seen_Nm`` was found on ``points`` places of the scene that share nothing with the
+    tables' knots; ``stated_Nm`` is twice that and is what the package promises. ``share`` is the
+    stated bound over ``scene_torque_Nm``, the largest torque in the scene; ``allowed_share`` is
+    the part of the scene's tolerance that tables may use up. Torques are compared as they are
+    rendered, within the torque limit, and at rates of at least ``from_rate_rad_per_s``, below
+    which friction is smoothed on purpose. Left out is where the model itself jumps: within 0.1 mm
+    of the blade's tip, and where the edges are so nearly parallel that no force advances the crack;
+    and where the response would exceed 1e5 N.
+    """
+
+    largest_seen_Nm: NonNegative
+    stated_Nm: NonNegative
+    scene_torque_Nm: NonNegative
+    share: NonNegative
+    allowed_share: Positive
+    points: Annotated[int, Field(ge=1)]
+    table_tolerance: Positive
+    from_rate_rad_per_s: NonNegative
+
+
+class EdgeStructure(Section):
+    family: Literal["line", "arc"]
+    offset_m: Finite
+    taper_rad: Finite
+    length_m: Positive
+    curvature_per_m: Finite
+
+
+class CutStructure(Section):
+    """The discrete choices of a cut fit."""
+
+    response: Literal["power", "exponential"]
+    fracture: Literal["none", "smooth", "rippled"]
+    closure: Literal["work", "eq4"]
+    reference_indentation_m: Positive
+    moving_blades: Literal[1, 2]
+    upper_face_m: NonNegative
+    edge: EdgeStructure
+
+
+class FrictionStructure(Section):
+    """The discrete choices of a friction fit."""
+
+    law: Literal["coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"]
+    symmetric: bool
+    angle_center: Finite
+
+
+class Parameter(Section):
+    """A fitted parameter: ``value`` is what the tables were compiled at, the rest its posterior."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z_]{1,40}$")]
+    unit: Annotated[str, Field(max_length=40)]
+    value: Finite
+    mean: Finite
+    sd: NonNegative
+    q05: Finite
+    q50: Finite
+    q95: Finite
+
+
+class FitRecord(Section):
+    """A fit that went into the package; its draws stand in ``draws/<what>.npy``.
+
+    ``parameters`` are in the order of the draws' columns. ``warnings`` are the fit's failed
+    verdicts, word for word.
+    """
+
+    rung: Text
+    effort: Literal["draft", "standard", "thorough"]
+    inputs_hash: Annotated[str, Field(max_length=200)]
+    sources: tuple[Text, ...]
+    parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=32)]
+    warnings: tuple[Text, ...]
+
+
+class CutRecord(FitRecord):
+    structure: CutStructure
+
+
+class FrictionRecord(FitRecord):
+    structure: FrictionStructure
+
+
+class Provenance(Section):
+    """Where a package comes from.
+
+    ``recipe`` is the recipe as canonical JSON, every default written out, ``recipe_sha256`` its
+    hash. ``inputs_hash`` covers the recipe, the fits and the version: equal hashes, equal package.
+    """
+
+    scissorcal_version: Annotated[str, Field(max_length=40)]
+    recipe: Annotated[str, Field(max_length=200_000)]
+    recipe_sha256: Digest
+    inputs_hash: Digest
+    cut: CutRecord
+    friction: FrictionRecord | None
+
+
+class Manifest(Section):
+    """The whole manifest, ``manifest.json`` in the archive.
+
+    ``content_hash`` is the SHA-256 of the canonical JSON of everything here except itself and
+    ``signature``; through ``members`` it covers every byte of every array. ``signature`` is the
+    reviewer's sign-off over that hash, null as long as there is none.
+    """
+
+    format: Literal["scissorcal-package/1"]
+    name: Name
+    units: dict[str, str]
+    ranges: Ranges
+    limits: Limits
+    mechanics: Mechanics
+    bound: Bound
+    provenance: Provenance
+    members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
+    signature: None
+    content_hash: Digest
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Manifest:
+        files = [member.file for member in self.members]
+        if len(set(files)) != len(files):
+            raise ValueError("members name a file twice")
+        if set(files) != expected_files(self):
+            odd = sorted(set(files) ^ expected_files(self))
+            raise ValueError(f"members do not fit what the package says it renders: {odd}")
+        structure = self.provenance.cut.structure
+        if (structure.fracture == "none") != (self.mechanics.fracture is None):
+            raise ValueError("mechanics.fracture and the cut fit's fracture contradict each other")
+        if (self.provenance.friction is None) != (self.mechanics.friction is None):
+            raise ValueError("mechanics.friction and provenance.friction contradict each other")
+        return self
+
+    def member(self, file: str) -> Member:
+        """Return the entry of one file; KeyError if there is none."""
+        for member in self.members:
+            if member.file == file:
+                return member
+        raise KeyError(file)
+
+
+def expected_files(manifest: Manifest) -> set[str]:
+    """The arrays that a package with this manifest has: no more and no fewer."""
+    files = {"tables/edge.npy", "tables/response.npy", "draws/cut.npy"}
+    if manifest.mechanics.friction is not None:
+        files |= {f"tables/friction_{part}.npy" for part in ("opening", "closing", "angle")}
+        files.add("draws/friction.npy")
+    if manifest.mechanics.fracture is not None and manifest.mechanics.fracture.kappa < 1.0:
+        files.add("tables/mean_energy.npy")
+    return files
+
+
+def content_hash(facts: dict[str, Any]) -> str:
+    """Hash of a manifest given as plain JSON, whatever its ``content_hash`` and ``signature``."""
+    kept = {key: value for key, value in facts.items() if key not in ("content_hash", "signature")}
+    return hashlib.sha256(canonical(kept)).hexdigest()
+
+
+def canonical(facts: Any) -> bytes:
+    """One byte string for one JSON value: keys sorted, no spaces, UTF-8, no NaN."""
+    text = json.dumps(
+        facts, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
+    )
+    return text.encode("utf-8")
+
+
+def manifest_schema_text() -> str:
+    """The JSON Schema of ``manifest.json``: the text of data_schemas/manifest.schema.json."""
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "manifest.schema.json",
+        **Manifest.model_json_schema(),
+    }
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,179 @@
+"""A package in memory: torque, its band, and the step that the loop runs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.kernel import Kernel, ModelTables
+from scissorcal.package.archive import MEND, read_archive
+from scissorcal.package.average import AverageTorque
+from scissorcal.package.compile import kernel_tables
+from scissorcal.package.exact import (
+    ExactModel,
+    FitDraws,
+    central_model,
+    exact_model,
+    torque_quantiles,
+)
+from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelPackage:
+    """A checked package: ``manifest`` says what it is, the methods evaluate it.
+
+    ``arrays`` holds tables (3, knots) and draws (draws, parameters) by file name; ``source`` is
+    the file it was read from.
+    """
+
+    manifest: Manifest
+    arrays: Mapping[str, NDArray[Any]]
+    source: str
+
+    def torque(self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike) -> Array:
+        """Torque in N m as felt on average, positive where it opens the blades.
+
+        Evaluated by the kernel from the tables, so it is what the loop renders, ripple averaged
+        out and before the torque limit; ``manifest.bound`` says how far it may be from the exact
+        model. Arguments (rad, rad/s, m) broadcast, and so does the result's shape. The crack
+        settles first: at a contact where the material would not hold, the torque is that of the
+        place where it does. See `covers` for where this is meant to be used.
+        """
+        opening, rate, contact = _broadcast(opening, opening_rate, contact)
+        return self.average.torque(opening, rate, contact)
+
+    def band(
+        self,
+        opening: ArrayLike,
+        opening_rate: ArrayLike,
+        contact: ArrayLike,
+        probability: float = 0.9,
+    ) -> tuple[Array, Array]:
+        """Equal-tailed interval that holds the torque with ``probability``: (low, high) in N m.
+
+        Each posterior draw in the package is evaluated with the exact model, without tables.
+        Arguments broadcast as in `torque`. Raises ValueError unless 0 < probability < 1.
+        """
+        if not 0.0 < probability < 1.0:
+            raise ValueError(f"probability must lie between 0 and 1, not {probability:g}")
+        tail = 0.5 * (1.0 - probability)
+        low, high = torque_quantiles(
+            self._drawn, opening, opening_rate, contact, (tail, 1.0 - tail)
+        )
+        return low, high
+
+    def kernel(self) -> Kernel:
+        """A new kernel with the step that the loop runs, ripple included, its crack at 0."""
+        return Kernel(self.tables)
+
+    def covers(
+        self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike
+    ) -> NDArray[np.bool_]:
+        """Whether places lie within the ranges for which the package was made and checked."""
+        ranges = self.manifest.ranges
+        opening, rate, contact = _broadcast(opening, opening_rate, contact)
+        inside = np.ones(opening.shape, dtype=np.bool_)
+        for values, (low, high) in (
+            (opening, ranges.opening_rad),
+            (np.abs(rate), ranges.opening_rate_rad_per_s),
+            (contact, ranges.contact_m),
+        ):
+            inside &= (low <= values) & (values <= high)
+        return inside
+
+    @cached_property
+    def tables(self) -> ModelTables:
+        """What the loop's kernel evaluates."""
+        return kernel_tables(self.manifest.mechanics, self.manifest.ranges, self.arrays)
+
+    @cached_property
+    def exact(self) -> ExactModel:
+        """The exact model, in float64, that the tables were compiled from."""
+        record = self.manifest.provenance
+        return central_model(
+            _centre(record.cut), _centre(record.friction) if record.friction else None
+        )
+
+    @property
+    def fit_warnings(self) -> tuple[str, ...]:
+        """What the fits' own verdicts hold against them, as sentences."""
+        record = self.manifest.provenance
+        return record.cut.warnings + (record.friction.warnings if record.friction else ())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What whoever renders this package should know beforehand, as sentences."""
+        unsigned = (
+            f"The package {self.manifest.name} is not signed: nobody has reviewed its report."
+        )
+        signed = self.manifest.signature is not None
+        return (() if signed else (unsigned,)) + self.fit_warnings
+
+    @property
+    def draws(self) -> int:
+        """How many posterior draws the band is made of."""
+        return len(self.arrays["draws/cut.npy"])
+
+    @cached_property
+    def average(self) -> AverageTorque:
+        """The average torque from the tables: what `torque` evaluates."""
+        return AverageTorque(self.manifest.mechanics, self.manifest.ranges, self.arrays)
+
+    @cached_property
+    def _drawn(self) -> ExactModel:
+        record = self.manifest.provenance
+        return exact_model(
+            _fit_draws(record.cut, self.arrays["draws/cut.npy"]),
+            None
+            if record.friction is None
+            else _fit_draws(record.friction, self.arrays["draws/friction.npy"]),
+        )
+
+
+def open_package(path: Path | str) -> ModelPackage:
+    """Open a package file, checking everything in it before anything is used.
+
+    Raises MissingError where there is no file, InputError where it is no package, was changed, or
+    states what cannot be. Nothing in a package is executed or unpacked to disk.
+
+    >>> package = open_package("package/paper-80gsm.zip")  # doctest: +SKIP
+    >>> package.torque(opening=0.5, opening_rate=-0.2, contact=0.03)  # doctest: +SKIP
+    array(0.0307)
+    """
+    path = Path(path)
+    manifest, arrays = read_archive(path)
+    package = ModelPackage(manifest, arrays, str(path))
+    records = {"cut": manifest.provenance.cut, "friction": manifest.provenance.friction}
+    for what, record in records.items():
+        if record and arrays[f"draws/{what}.npy"].shape[1] != len(record.parameters):
+            raise InputError(
+                f"{path}, member 'draws/{what}.npy' has another number of columns than the {what} "
+                f"fit has parameters. {MEND}"
+            )
+    try:
+        _ = package.tables, package.exact, package.average
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path}: its parts make no model ({error}). {MEND}") from error
+    return package
+
+
+def _broadcast(*values: ArrayLike) -> tuple[Array, ...]:
+    return tuple(np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in values)))
+
+
+def _centre(record: CutRecord | FrictionRecord) -> FitDraws:
+    values = [[parameter.value for parameter in record.parameters]]
+    return _fit_draws(record, np.array(values))
+
+
+def _fit_draws(record: CutRecord | FrictionRecord, draws: Array) -> FitDraws:
+    names = tuple(parameter.name for parameter in record.parameters)
+    return FitDraws(record.structure.model_dump(), names, draws)

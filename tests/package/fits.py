@@ -1,0 +1,137 @@
+"""Synthetic fits: what calibration would hand over, without fitting anything."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration import FitResult, FitSeries, FittedParameter
+from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+UNITS = {"response_force": "N", "response_exponent": "1", "fracture_energy": "J/m", "kappa": "1"}
+FRICTION = {
+    "inertia": 6e-4,
+    "offset": 0.001,
+    "coulomb": 0.012,
+    "viscous": 0.004,
+    "stribeck": 0.006,
+    "stribeck_rate": 0.08,
+    "angle_slope": 0.15,
+    "angle_curvature": -0.2,
+}
+
+
+def recipe(name: str = "paper-80gsm", **scene: Any) -> Recipe:
+    """A recipe that comes with scissorcal, its scene changed where asked."""
+    chosen = builtin_recipe(name)
+    return chosen.model_copy(update={"scene": chosen.scene.model_copy(update=scene)})
+
+
+def cut_fit(
+    chosen: Recipe,
+    *,
+    response: str = "power",
+    force: float = 2.0,
+    exponent: float = 1.5,
+    energy: float | None = 0.5,
+    kappa: float | None = None,
+    spread: float = 0.03,
+    seed: int = 1,
+    draws: int = 400,
+) -> FitResult:
+    """A cut fit that agrees with a recipe; ``energy`` None for a scene that only presses."""
+    values = {"response_force": force, "response_exponent": exponent}
+    fracture = "none"
+    if energy is not None:
+        values["fracture_energy"] = energy
+        fracture = "smooth"
+    if kappa is not None:
+        values["kappa"] = kappa
+        fracture = "rippled"
+    edge = chosen.rig.edge
+    structure = {
+        "response": response,
+        "fracture": fracture,
+        "closure": chosen.scene.closure,
+        "reference_indentation_m": chosen.fit.cut.reference_indentation_mm * 1e-3,
+        "moving_blades": chosen.rig.moving_blades,
+        "upper_face_m": chosen.upper_face_m,
+        "edge": {
+            "family": edge.family,
+            "offset_m": edge.offset_mm * 1e-3,
+            "taper_rad": math.radians(edge.taper_deg),
+            "length_m": edge.length_mm * 1e-3,
+            "curvature_per_m": edge.curvature_per_m,
+        },
+    }
+    return _result("cut", values, structure, spread, seed, draws)
+
+
+def friction_fit(
+    *,
+    law: str = "stribeck+angle",
+    spread: float = 0.03,
+    seed: int = 2,
+    draws: int = 400,
+    **values: float,
+) -> FitResult:
+    """A symmetric friction fit; keywords replace single parameters."""
+    structure = {"law": law, "symmetric": True, "joint": "rotary", "angle_center": 0.55}
+    kept = FRICTION | values
+    return _result("friction", kept, structure, spread, seed, draws)
+
+
+def _result(
+    what: Any,
+    values: dict[str, float],
+    structure: dict[str, Any],
+    spread: float,
+    seed: int,
+    draws: int,
+) -> FitResult:
+    rng = np.random.default_rng(seed)
+    centre = np.array(list(values.values()))
+    factors = np.exp(spread * rng.standard_normal((draws, len(centre))))
+    cloud = centre * factors
+    if "kappa" in values:
+        column = list(values).index("kappa")
+        cloud[:, column] = np.minimum(cloud[:, column], 0.999)
+    q05, q50, q95 = np.quantile(cloud, [0.05, 0.5, 0.95], axis=0)
+    parameters = tuple(
+        FittedParameter(
+            name=name,
+            unit=UNITS.get(name, "N m"),
+            mean=float(cloud[:, i].mean()),
+            sd=float(cloud[:, i].std()),
+            q05=float(q05[i]),
+            q50=float(q50[i]),
+            q95=float(q95[i]),
+            identifiability=0.1,
+        )
+        for i, name in enumerate(values)
+    )
+    nothing = np.zeros(0)
+    none = np.zeros(0, dtype=np.int64)
+    return FitResult(
+        what=what,
+        effort="standard",
+        rung="synthetic",
+        structure=structure,
+        parameters=parameters,
+        draws=cloud,
+        map_point=centre,
+        series=FitSeries(
+            nothing, none, none, nothing, nothing, nothing, nothing, nothing, nothing, nothing
+        ),
+        held_out=(),
+        rungs=(),
+        diagnostics={},
+        verdicts=(),
+        effort_unit="N m",
+        position_unit="rad",
+        inputs_hash=f"{what}-{seed}",
+        sources=(f"{what}.mcap sha256:{seed:064x}",),
+    )
