@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.device.coverage import CoverageGrid, friction_coverage
-from scissorcal.device.trajectory import friction_plan, opening_range
+from scissorcal.device.coverage import CoverageGrid, cut_coverage, even_cells, friction_coverage
+from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recording import SAMPLE_DTYPE
 from tests.device.conftest import IDENTITY
@@ -25,7 +26,7 @@ def closing(speed: float, top: float = 0.8, bottom: float = 0.2) -> NDArray[np.f
 
 
 def test_one_sweep_fills_one_row_evenly() -> None:
-    grid = CoverageGrid((0.1, 0.4), (0.2, 0.8), angle_cells=6)
+    grid = CoverageGrid((0.1, 0.4), even_cells((0.2, 0.8), 6))
     grid.add(samples_of(closing(0.1)))
     assert grid.seconds[0, 0] == pytest.approx(np.full(6, 1.0), abs=0.03)
     assert grid.seconds[1].sum() == grid.seconds[0, 1].sum() == 0
@@ -39,7 +40,7 @@ def test_one_sweep_fills_one_row_evenly() -> None:
 
 
 def test_blocks_make_no_difference() -> None:
-    whole, parts = (CoverageGrid((0.1, 0.4), (0.2, 0.8)) for _ in range(2))
+    whole, parts = (CoverageGrid((0.1, 0.4), even_cells((0.2, 0.8))) for _ in range(2))
     samples = samples_of(np.concatenate([closing(0.1), closing(0.4)[::-1]]))
     whole.add(samples)
     for start in range(0, len(samples), 37):
@@ -48,7 +49,7 @@ def test_blocks_make_no_difference() -> None:
 
 
 def test_a_gap_is_no_motion() -> None:
-    grid = CoverageGrid((0.1, 0.4), (0.2, 0.8))
+    grid = CoverageGrid((0.1, 0.4), even_cells((0.2, 0.8)))
     rest = np.full(500, 0.7)
     grid.add(samples_of(rest))
     grid.add(samples_of(rest - 0.4, start_us=2_000_000))
@@ -60,16 +61,25 @@ def test_a_gap_is_no_motion() -> None:
 def test_a_friction_plan_fills_every_cell() -> None:
     recipe = builtin_recipe("paper-80gsm")
     reference = friction_plan(recipe, IDENTITY).segments[0].reference
-    grid = friction_coverage(recipe, opening_range(recipe, IDENTITY))
+    grid = friction_coverage(recipe, IDENTITY)
     grid.add(samples_of(reference.opening))
     assert grid.share == 1.0, grid.sentence()
     assert grid.sentence() == "80 of 80 cells filled"
 
 
+@pytest.mark.parametrize("name", ["paper-80gsm", "cotton-cloth", "press-only"])
+def test_a_cut_plan_fills_every_cell(name: str) -> None:
+    recipe = builtin_recipe(name)
+    grid = cut_coverage(recipe, IDENTITY)
+    for number, segment in enumerate(cut_plan(recipe, IDENTITY).segments):
+        grid.add(samples_of(segment.reference.opening, start_us=number * 10**9))
+    assert grid.share == 1.0, grid.sentence()
+
+
 def test_the_table_is_small_and_readable() -> None:
     from rich.console import Console
 
-    grid = CoverageGrid((0.1, 0.4), (0.2, 0.8))
+    grid = CoverageGrid((0.1, 0.4), even_cells((0.2, 0.8)))
     grid.add(samples_of(closing(0.1)))
     text = io.StringIO()
     Console(file=text, width=100, color_system=None).print(grid)

@@ -1,17 +1,22 @@
 """Coverage of a capture: which speeds it has seen at which angles, in which direction, live."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.cut_trajectory import press_openings
+from scissorcal.device.trajectory import opening_range
+from scissorcal.kernel import Identity
 from scissorcal.recipe.schema import Recipe
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 Array = NDArray[np.float64]
+Range = tuple[float, float]
 Direction = Literal["closing", "opening"]
 
 ANGLE_CELLS = 8
@@ -25,7 +30,7 @@ class Cell:
 
     direction: Direction
     speed: float
-    opening: tuple[float, float]
+    opening: Range
     seconds: float
 
 
@@ -33,24 +38,23 @@ class CoverageGrid:
     """Seconds of motion by direction, speed and angle; a cell is filled from ``needed_s`` on.
 
     ``speeds`` (rad/s, ascending) are the nominal ones; a cell of speed reaches half-way to its
-    neighbours in the logarithm, and by the same factor outwards. Motion that fits no cell is left
-    out. Samples may come in blocks of any size.
+    neighbours in the logarithm, and by the same factor outwards. ``cells`` are ranges of opening
+    (rad). Motion that fits no cell is left out. Samples may come in blocks of any size.
     """
 
     def __init__(
         self,
         speeds: tuple[float, ...],
-        opening: tuple[float, float],
+        cells: tuple[Range, ...],
         directions: tuple[Direction, ...] = ("closing", "opening"),
-        angle_cells: int = ANGLE_CELLS,
         needed_s: float = NEEDED_S,
     ) -> None:
         self.speeds = tuple(sorted(set(speeds)))
         self.directions = directions
         self.needed_s = needed_s
-        self.angle_edges = np.linspace(*opening, angle_cells + 1)
+        self.cells = cells
         self.speed_edges = _speed_edges(np.asarray(self.speeds))
-        self.seconds = np.zeros((len(directions), len(self.speeds), angle_cells))
+        self.seconds = np.zeros((len(directions), len(self.speeds), len(cells)))
         self._time = np.zeros(0)
         self._opening = np.zeros(0)
 
@@ -94,7 +98,7 @@ class CoverageGrid:
             Cell(
                 self.directions[d],
                 self.speeds[s],
-                (float(self.angle_edges[a]), float(self.angle_edges[a + 1])),
+                self.cells[a],
                 float(self.seconds[d, s, a]),
             )
             for d, s, a in zip(*np.nonzero(~self.filled), strict=True)
@@ -104,7 +108,7 @@ class CoverageGrid:
     def sentence(self) -> str:
         """Say in one line what is covered and what is thin.
 
-        >>> CoverageGrid((0.1, 0.5), (0.2, 0.8)).sentence()
+        >>> CoverageGrid((0.1, 0.5), even_cells((0.2, 0.8))).sentence()
         '0 of 32 cells filled; thin: closing at 0.1, 0.5 rad/s; opening at 0.1, 0.5 rad/s'
         """
         parts = []
@@ -125,7 +129,7 @@ class CoverageGrid:
 
         table = Table(title=f"coverage {100 * self.share:.0f} %", title_justify="left")
         table.add_column("rad/s", justify="right")
-        for low, high in zip(self.angle_edges[:-1], self.angle_edges[1:], strict=True):
+        for low, high in self.cells:
             table.add_column(f"{np.degrees(low):.0f}-{np.degrees(high):.0f}", justify="center")
         for d, direction in enumerate(self.directions):
             for s, speed in enumerate(self.speeds):
@@ -144,23 +148,38 @@ class CoverageGrid:
         return "[yellow]▄[/yellow]" if seconds > 0 else "[dim]·[/dim]"
 
     def _count(self, rate: Array, opening: Array, seconds: Array) -> None:
-        angle = np.searchsorted(self.angle_edges, opening, side="right") - 1
         speed = np.searchsorted(self.speed_edges, np.abs(rate), side="right") - 1
-        inside = (angle >= 0) & (angle < self.seconds.shape[2])
-        inside &= (speed >= 0) & (speed < self.seconds.shape[1])
+        fits = (speed >= 0) & (speed < len(self.speeds))
         for d, direction in enumerate(self.directions):
-            of = inside & ((rate < 0) if direction == "closing" else (rate > 0))
-            np.add.at(self.seconds[d], (speed[of], angle[of]), seconds[of])
+            towards = fits & ((rate < 0) if direction == "closing" else (rate > 0))
+            for c, (low, high) in enumerate(self.cells):
+                of = towards & (opening >= low) & (opening < high)
+                self.seconds[d, :, c] += np.bincount(speed[of], seconds[of], len(self.speeds))
 
 
-def friction_coverage(recipe: Recipe, opening: tuple[float, float]) -> CoverageGrid:
-    """Grid of a friction capture: its speeds in both directions over the openings (rad)."""
-    return CoverageGrid(recipe.capture.friction.speeds_rad_per_s, opening)
+def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:
+    """Cut a range of openings into cells of one width."""
+    edges = [float(edge) for edge in np.linspace(*opening, count + 1)]
+    return tuple(pairwise(edges))
 
 
-def cut_coverage(recipe: Recipe, opening: tuple[float, float]) -> CoverageGrid:
-    """Grid of a cut capture: its speeds while closing over the openings (rad)."""
-    return CoverageGrid(recipe.capture.cut.speeds_rad_per_s, opening, ("closing",))
+def friction_coverage(recipe: Recipe, identity: Identity) -> CoverageGrid:
+    """Grid of a friction capture: its speeds in both directions over the scene's openings."""
+    cells = even_cells(opening_range(recipe, identity))
+    return CoverageGrid(recipe.capture.friction.speeds_rad_per_s, cells)
+
+
+def cut_coverage(recipe: Recipe, identity: Identity, *, hand: bool = False) -> CoverageGrid:
+    """Grid of a cut capture: its speeds while closing, over the openings at which it cuts.
+
+    Planned presses have a cell for each place at which they press.
+    """
+    speeds = recipe.capture.cut.speeds_rad_per_s
+    if recipe.scene.cut or hand:
+        cells = even_cells(opening_range(recipe, identity))
+    else:
+        cells = press_openings(recipe, identity)
+    return CoverageGrid(speeds, cells, ("closing",))
 
 
 def _speed_edges(speeds: Array) -> Array:

@@ -73,6 +73,12 @@ def hand_requests(recipe: Recipe) -> tuple[str, ...]:
     )
 
 
+def press_openings(recipe: Recipe, identity: Identity) -> tuple[tuple[float, float], ...]:
+    """Return the openings (rad) between which the presses of a recipe move: (deep, clear) each."""
+    places = _press_places(recipe, identity, recipe.capture.cut.strokes_per_sheet)
+    return tuple((place.bottom, place.top) for place in places)
+
+
 @dataclass(frozen=True)
 class _Cut:
     """One stroke: where the pivot stands, and the openings between which it closes."""

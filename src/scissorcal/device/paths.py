@@ -25,6 +25,11 @@ class Reference:
     def __len__(self) -> int:
         return len(self.opening)
 
+    def head(self) -> "Reference":
+        """Return where it begins, as a rest of one tick that belongs to no stroke."""
+        still = np.zeros(1)
+        return Reference(self.opening[:1], still, self.advance[:1], np.full(1, -1, dtype=np.int32))
+
     def __add__(self, other: "Reference") -> "Reference":
         return Reference(
             np.concatenate([self.opening, other.opening]),

@@ -1,0 +1,222 @@
+"""Capture friction and cuts: drive the rig, or let a hand move it, and record what it does."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
+from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.hand import hand_strokes, hand_travel
+from scissorcal.device.link import Link
+from scissorcal.device.loading import Confirm, Loader
+from scissorcal.device.motion import Motion, MotionReport, Samples, open_motion
+from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.kernel import Identity, ServoConfig
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
+
+CaptureProgress = Callable[[float, str, CoverageGrid], None]
+"""Called with the share done (0 to 1), a sentence, and the coverage so far."""
+
+SUPERVISOR_S = 1.0
+RATE_CUTOFF_HZ = 120.0
+FAULT_CLEARINGS = 20
+OPENING_ERROR_RAD = 0.3
+ADVANCE_ERROR_M = 0.02
+
+CLEAR_REQUEST = (
+    "Take everything out from between the blades and keep clear: they will open, and the sledge "
+    "will go to its start."
+)
+
+
+@dataclass(frozen=True)
+class CaptureReport:
+    """What a capture recorded, what it met on the way, and how the servo did."""
+
+    sample_count: int
+    coverage: CoverageGrid
+    tally: Tally
+    motion: MotionReport
+
+
+def open_writer(
+    path: Path, kind: Kind, link: Link, recipe: Recipe, recipe_toml: str, *, hand: bool = False
+) -> RecordingWriter:
+    """Open the recording of a capture, with everything that is known before it starts.
+
+    ``recipe_toml`` is the recipe's text, as it stands in its file. Raises as RecordingWriter
+    does, and as the plan of the capture does.
+    """
+    identity = link.identity
+    strokes: tuple[Stroke, ...] = ()
+    if not hand:
+        plan = friction_plan if kind == "friction" else cut_plan
+        strokes = plan(recipe, identity).strokes
+    return RecordingWriter(
+        path,
+        kind,
+        Joint(recipe.rig.joint),
+        recipe_toml,
+        identity_facts(identity),
+        identity.handle_radius,
+        strokes,
+        min_travel=hand_travel(recipe, identity) if hand else None,
+    )
+
+
+def capture_friction(
+    link: Link,
+    recipe: Recipe,
+    writer: RecordingWriter,
+    progress: CaptureProgress | None = None,
+    *,
+    confirm: Confirm | None = None,
+) -> CaptureReport:
+    """Drive empty sweeps and a swing, and record them.
+
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
+    recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
+    faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
+    """
+    coverage = friction_coverage(recipe, link.identity)
+    recorder = Recorder(writer, coverage)
+    plan = friction_plan(recipe, link.identity)
+    with _motion_for(link, recipe, plan) as motion:
+        Loader(motion, recorder, confirm).clear(plan.segments[0].request)
+        plan = friction_plan(recipe, link.identity, advance=motion.position[1])
+        drive = _Drive(motion, recorder, plan, progress)
+        drive.follow(plan.segments[0])
+        return _finish(recorder, motion)
+
+
+def capture_cut(
+    link: Link,
+    recipe: Recipe,
+    writer: RecordingWriter,
+    hand: bool = False,
+    progress: CaptureProgress | None = None,
+    confirm: Confirm | None = None,
+) -> CaptureReport:
+    """Drive strokes through sheet after sheet (or presses), or watch a hand make them.
+
+    With ``hand`` the motors are off while the hand moves; strokes are found from the motion. On
+    a simulator the virtual hand does it, and motors bring the rig back before each sheet.
+    ``confirm`` asks a person to load each sheet; a simulator loads by itself. Otherwise as
+    capture_friction.
+    """
+    identity = link.identity
+    coverage = cut_coverage(recipe, identity, hand=hand)
+    recorder = Recorder(writer, coverage)
+    if hand:
+        with _motion_for(link, recipe, None) as motion:
+            loader = Loader(motion, recorder, confirm)
+            tell = progress or _silent
+            hand_strokes(
+                motion, recipe, recorder, loader, lambda done, what: tell(done, what, coverage)
+            )
+            return _finish(recorder, motion)
+    plan = cut_plan(recipe, identity)
+    with _motion_for(link, recipe, plan) as motion:
+        loader = Loader(motion, recorder, confirm)
+        loader.clear(CLEAR_REQUEST)
+        drive = _Drive(motion, recorder, plan, progress)
+        for segment in plan.segments:
+            loader.retract()
+            drive.go_to_start(segment)
+            loader.load(segment.request)
+            drive.follow(segment)
+        return _finish(recorder, motion)
+
+
+def servo_config(recipe: Recipe, identity: Identity) -> ServoConfig:
+    """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits."""
+    limits, control = recipe.limits, recipe.rig.control
+    return ServoConfig(
+        torque_limit=min(limits.torque_Nm, identity.torque_limit),
+        torque_slew=limits.torque_slew_Nm_per_s,
+        force_limit=min(limits.force_N, identity.force_limit),
+        force_slew=limits.force_slew_N_per_s,
+        ramp_s=limits.engagement_ramp_s,
+        rate_cutoff_Hz=RATE_CUTOFF_HZ,
+        opening_kp=control.opening_kp_Nm_per_rad,
+        opening_kd=control.opening_kd_Nm_s_per_rad,
+        opening_ki=control.opening_ki_Nm_per_rad_s,
+        advance_kp=control.advance_kp_N_per_m,
+        advance_kd=control.advance_kd_N_s_per_m,
+        advance_ki=control.advance_ki_N_per_m_s,
+        opening_error_limit=OPENING_ERROR_RAD,
+        advance_error_limit=ADVANCE_ERROR_M,
+        supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
+        fault_clearings=FAULT_CLEARINGS,
+        tick_us=identity.tick_us,
+    )
+
+
+def identity_facts(identity: Identity) -> dict[str, Any]:
+    """The identity as plain numbers and strings, for a recording; the hash in hexadecimal."""
+    facts = identity._asdict()
+    del facts["nonce_echo"]
+    return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
+
+
+class _Drive:
+    """Runs segments of a plan and tells how far it is."""
+
+    def __init__(
+        self, motion: Motion, recorder: Recorder, plan: Plan, progress: CaptureProgress | None
+    ) -> None:
+        self._motion = motion
+        self._recorder = recorder
+        self._plan = plan
+        self._tell = progress or _silent
+        self._total = sum(len(segment.reference) for segment in plan.segments)
+        self._done = 0
+
+    def go_to_start(self, segment: Segment) -> None:
+        """Bring the rig to where a segment starts, so that material can be loaded there."""
+        for samples in self._motion.track(segment.reference.head()):
+            self._take(samples, "going to where the next piece is loaded")
+
+    def follow(self, segment: Segment) -> None:
+        """Run a segment and record it."""
+        begun = self._done
+        for samples in self._motion.track(segment.reference):
+            passed = self._motion.track_index - self._motion.way_there
+            self._done = begun + int(np.clip(passed, 0, len(segment.reference)))
+            self._take(samples, self._doing(samples))
+        self._done = begun + len(segment.reference)
+
+    def _take(self, samples: Samples, sentence: str) -> None:
+        self._recorder.take(samples, self._motion.garbled)
+        self._tell(self._done / self._total, sentence, self._recorder.coverage)
+
+    def _doing(self, samples: Samples) -> str:
+        labels = samples["stroke"]
+        if len(labels) == 0 or labels[-1] < 0:
+            return "between strokes"
+        stroke = self._plan.strokes[int(labels[-1])]
+        speed = f" at {stroke.speed:g} rad/s" if np.isfinite(stroke.speed) else ""
+        sheet = f", piece {stroke.sheet + 1}" if stroke.sheet >= 0 else ""
+        of = f"stroke {stroke.index + 1} of {len(self._plan.strokes)}{sheet}"
+        return f"{stroke.kind}{speed} ({of})"
+
+
+def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
+    config = servo_config(recipe, link.identity)
+    longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
+    return open_motion(link, config, longest_reference=longest)
+
+
+def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
+    report = motion.report()
+    recorder.finish(report.overrun)
+    return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
+
+
+def _silent(done: float, sentence: str, coverage: CoverageGrid) -> None:
+    pass

@@ -1,0 +1,160 @@
+"""The servo in this process and in virtual time: one exchange, one tick."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples
+from scissorcal.device.paths import Reference
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import (
+    SAMPLE_DTYPE,
+    ConfigKey,
+    Identity,
+    Mode,
+    ModelTables,
+    Servo,
+    ServoConfig,
+    StopReason,
+)
+
+FAREWELLS = 3
+
+
+@runtime_checkable
+class Exchanging(Protocol):
+    """A link in virtual time: each exchange is one tick."""
+
+    @property
+    def identity(self) -> Identity: ...
+
+    @property
+    def garbled(self) -> int: ...
+
+    @property
+    def virtual_time(self) -> float: ...
+
+    def configure(self, key: int, value: float) -> float: ...
+
+    def exchange(self, command_frame: bytes | None) -> list[bytes]: ...
+
+
+class LockstepMotion(Motion):
+    """Runs the same servo as the loop does, frame by frame; made by open_motion.
+
+    The host's clock is the virtual one, in nanoseconds since the rig was switched on.
+    """
+
+    def __init__(self, link: Exchanging, config: ServoConfig, tables: ModelTables | None) -> None:
+        super().__init__(link.identity)
+        self._link = link
+        self._servo = Servo(tables, config)
+        self._frame: bytes | None = None
+        self._ticks = max(1, round(BLOCK_S / self.tick_s))
+        self._failure: DeviceError | None = None
+        self._last_sequence = -1
+        self._garbled_before = link.garbled
+        link.configure(ConfigKey.STREAM, 1.0)
+        self.step()
+
+    @property
+    def mode(self) -> Mode:
+        return self._servo.mode
+
+    @property
+    def track_index(self) -> int:
+        return self._servo.track_index
+
+    @property
+    def stop_reason(self) -> StopReason:
+        return StopReason.HANGUP if self._failure else self._servo.stop_reason
+
+    @property
+    def garbled(self) -> int:
+        return self._link.garbled - self._garbled_before
+
+    def engage(self, mode: Mode) -> None:
+        self._servo.engage(mode)
+
+    def set_reference(self, reference: Reference) -> None:
+        self._leave_track()
+        self._servo.set_reference(
+            reference.opening, reference.opening_rate, reference.advance, reference.stroke
+        )
+
+    def fresh_sheet(self, crack: float = 0.0) -> None:
+        self._servo.fresh_sheet(crack)
+
+    def configure(self, key: int, value: float) -> float:
+        return self._link.configure(key, value)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Virtual time stands still in a pause."""
+        self.engage(Mode.IDLE)
+        self.step()
+        yield
+
+    def report(self) -> MotionReport:
+        return MotionReport(
+            counters=self._servo.counters,
+            ledger=self._servo.ledger,
+            stop_reason=self.stop_reason,
+            garbled=self.garbled,
+            stalls=0,
+            unsent=0,
+            overrun=0,
+            latency=None,
+            interval=None,
+        )
+
+    def close(self) -> None:
+        if self._failure is not None:
+            return
+        self._servo.stop()
+        try:
+            for _ in range(FAREWELLS):
+                self._exchange()
+            self._link.configure(ConfigKey.STREAM, 0.0)
+        except DeviceError as error:
+            self._failure = error
+
+    def _pass_time(self) -> Samples:
+        stopped = self.stop_reason is not StopReason.NONE
+        rows: list[bytes] = []
+        try:
+            for _ in range(0 if stopped else self._ticks):
+                rows += self._exchange()
+        except DeviceError as error:
+            self._failure = error
+        samples = np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE)
+        return self._without_repeats(samples)
+
+    def _exchange(self) -> list[bytes]:
+        """Let one tick pass: send the newest command, take what arrives, give its samples."""
+        payloads = self._link.exchange(self._frame)
+        self._frame = None
+        rows = []
+        for payload in payloads:
+            now_ns = round(1e9 * self._link.virtual_time)
+            self._frame = self._servo.answer(payload, host_time_ns=now_ns)
+            rows.append(self._servo.telemetry().tobytes())
+        return rows
+
+    def _without_repeats(self, samples: Samples) -> Samples:
+        """Drop the samples of repeated frames, for which the servo tells of the last one again."""
+        sequence = samples["sequence"].astype(np.int64)
+        fresh = np.diff(sequence, prepend=self._last_sequence) != 0
+        if len(sequence):
+            self._last_sequence = int(sequence[-1])
+        return np.asarray(samples[fresh])
+
+    def _stopped(self) -> DeviceError:
+        return self._failure or DeviceError(self.stop_reason.sentence)
+
+    def _leave_track(self) -> None:
+        if self.mode is Mode.TRACK:
+            self.engage(Mode.IDLE)
+            self.step()

@@ -1,0 +1,244 @@
+"""One way to run the servo on a rig, whether through a port in real time or in virtual time.
+
+A motion idles (motors off), tracks a reference, renders, or damps. In each of these it hands over
+samples in blocks, as they come.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.link import Link, PortLink
+from scissorcal.device.paths import Reference
+from scissorcal.device.trajectory import approach, check_reference
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import (
+    EnergyLedger,
+    Identity,
+    Mode,
+    ModelTables,
+    ServoConfig,
+    ServoCounters,
+    StopReason,
+)
+
+Samples = NDArray[np.void]
+
+BLOCK_S = 0.05
+SPARE_S = 30.0
+"""What a block of shared memory has room for beyond the longest reference: the way there."""
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Times in microseconds, from a frame's arrival to the command's departure; NaN if unknown."""
+
+    p50: float
+    p99: float
+    p999: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class MotionReport:
+    """How a motion went.
+
+    ``counters`` count frames and limits; ``garbled`` frames were thrown away, ``stalls`` are
+    pauses of more than five ticks between frames by the host's clock, ``overrun`` samples were
+    overwritten before they were fetched. ``latency`` is None in virtual time, where it means
+    nothing.
+    """
+
+    counters: ServoCounters
+    ledger: EnergyLedger
+    stop_reason: StopReason
+    garbled: int
+    stalls: int
+    unsent: int
+    overrun: int
+    latency: Latency | None
+    interval: Latency | None
+
+
+class Motion(AbstractContextManager["Motion"], ABC):
+    """The servo at work on a rig; leaving the context switches the motors off.
+
+    ``identity`` says whose rig it is, ``position`` where it stood last (opening in rad, advance
+    in m). Everything that yields samples raises DeviceError once the servo has stopped by itself,
+    after the last sample has been handed over.
+    """
+
+    identity: Identity
+
+    def __init__(self, identity: Identity) -> None:
+        self.identity = identity
+        self._position: tuple[float, float] | None = None
+        self._way_there = 0
+
+    @property
+    def tick_s(self) -> float:
+        """Seconds between two frames of the device."""
+        return self.identity.tick_us * 1e-6
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Opening (rad) and advance (m) of the last sample; DeviceError if there was none."""
+        if self._position is None:
+            raise DeviceError("The device has not said yet where it stands.")
+        return self._position
+
+    @property
+    def way_there(self) -> int:
+        """Ticks that the way to the reference takes, before it begins itself."""
+        return self._way_there
+
+    def idle(self, seconds: float) -> Iterator[Samples]:
+        """Switch the motors off and yield what comes for ``seconds`` of the device's time."""
+        self.engage(Mode.IDLE)
+        yield from self._for_ticks(round(seconds / self.tick_s))
+
+    def track(self, reference: Reference) -> Iterator[Samples]:
+        """Follow a reference from where the rig stands, smoothly, to its end; then motors off.
+
+        Goes to the reference's start first (stroke -1). Raises InputError, before anything moves,
+        if the reference leaves the device's limits.
+        """
+        way = approach(*self.position, reference, self.tick_s)
+        whole = way + reference
+        check_reference(reference, self.identity)
+        self._way_there = len(way)
+        self.set_reference(whole)
+        self.engage(Mode.TRACK)
+        while not (self.mode is Mode.TRACK and self.track_index >= len(whole) - 1):
+            if self.mode is Mode.DAMP:
+                raise DeviceError(
+                    "The servo fell back to damping because this process was too late to show that "
+                    "it lives: close what keeps the computer busy, and start again."
+                )
+            yield self.step()
+        yield from self.idle(BLOCK_S)
+
+    def render(self, seconds: float) -> Iterator[Samples]:
+        """Render the model for ``seconds`` of the device's time; then motors off."""
+        self.engage(Mode.RENDER)
+        yield from self._for_ticks(round(seconds / self.tick_s))
+        yield from self.idle(BLOCK_S)
+
+    def step(self) -> Samples:
+        """Let about 50 ms pass and return the samples that came; shows that the host lives."""
+        samples = self._pass_time()
+        if len(samples):
+            last = samples[-1]
+            self._position = (float(last["opening"]), float(last["advance"]))
+        elif self.stop_reason is not StopReason.NONE:
+            raise self._stopped()
+        return samples
+
+    @abstractmethod
+    def engage(self, mode: Mode) -> None:
+        """Order a mode; it holds from the next frame on."""
+
+    @abstractmethod
+    def set_reference(self, reference: Reference) -> None:
+        """Set what TRACK follows; not while it does."""
+
+    @abstractmethod
+    def fresh_sheet(self, crack: float = 0.0) -> None:
+        """Put the rendered crack at ``crack`` (m)."""
+
+    @abstractmethod
+    def configure(self, key: int, value: float) -> float:
+        """Set a value of the device and return what is in force; DeviceError if it refuses."""
+
+    @abstractmethod
+    def paused(self) -> AbstractContextManager[None]:
+        """Motors off while somebody else has the word; the samples of that time are dropped."""
+
+    @abstractmethod
+    def report(self) -> MotionReport:
+        """How it has gone so far."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Motors off, streaming off; the link stays open."""
+
+    @property
+    @abstractmethod
+    def mode(self) -> Mode:
+        """The mode in force."""
+
+    @property
+    @abstractmethod
+    def track_index(self) -> int:
+        """How many ticks of the reference have passed."""
+
+    @property
+    @abstractmethod
+    def stop_reason(self) -> StopReason:
+        """Why the servo stopped, NONE while it has not."""
+
+    @property
+    @abstractmethod
+    def garbled(self) -> int:
+        """Frames thrown away so far."""
+
+    @abstractmethod
+    def _pass_time(self) -> Samples: ...
+
+    @abstractmethod
+    def _stopped(self) -> DeviceError: ...
+
+    def _for_ticks(self, ticks: int) -> Iterator[Samples]:
+        first: int | None = None
+        passed = 0
+        while passed < ticks:
+            samples = self.step()
+            if len(samples):
+                first = int(samples["sequence"][0]) if first is None else first
+                passed = (int(samples["sequence"][-1]) - first) % 2**32 + 1
+            yield samples
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def open_motion(
+    link: Link,
+    config: ServoConfig,
+    tables: ModelTables | None = None,
+    *,
+    longest_reference: int = 0,
+) -> Motion:
+    """Start the servo on a link: in a process of its own on a port, in this one in virtual time.
+
+    ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It begins idle, and
+    knows where the rig stands. A fault that the device has latched is cleared.
+
+    >>> from scissorcal.device.lockstep import LockstepLink
+    >>> link = LockstepLink("office-paper", np.random.default_rng(1))
+    >>> limits = ServoConfig(torque_limit=1, torque_slew=200, force_limit=0, force_slew=0)
+    >>> with open_motion(link, limits) as motion:
+    ...     samples = np.concatenate(list(motion.idle(0.2)))
+    >>> len(samples), bool(samples["torque_command"].any())
+    (200, False)
+    """
+    from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
+    from scissorcal.device.port_motion import PortMotion
+
+    if isinstance(link, Exchanging):
+        return LockstepMotion(link, config, tables)
+    if not isinstance(link, PortLink):
+        raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
+    return PortMotion(
+        link, config, tables, longest_reference + round(SPARE_S * 1e6 / config.tick_us)
+    )

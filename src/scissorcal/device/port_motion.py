@@ -1,0 +1,165 @@
+"""The servo on a port, in real time: a process of its own does the work, this one watches."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from scissorcal.device.link import PortLink, check_echo
+from scissorcal.device.motion import Latency, Motion, MotionReport, Samples
+from scissorcal.device.paths import Reference
+from scissorcal.device.servo_process import ServoProcess
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import (
+    ConfigKey,
+    Histogram,
+    LoopBlock,
+    Mode,
+    ModelTables,
+    ServoConfig,
+    StopReason,
+)
+
+DRAIN_S = 0.05
+CONFIGURE_ATTEMPTS = 3
+IDLE_TIMEOUT_S = 2.0
+
+
+class PortMotion(Motion):
+    """Steers a ServoProcess through its block; made by open_motion."""
+
+    def __init__(
+        self, link: PortLink, config: ServoConfig, tables: ModelTables | None, capacity: int
+    ) -> None:
+        super().__init__(link.identity)
+        self._link = link
+        self._block = LoopBlock.create(config, tables, reference_capacity=capacity)
+        self._process = ServoProcess(link, self._block)
+        self._drain_at = 0.0
+        self._final: MotionReport | None = None
+        try:
+            self._process.start()
+            while self._position is None:
+                self.step()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the servo."""
+        return self._process.pid
+
+    @property
+    def mode(self) -> Mode:
+        return self._block.mode
+
+    @property
+    def track_index(self) -> int:
+        return self._block.track_index
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """As the loop says; SUPERVISOR_LOST never, HANGUP where its process died."""
+        if not self._process.alive and self._block.stop_reason is StopReason.NONE:
+            return StopReason.HANGUP
+        return self._block.stop_reason
+
+    @property
+    def garbled(self) -> int:
+        return self._block.line.garbled
+
+    def engage(self, mode: Mode) -> None:
+        self._block.engage(mode)
+
+    def set_reference(self, reference: Reference) -> None:
+        if self.mode is Mode.TRACK:
+            self._go_idle()
+        self._block.set_reference(
+            reference.opening, reference.opening_rate, reference.advance, reference.stroke
+        )
+
+    def fresh_sheet(self, crack: float = 0.0) -> None:
+        self._block.fresh_sheet(crack)
+
+    def configure(self, key: int, value: float) -> float:
+        for _ in range(CONFIGURE_ATTEMPTS):
+            echo = self._block.configure(key, value)
+            if echo is not None:
+                check_echo(self._link.name, echo, key, value)
+                return echo.value
+            if self.stop_reason is not StopReason.NONE:
+                raise self._stopped()
+        raise DeviceError(
+            f"{self._link.name} did not confirm setting {key:#x} = {value:g} while it streamed: "
+            "check the cable."
+        )
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Motors off, heart kept beating by a thread, and what was sampled meanwhile dropped."""
+        self._go_idle()
+        with self._process.kept_alive():
+            yield
+        self._block.read()
+        self._drain_at = 0.0
+
+    def report(self) -> MotionReport:
+        if self._final is not None:
+            return self._final
+        block, line = self._block, self._block.line
+        return MotionReport(
+            counters=block.counters,
+            ledger=block.ledger,
+            stop_reason=block.stop_reason,
+            garbled=line.garbled,
+            stalls=line.stalls,
+            unsent=line.unsent,
+            overrun=line.lost_samples,
+            latency=_latency(block.latency),
+            interval=_latency(block.interval),
+        )
+
+    def close(self) -> None:
+        if self._final is not None:
+            return
+        self._process.close()
+        self._final = self.report()
+        self._block.close()
+        with suppress(DeviceError):  # an unplugged device has stopped streaming anyway
+            self._link.configure(ConfigKey.STREAM, 0.0)
+            self._link.flush()
+
+    def _pass_time(self) -> Samples:
+        """Wait until 50 ms after the last call, or less if the loop has ended; drain the ring."""
+        self._block.beat()
+        self._drain_at = max(self._drain_at + DRAIN_S, time.monotonic())
+        while (left := self._drain_at - time.monotonic()) > 0 and self._process.alive:
+            time.sleep(min(left, 0.01))
+            self._block.beat()
+        return self._block.read()
+
+    def _stopped(self) -> DeviceError:
+        if not self._process.alive and self._block.stop_reason is StopReason.NONE:
+            return self._process.why_dead()
+        return DeviceError(f"{self._link.name}: {self._block.stop_reason.sentence}")
+
+    def _go_idle(self) -> None:
+        """Switch the motors off and wait until that holds."""
+        self.engage(Mode.IDLE)
+        until = time.monotonic() + IDLE_TIMEOUT_S
+        while self.mode is not Mode.IDLE:
+            self._block.beat()
+            if self.stop_reason is not StopReason.NONE:
+                raise self._stopped()
+            if time.monotonic() > until:
+                raise DeviceError(f"{self._link.name} sends no frames: restart the device.")
+            time.sleep(0.002)
+
+
+def _latency(histogram: Histogram) -> Latency:
+    return Latency(
+        histogram.quantile(0.5),
+        histogram.quantile(0.99),
+        histogram.quantile(0.999),
+        histogram.largest_us if histogram.total else float("nan"),
+    )

@@ -1,0 +1,114 @@
+"""Between a motion and a recording: appends samples, counts coverage, notes what went wrong."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.coverage import CoverageGrid
+from scissorcal.kernel import StateFlag
+from scissorcal.recording import RecordingWriter
+
+NOTES_OF_A_KIND = 10
+U32 = 2**32
+
+
+@dataclass
+class Tally:
+    """What a capture met: gaps and the frames lost in them, faults, and the frames garbled."""
+
+    gaps: int = 0
+    lost: int = 0
+    faults: int = 0
+    garbled: int = 0
+
+
+class Recorder:
+    """Takes blocks of samples as they come and keeps the writer's file close behind.
+
+    Each gap, fault and garbled frame becomes a note at once, so that it survives a killed
+    capture; after ten of a kind only the total is noted, at the end.
+    """
+
+    def __init__(self, writer: RecordingWriter, coverage: CoverageGrid) -> None:
+        self.writer = writer
+        self.coverage = coverage
+        self.tally = Tally()
+        self.last: NDArray[np.void] | None = None
+        self._faulty = False
+        self._enabled_once = False
+
+    @property
+    def sample_count(self) -> int:
+        """Samples recorded so far."""
+        return self.writer.sample_count
+
+    def take(self, samples: NDArray[np.void], garbled: int = 0) -> None:
+        """Record a block; ``garbled`` is the number of frames thrown away since the start."""
+        if len(samples) == 0:
+            self.writer.poll(time.time_ns())
+        else:
+            self._note_gaps(samples)
+            self._note_faults(samples)
+            self.writer.append(samples)
+            self.coverage.add(samples)
+            self.last = samples[-1:].copy()
+        if garbled > self.tally.garbled:
+            self.tally.garbled = garbled
+            self._note(garbled, f"{garbled} frames had arrived garbled by {self._when()}.")
+
+    def resume(self, sentence: str) -> None:
+        """Begin anew after a pause in which nothing was recorded; it counts as no gap."""
+        if self.last is not None:
+            self.writer.note(f"Paused at {self._when()}: {sentence}")
+        self.last = None
+
+    def finish(self, overrun: int = 0) -> None:
+        """Note the totals; ``overrun`` counts samples that were never fetched from the loop."""
+        tally = self.tally
+        if tally.gaps > NOTES_OF_A_KIND:
+            self.writer.note(f"{tally.lost} frames were lost in {tally.gaps} gaps in all.")
+        if tally.garbled > NOTES_OF_A_KIND:
+            self.writer.note(f"{tally.garbled} frames arrived garbled in all.")
+        if tally.faults > NOTES_OF_A_KIND:
+            self.writer.note(f"The device latched a fault {tally.faults} times in all.")
+        if overrun:
+            self.writer.note(f"{overrun} samples were lost because the disk was too slow.")
+
+    def _note_gaps(self, samples: NDArray[np.void]) -> None:
+        sequence = samples["sequence"].astype(np.int64)
+        first = sequence[0] if self.last is None else int(self.last["sequence"][0])
+        steps = np.diff(sequence, prepend=first) % U32
+        for index in np.flatnonzero((steps > 1) & (steps < U32 // 2)):
+            missing = int(steps[index]) - 1
+            self.tally.gaps += 1
+            self.tally.lost += missing
+            at = f"frame {sequence[index]} ({self._sample_time(samples[index]):.3f} s)"
+            self._note(self.tally.gaps, f"{missing} frames are missing before {at}.")
+
+    def _note_faults(self, samples: NDArray[np.void]) -> None:
+        """Note each time a fault latches after the motors were first enabled."""
+        faulty = (samples["flags"] & int(StateFlag.FAULT_LATCHED)) != 0
+        enabled = (samples["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
+        since = np.logical_or.accumulate(enabled | self._enabled_once)
+        before = np.concatenate([[self._faulty], faulty[:-1]])
+        for index in np.flatnonzero(faulty & ~before & since):
+            self.tally.faults += 1
+            flags = StateFlag(int(samples["flags"][index]) & 0xFFFF)
+            names = ", ".join(flag.name or "" for flag in flags)
+            at = f"{self._sample_time(samples[index]):.3f} s"
+            self._note(self.tally.faults, f"The device latched a fault at {at} ({names}).")
+        self._faulty = bool(faulty[-1])
+        self._enabled_once = bool(since[-1])
+
+    def _note(self, number: int, sentence: str) -> None:
+        if number <= NOTES_OF_A_KIND:
+            self.writer.note(sentence)
+
+    def _when(self) -> str:
+        return "the start" if self.last is None else f"{self._sample_time(self.last[0]):.3f} s"
+
+    @staticmethod
+    def _sample_time(sample: np.void) -> float:
+        return float(sample["device_time_us"]) * 1e-6

@@ -1,0 +1,150 @@
+"""The servo loop in a process of its own: started, kept alive, watched, ended, cleaned up."""
+
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Self
+
+from scissorcal.device.link import PortLink
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Config, ConfigKey, LoopBlock, StopReason
+
+START_TIMEOUT_S = 30.0
+STREAM_TIMEOUT_S = 2.0
+STOP_TIMEOUT_S = 2.0
+ASK_AGAIN_S = 0.2
+BEAT_S = 0.02
+
+
+class ServoProcess:
+    """Runs the loop on a link's port in another process; a context manager.
+
+    The process has the port to itself from :meth:`start` to :meth:`close`. It gets no Ctrl-C (it
+    stands in a session of its own); when this process dies, the missing heartbeat stops it.
+    """
+
+    def __init__(self, link: PortLink, block: LoopBlock) -> None:
+        self._link = link
+        self._block = block
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close()
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the loop; None before the start."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process still runs."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Start the loop, let the device stream, and wait for its first state.
+
+        Raises DeviceError if the process does not start or the device sends nothing.
+        """
+        self._link.configure(ConfigKey.STREAM, 0.0)
+        self._link.flush()
+        line, memory = self._link.fileno(), self._block.fileno()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "scissorcal.device.servo_main", str(line), str(memory)],
+            pass_fds=(line, memory),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self._errors,
+            start_new_session=True,
+        )
+        self._await_loop()
+        self._begin_streaming()
+
+    def close(self) -> None:
+        """Ask the loop to release the motors and end; kill it if it does not. Twice is fine."""
+        process, self._process = self._process, None
+        if process is not None:
+            self._block.stop()
+            try:
+                process.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        self._errors.close()
+
+    @contextmanager
+    def kept_alive(self) -> Iterator[None]:
+        """Let a thread show the loop that this process lives, while the caller is busy."""
+        over = threading.Event()
+
+        def beat() -> None:
+            while not over.wait(BEAT_S):
+                self._block.beat()
+
+        thread = threading.Thread(target=beat, name="servo-heartbeat", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def why_dead(self) -> DeviceError:
+        """Say how the process ended, for when it ended by itself."""
+        self._errors.seek(0)
+        lines = self._errors.read().decode(errors="replace").strip().splitlines()
+        code = None if self._process is None else self._process.poll()
+        how = f"was killed by signal {-code}" if code and code < 0 else f"ended with code {code}"
+        said = f" It said: {lines[-1]}" if lines else ""
+        return DeviceError(
+            f"The servo's process {how}; without commands the device brakes by itself.{said}"
+        )
+
+    def _await_loop(self) -> None:
+        until = time.monotonic() + START_TIMEOUT_S
+        while not self._block.running:
+            if not self.alive:
+                raise self.why_dead()
+            if time.monotonic() > until:
+                raise DeviceError(
+                    f"The servo's process did not begin within {START_TIMEOUT_S:g} s: this machine "
+                    "is too busy."
+                )
+            self._block.beat()
+            time.sleep(0.002)
+
+    def _begin_streaming(self) -> None:
+        """Ask for the stream until states arrive; only the loop reads, so no echo is awaited."""
+        until = time.monotonic() + STREAM_TIMEOUT_S
+        ask_at = time.monotonic()
+        while self._block.counters.frames == 0:
+            if time.monotonic() >= ask_at:
+                ask_at += ASK_AGAIN_S
+                self._link.send(Config(ConfigKey.STREAM, 0, 1.0))
+            if not self.alive:
+                raise self.why_dead()
+            if self._block.stop_reason is not StopReason.NONE or time.monotonic() > until:
+                raise DeviceError(
+                    f"{self._link.name} was asked to stream and sends no state: restart the device."
+                )
+            self._block.beat()
+            time.sleep(0.002)
+
+    def __enter__(self) -> Self:
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
