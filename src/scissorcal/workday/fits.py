@@ -132,6 +132,11 @@ def _fit(
     if not usable.recordings:
         raise MissingError(_nothing_captured(workspace, what, usable.left_out))
     friction = load_fit(workspace.fit_path("friction")) if what == "cut" else None
+    if friction is not None and friction.position_unit != "rad":
+        raise InputError(
+            f"{workspace.fit_path('friction')} is of a linear joint, which carries no blades: the "
+            "fit of a cut needs friction of the rig that cuts."
+        )
     path = workspace.fit_path(what)
     upstream = friction.inputs_hash if friction else ""
     if path.is_file() and not force:

@@ -92,6 +92,11 @@ def _capture_step(
             return Step(name, "stale", "recorded with another recipe", why, command)
         return Step(name, "missing", "nothing recorded yet", why, command)
     for recording in usable.recordings:
+        if recording.joint.kind != recipe.rig.joint:
+            notes.append(
+                f"{recording.source} is of a {recording.joint.kind} joint, and the recipe says "
+                f'otherwise: set joint = "{recording.joint.kind}" in its [rig].'
+            )
         notes.extend(f"{recording.source}: {sentence}" for sentence in recording.notes)
     seconds = sum(recording.duration_s for recording in usable.recordings)
     count = len(usable.recordings)

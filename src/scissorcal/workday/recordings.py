@@ -30,7 +30,7 @@ def usable_recordings(workspace: Workspace, recipe: Recipe, kind: CaptureKind) -
 
     A recording is set aside where the recipe at its capture names another rig, material or scene
     (`capture_facts`); an import carries no recipe and is always used. Raises InputError where a
-    file cannot be read as a recording.
+    file cannot be read as a recording, or where turning and sliding joints are mixed.
     """
     used, left_out = [], []
     for path in workspace.recordings(kind):
@@ -40,6 +40,13 @@ def usable_recordings(workspace: Workspace, recipe: Recipe, kind: CaptureKind) -
             left_out.append(f"{workspace.relative(path)} is not used: {changed}.")
         else:
             used.append(recording)
+    joints = {recording.joint.kind: recording.source for recording in used}
+    if len(joints) > 1:
+        raise InputError(
+            f"{workspace.captures_dir} has {kind} recordings of a rotary joint "
+            f"({joints['rotary']}) and of a linear one ({joints['linear']}), which no fit can "
+            "take together: move one of them away."
+        )
     return Usable(tuple(used), tuple(left_out))
 
 
@@ -62,11 +69,6 @@ def _read(path: Path, _modified_ns: int, _size: int) -> "Recording":
 def _changed(recording: "Recording", recipe: Recipe, kind: CaptureKind) -> str:
     """Say what the recipe names differently now; empty where nothing is."""
     if not recording.recipe_toml:
-        if recording.joint.kind != recipe.rig.joint:
-            return (
-                f"its joint is {recording.joint.kind}, and the recipe says "
-                f"rig.joint = {recipe.rig.joint}"
-            )
         return ""
     from scissorcal.recipe.load import parse_recipe
 

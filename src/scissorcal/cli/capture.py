@@ -1,0 +1,143 @@
+"""``scissorcal capture``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import device_option, seed_option, workspace_option
+from scissorcal.cli.output import Answer, command, note
+
+if TYPE_CHECKING:
+    from scissorcal.recipe.requirements import CaptureKind
+    from scissorcal.workday.captures import Captured
+    from scissorcal.workday.workspace import Workspace
+
+_COMMANDS = {
+    "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
+    "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
+}
+
+yes_option = click.option(
+    "--yes", is_flag=True, help="Ask nobody: blades are clear and material is loaded."
+)
+
+
+@click.group("capture", cls=LazyGroup, lazy=_COMMANDS)
+def capture() -> None:
+    """Record friction or cuts from a rig."""
+
+
+@click.command("friction")
+@device_option
+@yes_option
+@seed_option
+@workspace_option
+@command
+def friction(device: str, yes: bool, seed: int, folder: Path | None) -> Answer:
+    """Record empty closing and opening at several speeds, then excited motion for the inertia.
+
+    Nothing may lie between the blades: the motors will move them.
+
+    \b
+    Example:
+      $ scissorcal capture friction --device sim
+      captures/friction-20260102T030405Z.mcap: 110341 samples
+      80 of 80 cells filled
+    """
+    return _capture("friction", device, hand=False, yes=yes, seed=seed, folder=folder)
+
+
+@click.command("cut")
+@device_option
+@click.option("--hand", is_flag=True, help="Motor off: a person (or the virtual hand) cuts.")
+@yes_option
+@seed_option
+@workspace_option
+@command
+def cut(device: str, hand: bool, yes: bool, seed: int, folder: Path | None) -> Answer:
+    """Record strokes through fresh sheets at the recipe's speeds, or presses.
+
+    Says when to put a fresh sheet in; a virtual rig does so by itself.
+
+    \b
+    Example:
+      $ scissorcal capture cut --device sim
+      captures/cut-20260102T031500Z.mcap: 98012 samples
+      24 of 24 cells filled
+    """
+    return _capture("cut", device, hand=hand, yes=yes, seed=seed, folder=folder)
+
+
+def _capture(
+    kind: "CaptureKind", device: str, *, hand: bool, yes: bool, seed: int, folder: Path | None
+) -> Answer:
+    from scissorcal.cli.capture_view import CaptureView
+    from scissorcal.workday.captures import capture_into
+
+    workspace = open_workspace(folder)
+    before = set(workspace.recordings(kind))
+    try:
+        with CaptureView(ask=not yes) as view:
+            captured = capture_into(
+                workspace,
+                kind,
+                device,
+                hand=hand,
+                seed=seed,
+                progress=view.show,
+                confirm=view.confirm,
+            )
+    except BaseException:
+        _say_what_is_kept(workspace, set(workspace.recordings(kind)) - before)
+        raise
+    return Answer(_facts(captured), _text(workspace, captured), files=[captured.path])
+
+
+def _say_what_is_kept(workspace: "Workspace", kept: set[Path]) -> None:
+    for path in sorted(kept):
+        note(f"What was recorded until then is kept in {workspace.relative(path)}.")
+
+
+def _text(workspace: "Workspace", captured: "Captured") -> str:
+    report = captured.report
+    lines = [
+        f"{workspace.relative(captured.path)}: {report.sample_count} samples from {captured.rig}",
+        report.coverage.sentence(),
+    ]
+    tally = report.tally
+    if tally.lost or tally.garbled or tally.faults:
+        lines.append(
+            f"{tally.lost} frames lost in {tally.gaps} gaps, {tally.garbled} garbled, "
+            f"{tally.faults} faults latched"
+        )
+    latency = report.motion.latency
+    if latency is not None:
+        lines.append(
+            f"answered a frame within {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
+            f"{latency.worst:.0f} us (worst)"
+        )
+    return "\n".join(lines)
+
+
+def _facts(captured: "Captured") -> dict[str, Any]:
+    report = captured.report
+    grid = report.coverage
+    return {
+        "recording": captured.path,
+        "rig": captured.rig,
+        "samples": report.sample_count,
+        "coverage": {
+            "share": grid.share,
+            "directions": grid.directions,
+            "speeds_rad_per_s": grid.speeds,
+            "opening_cells_rad": grid.cells,
+            "seconds": grid.seconds,
+            "needed_s": grid.needed_s,
+            "sentence": grid.sentence(),
+        },
+        "tally": report.tally,
+        "motion": report.motion,
+    }

@@ -1,0 +1,59 @@
+"""Take a capture into a workspace: rig, recording, and what is kept when something goes wrong."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.load import read_text
+from scissorcal.recipe.requirements import CaptureKind, requirements
+from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.device.capture import CaptureProgress, CaptureReport
+    from scissorcal.device.loading import Confirm
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A finished capture: its file, its report, and the rig it was taken from."""
+
+    path: Path
+    report: "CaptureReport"
+    rig: str
+
+
+def capture_into(
+    workspace: Workspace,
+    kind: CaptureKind,
+    device: str,
+    *,
+    hand: bool = False,
+    seed: int = 0,
+    progress: "CaptureProgress | None" = None,
+    confirm: "Confirm | None" = None,
+) -> Captured:
+    """Record friction or cuts from ``device`` into captures/<kind>-<stamp>.mcap.
+
+    ``device`` is a port, or "sim" for a virtual rig with the recipe's specimen. ``hand`` (cuts
+    only): motors off, a person or the virtual hand moves the handles. ``confirm`` asks a person to
+    load material; a virtual rig loads by itself. Whatever was recorded before an error stays in
+    the file.
+
+    Raises InputError where the scene needs no such capture, and what the capture itself raises.
+    """
+    from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+
+    recipe = workspace.recipe()
+    if not requirements(recipe).needs_capture(kind):
+        raise InputError(f"{workspace.recipe_path}: this scene needs no capture of {kind}.")
+    text = read_text(workspace.recipe_path)
+    with open_rig(device, recipe.specimen, seed) as link:
+        path = workspace.new_recording(kind)
+        with open_writer(path, kind, link, recipe, text, hand=hand) as writer:
+            if kind == "friction":
+                report = capture_friction(link, recipe, writer, progress, confirm=confirm)
+            else:
+                report = capture_cut(link, recipe, writer, hand, progress, confirm)
+        return Captured(path, report, f"{link.identity.name} {link.identity.serial}")
