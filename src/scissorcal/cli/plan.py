@@ -50,7 +50,7 @@ def _text(found: "Plan") -> str:
     lines = [f"{found.recipe}:", "", table(rows), ""]
     if found.tables:
         lines.append("tables to build: " + ", ".join(item.name for item in found.tables))
-    lines += [f"left out: {item.name} ({item.why})" for item in found.left_out]
+    lines += [f"left out: {item.name}, as {item.why}" for item in found.left_out]
     lines += [f"note: {note}" for note in found.notes]
-    lines += ["", f"next: {found.next_command or 'nothing; scissorcal render is ready to run'}"]
+    lines += ["", f"next: {found.next_command or 'nothing is left to do'}"]
     return "\n".join(lines)

@@ -1,6 +1,7 @@
 """What a scene requires of the day: done, missing or stale, in order, and what comes next."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
@@ -91,18 +92,19 @@ def _capture_step(
         if usable.left_out:
             return Step(name, "stale", "recorded with another recipe", why, command)
         return Step(name, "missing", "nothing recorded yet", why, command)
-    for recording in usable.recordings:
-        if recording.joint.kind != recipe.rig.joint:
+    files = [workspace.relative(Path(recording.source)) for recording in usable.recordings]
+    for file, recording in zip(files, usable.recordings, strict=True):
+        joint = recording.joint.kind
+        if joint != recipe.rig.joint:
             notes.append(
-                f"{recording.source} is of a {recording.joint.kind} joint, and the recipe says "
-                f'otherwise: set joint = "{recording.joint.kind}" in its [rig].'
+                f"{file} is of a {joint} joint, and the recipe says otherwise: set "
+                f'joint = "{joint}" in its [rig].'
             )
-        notes.extend(f"{recording.source}: {sentence}" for sentence in recording.notes)
+        notes.extend(f"{file}: {sentence}" for sentence in recording.notes)
     seconds = sum(recording.duration_s for recording in usable.recordings)
     count = len(usable.recordings)
     state = f"{count} recording{'s' if count > 1 else ''}, {seconds:.0f} s"
-    files = tuple(recording.source for recording in usable.recordings)
-    return Step(name, "done", state, why, command, files)
+    return Step(name, "done", state, why, command, tuple(files))
 
 
 def _fit_step(

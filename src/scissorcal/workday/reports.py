@@ -1,9 +1,60 @@
 """Write a workspace's report, and tell which fits a report shows."""
 
 import json
-from typing import Any
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from scissorcal.workday.workspace import Workspace
+from scissorcal.errors import InputError
+from scissorcal.recipe.load import read_text
+from scissorcal.recipe.requirements import requirements
+from scissorcal.verdicts import Verdict
+from scissorcal.workday.fits import current_fits
+from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.workspace import FitKind, Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.report import FactSheet
+
+
+@dataclass(frozen=True)
+class Reported:
+    """The report's two files, and every verdict that it shows."""
+
+    html: Path
+    json: Path
+    verdicts: tuple[Verdict, ...]
+
+
+def write_workspace_report(workspace: Workspace, *, now: datetime | None = None) -> Reported:
+    """Write report/report.html and report/report.json from the workspace's fits and package.
+
+    Raises MissingError where a fit that the scene requires is missing or has fallen behind.
+    """
+    from scissorcal.report import build_report
+
+    recipe = workspace.recipe()
+    fits = current_fits(workspace, recipe)
+    kinds: list[FitKind] = list(fits)
+    recordings = [
+        recording
+        for kind in kinds
+        for recording in usable_recordings(workspace, recipe, kind).recordings
+    ]
+    sheets = _package_sheets(workspace)
+    files = build_report(
+        recipe,
+        list(fits.values()),
+        recordings,
+        workspace.report_html.parent,
+        created=now or datetime.now(UTC),
+        recipe_text=read_text(workspace.recipe_path),
+        sheets=sheets,
+    )
+    verdicts = [verdict for fit in fits.values() for verdict in fit.verdicts]
+    verdicts += [verdict for sheet in sheets for verdict in sheet.verdicts]
+    return Reported(files.html, files.json, tuple(verdicts))
 
 
 def reported_fits(workspace: Workspace) -> set[str]:
@@ -13,6 +64,29 @@ def reported_fits(workspace: Workspace) -> set[str]:
     except (OSError, ValueError):
         return set()
     return set(_values(facts, "inputs_hash"))
+
+
+def _package_sheets(workspace: Workspace) -> "list[FactSheet]":
+    """What the workspace's package promises, where there is one that can be opened."""
+    from scissorcal.package import check_package, open_package
+    from scissorcal.report import sheet_from_mapping
+
+    recipe = workspace.recipe()
+    path = workspace.package_path(recipe)
+    if not requirements(recipe).tables or not path.is_file():
+        return []
+    try:
+        manifest = open_package(path).manifest
+    except InputError as error:
+        return [sheet_from_mapping("Package", "package", {}, notes=[str(error)])]
+    facts = {
+        "file": workspace.relative(path),
+        "content hash": manifest.content_hash,
+        "error bound": manifest.bound.model_dump(),
+        "ranges": {key: list(value) for key, value in manifest.ranges.model_dump().items()},
+    }
+    verdicts = check_package(path)
+    return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts)]
 
 
 def _values(facts: Any, key: str) -> list[str]:
