@@ -1,5 +1,6 @@
 """What a scene requires: captures to take, fits to run, tables to build, and what is left out."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -105,3 +106,23 @@ def _linear_joint() -> Requirements:
         tables=(),
         left_out=tuple(Requirement(name, reason) for name in ("cut", "package")),
     )
+
+
+def capture_facts(recipe: Recipe, kind: CaptureKind) -> Mapping[str, object]:
+    """Return what a capture of one kind recorded, as far as the recipe says it.
+
+    Where these differ between the recipe at capture and the recipe now, the recording is of
+    something else and is no longer used. Settings that only say how much to record (speeds,
+    repeats, sheets) are not among them: what was recorded stays true.
+    """
+    rig = recipe.rig
+    facts: dict[str, object] = {
+        "rig.joint": rig.joint,
+        "rig.moving": rig.moving,
+        "rig.handle_radius_mm": rig.handle_radius_mm,
+    }
+    if kind == "cut":
+        facts["material.name"] = recipe.material.name
+        facts["material.thickness_mm"] = recipe.material.thickness_mm
+        facts["scene.cut"] = recipe.scene.cut
+    return facts
