@@ -16,20 +16,32 @@ from scissorcal.recipe.library import schemas_dir
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
-    "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
+    "manifest.schema.json": "scissorcal.package:manifest_schema_text",
+    "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
+    "recording.schema.json": "scissorcal.recording:recording_schema",
+    "report.schema.json": "scissorcal.report.twin:schema_text",
+    "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
 }
-"""File name, and the type (pydantic model or dataclass) that it is generated from."""
+"""File name, and where its schema comes from: a pydantic model or dataclass that is described, or
+a function that gives the schema itself, as an object or as text."""
 
 
 def generate(name: str) -> str:
-    """Return the text of one schema file, generated from its type."""
+    """Return the text of one schema file, generated from the code."""
+    module, _, attribute = SOURCES[name].partition(":")
+    source: Any = getattr(import_module(module), attribute)
+    schema: Any = _described(name, source) if isinstance(source, type) else source()
+    if isinstance(schema, str):
+        return schema
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def _described(name: str, kind: type) -> dict[str, Any]:
     from pydantic import TypeAdapter
 
-    module, _, attribute = SOURCES[name].partition(":")
-    adapter: TypeAdapter[Any] = TypeAdapter(getattr(import_module(module), attribute))
-    schema = {"$schema": DIALECT, "$id": name, **adapter.json_schema()}
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    adapter: TypeAdapter[Any] = TypeAdapter(kind)
+    return {"$schema": DIALECT, "$id": name, **adapter.json_schema()}
 
 
 def fallen_behind(folder: Path | None = None) -> list[Path]:
