@@ -75,6 +75,15 @@ def test_delimiters_and_headings_are_found(
     assert any("0 throughout: advance, handle_force" in note for note in recording.notes)
 
 
+def test_a_delimiter_may_be_named(tmp_path: Path) -> None:
+    for name, character in (("tab", "\t"), ("\\t", "\t"), ("space", " "), (":", ":"), (";", ";")):
+        path = written(tmp_path / "log.csv", rows(), character)
+        assert_holds(import_table(path, columns=COLUMNS, units=UNITS, delimiter=name), rows())
+    for nonsense in ("comma", ";;", "1", ".", '"'):
+        assert "cannot part the columns" in refusal(path, delimiter=nonsense)
+    assert "holds no row of numbers" in refusal(path, delimiter="|")
+
+
 def test_decimal_commas_quotes_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
     lines = ['"t";"angle";"torque"']
     lines += [";".join(f'"{value}"'.replace(".", ",") for value in row) for row in rows()]

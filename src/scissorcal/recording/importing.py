@@ -83,6 +83,7 @@ def import_table(
     else:
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
     strokes = _label(samples, joint, min_travel)
+    digest = content_hash(path)
     return Recording(
         kind=kind,
         samples=samples,
@@ -90,8 +91,8 @@ def import_table(
         joint=joint,
         handle_radius_m=handle_radius_m,
         source=str(path),
-        content_hash=content_hash(path),
-        notes=_notes(path, columns, quantities, samples, moved=bool(strokes)),
+        content_hash=digest,
+        notes=_notes(f"{path.name} (sha256:{digest[:16]})", columns, quantities, samples),
     )
 
 
@@ -159,8 +160,8 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
         raise InputError(
             f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s pass since the row "
             f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
-            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps to keep it as it is, with a note, "
-            "or export the log without losses."
+            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep it as it is, "
+            "with a note, or export the log without losses."
         )
     counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
     samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
@@ -195,16 +196,15 @@ def _label(samples: NDArray[np.void], joint: Joint, min_travel: float | None) ->
 
 
 def _notes(
-    path: Path,
+    source: str,
     columns: Mapping[str, str | int],
     quantities: Mapping[str, Quantity],
     samples: NDArray[np.void],
-    *,
-    moved: bool,
 ) -> tuple[str, ...]:
     missing = [channel for channel in CHANNELS if channel not in columns]
-    notes = [f"Imported from {path.name}: {describe(quantities)}."]
+    notes = [f"Imported from {source}: {describe(quantities)}."]
     notes += [f"Not in that file, and 0 throughout: {', '.join(missing)}."] if missing else []
     notes += [entry.note for entry in quantities.values() if entry.note]
-    notes += [] if moved else ["No stroke was found: the joint does not move enough."]
+    if samples["stroke"].max() < 0:
+        notes.append("No stroke was found: the joint does not move enough.")
     return (*notes, *gap_note(samples))

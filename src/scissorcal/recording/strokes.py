@@ -42,7 +42,7 @@ def label_strokes(
     >>> time = np.arange(0.0, 4.0, 0.01)
     >>> labels = label_strokes(np.cos(np.pi * time / 2), time, min_travel=0.1)
     >>> [(stroke.kind, round(stroke.speed, 2)) for stroke in labels.strokes]
-    [('closing', 1.36), ('opening', 1.36)]
+    [('closing', 1.35), ('opening', 1.35)]
     """
     position = np.asarray(opening, dtype=np.float64)
     seconds = np.asarray(time, dtype=np.float64)

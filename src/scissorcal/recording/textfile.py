@@ -33,7 +33,8 @@ def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table
     the comma does not part the cells.
     """
     comments, lines = _lines(path)
-    delimiter = delimiter or _find_delimiter([line.text for line in lines[-20:]])
+    tail = [line.text for line in lines[-20:]]
+    delimiter = _named(delimiter) if delimiter else _find_delimiter(tail)
     widths = Counter(len(_cells(line.text, delimiter)) for line in lines[-20:])
     width = widths.most_common(1)[0][0] if widths else 0
     start = next((i for i, line in enumerate(lines) if _is_row(line.text, delimiter, width)), None)
@@ -84,6 +85,17 @@ def _is_row(text: str, delimiter: str | None, width: int) -> bool:
     """
     numbers = [_is_number(cell) for cell in _cells(text, delimiter)]
     return all(numbers) or (len(numbers) == width and any(numbers))
+
+
+def _named(delimiter: str) -> str | None:
+    """Return the delimiter that a person means; "tab" and "space" have names."""
+    meant = {"tab": "\t", "\\t": "\t", "space": None, " ": None}.get(delimiter, delimiter)
+    if meant is not None and (len(meant) != 1 or meant.isalnum() or meant in "\"'+-.\n\r"):
+        raise InputError(
+            f"{delimiter!r} cannot part the columns of a table. Give one character such as ; or "
+            "the words tab or space."
+        )
+    return meant
 
 
 def _find_delimiter(rows: Sequence[str]) -> str | None:
