@@ -217,8 +217,8 @@ def test_messages_of_the_device_itself_are_ignored(host: Host) -> None:
 
 def test_dropped_and_garbled_frames_have_their_stated_share() -> None:
     host = Host(Faults(drop_share=0.1, garble_share=0.05))
-    while not host.device._values[ConfigKey.STREAM]:
-        host.say(Config(ConfigKey.STREAM, 1, 1.0))
+    while not host.say(Config(ConfigKey.STREAM, 1, 1.0)):
+        pass
     count = 10_000
     heard = 0
     for _ in range(count):

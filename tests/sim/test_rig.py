@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.hand import Phase
+from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque
@@ -210,6 +213,27 @@ def test_a_moving_cut_has_the_average_torque_of_the_judge() -> None:
     average = average_torque(truth, openings, 0.0, 0.0, friction=False)
     assert len(openings) > 1_500
     assert np.mean(torques) == pytest.approx(np.mean(average), rel=0.01)
+
+
+@pytest.mark.parametrize("kappa", [1.0, 0.9, 0.5])
+def test_each_run_of_the_crack_ends_exactly_at_its_arrest(kappa: float) -> None:
+    truth = specimen(material={"kappa": kappa, "toughness_variation": 0.1})
+    blade = BladeOnSheet(truth)
+    cut = Cut(blade, Sheet(truth.material, np.random.default_rng(2)))
+    runs = 0
+    for opening in np.radians(np.linspace(45.0, 12.0, 3_000)).tolist():
+        before, lost = cut.sheet.crack, cut.arrest_J
+        touch = cut.move_to(opening, -0.02)
+        assert touch.drive <= cut.sheet.fracture_energy_at(cut.sheet.crack) + 1e-9
+        if cut.sheet.crack > before:
+            runs += 1
+            assert cut.arrest_J >= lost
+            # the tip stopped on the way here and was loaded again since: never below arrest
+            arrest = kappa * cut.sheet.fracture_energy_at(cut.sheet.crack)
+            assert touch.drive >= arrest - 1e-8
+            if kappa == 1.0:
+                assert touch.drive == pytest.approx(arrest, abs=1e-8)
+    assert runs > 30
 
 
 def test_a_sheet_is_refused_while_the_blades_are_in_the_way() -> None:

@@ -15,6 +15,9 @@ from scissorcal.device.sim.material import Sheet
 
 RUNS_PER_STEP = 64
 PLACE_TOLERANCE = 1e-12
+SHORTEST_BRACKET = 1e-8
+FORCE_TOLERANCE_N = 1e-11
+DRIVE_TOLERANCE_N = 1e-8  # above what the last bit of a run's place may leave
 
 
 class Cut:
@@ -23,7 +26,7 @@ class Cut:
     ``fracture_J`` and ``arrest_J`` add up what the new surface took and what the stops lost.
     """
 
-    __slots__ = ("_drive", "_pose", "arrest_J", "blade", "fracture_J", "sheet")
+    __slots__ = ("_drive", "_pose", "_width", "arrest_J", "blade", "fracture_J", "sheet")
 
     def __init__(self, blade: BladeOnSheet, sheet: Sheet) -> None:
         self.blade = blade
@@ -32,6 +35,7 @@ class Cut:
         self.arrest_J = 0.0
         self._pose: tuple[float, float] | None = None
         self._drive = 0.0
+        self._width = SHORTEST_BRACKET
 
     def move_to(self, opening: float, advance: float) -> Touch:
         """Bring the blades to a pose, let the crack run if it must, and give the forces.
@@ -61,7 +65,7 @@ class Cut:
         start, drive = self._pose, self._drive
         for _ in range(RUNS_PER_STEP):
             cost = sheet.fracture_energy_at(sheet.crack)
-            if touch.drive <= cost or sheet.severed:
+            if touch.drive <= cost + DRIVE_TOLERANCE_N or sheet.severed:
                 return touch
             at = (opening, advance)
             if sheet.kappa < 1.0 and start is not None and drive < cost:
@@ -87,24 +91,28 @@ class Cut:
             drive = blade.touch(opening, place - advance).drive
             return drive - sheet.kappa * sheet.fracture_energy_at(place)
 
-        place = _first_fall(excess, before, sheet.length)
+        place = _first_fall(excess, before, sheet.length, self._width)
         if place is None:
             place = sheet.length
             sheet.severed = True
         sheet.crack = max(place, before)
+        self._width = max(1.2 * (sheet.crack - before), SHORTEST_BRACKET)
         work = sheet.kappa * sheet.work_between(before, sheet.crack)
         left = 0.0 if sheet.severed else blade.energy(opening, sheet.crack - advance)
         self.fracture_J += work
         self.arrest_J += stored - left - work
 
 
-def _first_fall(excess: Callable[[float], float], start: float, end: float) -> float | None:
+def _first_fall(
+    excess: Callable[[float], float], start: float, end: float, width: float
+) -> float | None:
     """First place after ``start`` at which ``excess`` is no longer positive; None before ``end``.
 
-    Widens a bracket step by step, then closes it by the Illinois form of regula falsi, which
-    needs no derivative and cannot leave the bracket.
+    Widens a bracket step by step, beginning with ``width`` (the last run is a good guess), then
+    closes it by the Illinois form of regula falsi, which needs no derivative and cannot leave the
+    bracket.
     """
-    low, high_value, width = start, 1.0, 5e-5
+    low = start
     low_value = excess(start)
     if low_value <= 0.0:
         return start
@@ -125,6 +133,8 @@ def _first_fall(excess: Callable[[float], float], start: float, end: float) -> f
         if not low < place < high:
             place = 0.5 * (low + high)
         value = excess(place)
+        if math.fabs(value) < FORCE_TOLERANCE_N:
+            return place
         if value > 0.0:
             low, low_value = place, value
             if side == 1:
@@ -135,6 +145,4 @@ def _first_fall(excess: Callable[[float], float], start: float, end: float) -> f
             if side == -1:
                 low_value *= 0.5
             side = -1
-        if math.fabs(value) < 1e-12:
-            break
     return high
