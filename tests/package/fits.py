@@ -70,17 +70,31 @@ def cut_fit(
     return _result("cut", values, structure, spread, seed, draws)
 
 
+RUNGS = {
+    "coulomb": ("inertia", "offset", "coulomb"),
+    "coulomb+viscous": ("inertia", "offset", "coulomb", "viscous"),
+    "stribeck": ("inertia", "offset", "coulomb", "viscous", "stribeck", "stribeck_rate"),
+    "stribeck+angle": tuple(FRICTION),
+}
+
+
 def friction_fit(
     *,
     law: str = "stribeck+angle",
+    symmetric: bool = True,
     spread: float = 0.03,
     seed: int = 2,
     draws: int = 400,
     **values: float,
 ) -> FitResult:
-    """A symmetric friction fit; keywords replace single parameters."""
-    structure = {"law": law, "symmetric": True, "joint": "rotary", "angle_center": 0.55}
-    kept = FRICTION | values
+    """A friction fit; keywords replace single parameters. Closing has 20 % more if asymmetric."""
+    structure = {"law": law, "symmetric": symmetric, "joint": "rotary", "angle_center": 0.55}
+    kept = {}
+    for name, value in ({key: FRICTION[key] for key in RUNGS[law]} | values).items():
+        if symmetric or name not in ("offset", "coulomb", "viscous"):
+            kept[name] = value
+        elif name != "offset":
+            kept[f"{name}_pos"], kept[f"{name}_neg"] = value, 1.2 * value
     return _result("friction", kept, structure, spread, seed, draws)
 
 

@@ -52,11 +52,20 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
-    """Write a package, complete or not at all. Equal manifest and arrays give equal bytes."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write a package, complete or not at all. Equal manifest and arrays give equal bytes.
+
+    Raises InputError where the file cannot be written; what was there before is kept.
+    """
     part = path.with_name(path.name + ".part")
-    part.write_bytes(archive_bytes(manifest, arrays))
-    part.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(archive_bytes(manifest, arrays))
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(
+            f"{path} cannot be written ({error.strerror}): choose another place, or make room."
+        ) from error
 
 
 def archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:

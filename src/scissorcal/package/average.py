@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.kernel import Kernel, Table
-from scissorcal.package.compile import Arrays, kernel_tables
+from scissorcal.kernel import Kernel
+from scissorcal.package.compile import Arrays, kernel_tables, table_of
 from scissorcal.package.manifest import Mechanics, Ranges
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class AverageTorque:
 
     def __init__(self, mechanics: Mechanics, ranges: Ranges, arrays: Arrays) -> None:
         mean = arrays.get("tables/mean_energy.npy")
-        self._energy = None if mean is None else Table(*mean)
+        self._energy = None if mean is None else table_of(mean)
         if mean is None:
             self._kernels = [Kernel(kernel_tables(mechanics, ranges, arrays))]
             return

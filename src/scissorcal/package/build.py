@@ -26,7 +26,6 @@ from scissorcal.package.compile import (
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.manifest import (
     FORMAT,
-    UNITS,
     Bound,
     CutRecord,
     CutStructure,
@@ -39,6 +38,7 @@ from scissorcal.package.manifest import (
     Ranges,
     canonical,
     content_hash,
+    units_of,
 )
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.recipe.schema import Recipe
@@ -99,7 +99,7 @@ def build_package(
         Manifest(
             format="scissorcal-package/1",
             name=recipe.name,
-            units=UNITS,
+            units=units_of(compiled.mechanics),
             ranges=ranges,
             limits=_limits(recipe),
             mechanics=compiled.mechanics,

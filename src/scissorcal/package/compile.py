@@ -154,7 +154,7 @@ def kernel_tables(
 
     def table(name: str) -> Table:
         array = arrays.get(f"tables/{name}.npy")
-        return _NOTHING if array is None else Table(*array)
+        return _NOTHING if array is None else table_of(array)
 
     return ModelTables(
         edge=table("edge"),
@@ -177,6 +177,13 @@ def kernel_tables(
         contact_min=ranges.contact_m[0],
         contact_max=ranges.contact_m[1],
     )
+
+
+def table_of(array: NDArray[Any]) -> Table:
+    """A kernel's table from a package's array; ValueError unless its rows are x, y and slope."""
+    if len(array) != 3:
+        raise ValueError(f"a table has three rows, x, y and slope, not {len(array)}")
+    return Table(*array)
 
 
 _NOTHING = Table(*np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]], dtype=np.float32))

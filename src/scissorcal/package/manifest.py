@@ -21,19 +21,6 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
 Text = Annotated[str, Field(max_length=10_000)]
 Range = tuple[Finite, Finite]
 
-UNITS = {
-    "opening": "rad",
-    "opening_rate": "rad/s",
-    "contact": "m",
-    "station": "m",
-    "edge_offset": "m",
-    "indentation": "m",
-    "force": "N",
-    "torque": "N m",
-    "fracture_energy": "J/m",
-    "energy": "J",
-}
-
 
 class Section(BaseModel):
     """Base of every object in the manifest: frozen, no unknown keys, no conversions, no NaN."""
@@ -262,6 +249,25 @@ class Manifest(Section):
             if member.file == file:
                 return member
         raise KeyError(file)
+
+
+def units_of(mechanics: Mechanics) -> dict[str, str]:
+    """Units of the quantities that a package speaks of."""
+    units = {
+        "opening": "rad",
+        "opening_rate": "rad/s",
+        "contact": "m",
+        "station": "m",
+        "edge_offset": "m",
+        "indentation": "m",
+        "response": "N",
+        "torque": "N m",
+    }
+    if mechanics.fracture is not None:
+        units["fracture_energy"] = "J/m"
+    if mechanics.friction is not None:
+        units["friction"] = "N m"
+    return units
 
 
 def expected_files(manifest: Manifest) -> set[str]:

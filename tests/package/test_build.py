@@ -1,0 +1,215 @@
+"""What is built from which fits, and what is refused."""
+
+import json
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.package import (
+    PackageSummary,
+    build_package,
+    check_package,
+    open_package,
+    package_inputs_hash,
+)
+from scissorcal.verdicts import Verdict
+from tests.package.fits import cut_fit, friction_fit, recipe
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+def manifest_text(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        return archive.read("manifest.json").decode()
+
+
+def test_a_press_only_package_has_neither_toughness_nor_fracture(pad: PackageSummary) -> None:
+    package = open_package(pad.path)
+    assert package.manifest.mechanics.fracture is None
+    assert set(package.arrays) == {"tables/edge.npy", "tables/response.npy", "draws/cut.npy"}
+    facts = json.loads(manifest_text(pad.path))
+    facts["provenance"].pop("recipe")
+    for word in ("toughness", "energy", "kappa"):
+        assert word not in json.dumps(facts)
+    assert package.tables.fracture_energy == 0.0
+    kernel = package.kernel()
+    kernel.reset(0.0)
+    for opening in np.radians(np.linspace(50, 12, 50)):
+        kernel.step(opening, -0.1, -0.03)
+    assert kernel.crack == 0.0
+
+
+def test_a_package_without_friction_has_none(pad: PackageSummary, tmp_path: Path) -> None:
+    assert "friction" not in json.dumps(
+        {k: v for k, v in json.loads(manifest_text(pad.path)).items() if k == "units"}
+    )
+    chosen = recipe(render_friction=False)
+    summary = build_package(chosen, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng())
+    assert summary.manifest.provenance.friction is None
+    assert not any("friction" in file for file in open_package(summary.path).arrays)
+    package = open_package(summary.path)
+    opening = np.radians(49.0)
+    assert package.torque(opening, 1.0, 0.06) == 0.0
+
+
+def test_friction_is_rendered_against_the_motion(paper: PackageSummary) -> None:
+    package = open_package(paper.path)
+    opening, contact = np.radians(49.0), 0.06
+    assert package.torque(opening, 0.5, contact) < 0 < package.torque(opening, -0.5, contact)
+
+
+def test_provenance_names_recordings_fits_and_recipe(paper: PackageSummary) -> None:
+    record = open_package(paper.path).manifest.provenance
+    assert record.cut.sources == (f"cut.mcap sha256:{1:064x}",)
+    assert record.friction is not None
+    assert record.friction.inputs_hash == "friction-2"
+    assert json.loads(record.recipe)["name"] == "paper-80gsm"
+    values = {parameter.name: parameter.value for parameter in record.cut.parameters}
+    assert values == {
+        "response_force": 2.0,
+        "response_exponent": 1.5,
+        "fracture_energy": 0.5,
+        "kappa": 0.75,
+    }
+
+
+def test_the_inputs_hash_changes_with_what_matters_and_only_then(paper: PackageSummary) -> None:
+    chosen, friction = recipe(), friction_fit()
+    cut = cut_fit(chosen, kappa=0.75)
+    assert package_inputs_hash(chosen, friction, cut) == paper.manifest.provenance.inputs_hash
+    other = recipe(tolerance_percent=5.0)
+    changed = {
+        package_inputs_hash(other, friction, cut),
+        package_inputs_hash(chosen, replace(friction, inputs_hash="other"), cut),
+        package_inputs_hash(chosen, friction, replace(cut, inputs_hash="other")),
+        package_inputs_hash(chosen, friction, None),
+    }
+    assert len(changed) == 4
+    assert paper.manifest.provenance.inputs_hash not in changed
+    silent = recipe(render_friction=False)
+    assert package_inputs_hash(silent, friction, cut) == package_inputs_hash(silent, None, cut)
+
+
+def test_fits_that_are_missing_are_named(tmp_path: Path) -> None:
+    chosen = recipe()
+    with pytest.raises(MissingError, match="scissorcal fit cut"):
+        build_package(chosen, friction_fit(), None, tmp_path / "p.zip", rng())
+    with pytest.raises(MissingError, match="scissorcal fit friction"):
+        build_package(chosen, None, cut_fit(chosen), tmp_path / "p.zip", rng())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_linear_joint_has_no_package(tmp_path: Path) -> None:
+    chosen = recipe()
+    linear = chosen.model_copy(update={"rig": chosen.rig.model_copy(update={"joint": "linear"})})
+    with pytest.raises(InputError, match="linear joint carries no blades"):
+        build_package(linear, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng())
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "key"),
+    [
+        ("scene", {"closure": "eq4"}, "scene.closure"),
+        ("scene", {"cut": False}, "scene.cut"),
+        ("rig", {"moving": "upper"}, "rig.moving"),
+        ("material", {"thickness_mm": 0.2}, "material.thickness_mm"),
+    ],
+)
+def test_a_fit_of_another_recipe_is_refused(
+    part: str, change: dict[str, Any], key: str, tmp_path: Path
+) -> None:
+    chosen = recipe()
+    other = chosen.model_copy(update={part: getattr(chosen, part).model_copy(update=change)})
+    with pytest.raises(InputError, match=rf"another {key}.*scissorcal fit"):
+        build_package(other, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng())
+
+
+def test_a_fit_of_another_edge_is_refused(tmp_path: Path) -> None:
+    chosen = recipe()
+    edge = chosen.rig.edge.model_copy(update={"offset_mm": -9.0})
+    other = chosen.model_copy(update={"rig": chosen.rig.model_copy(update={"edge": edge})})
+    with pytest.raises(InputError, match=r"rig\.edge\.offset_mm"):
+        build_package(other, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng())
+
+
+def test_a_scene_that_never_touches_is_refused(tmp_path: Path) -> None:
+    chosen = recipe("press-only", contact_mm=(55.0, 70.0), opening_deg=(45.0, 50.0))
+    fit = cut_fit(chosen, energy=None)
+    with pytest.raises(InputError, match="Nowhere in the scene"):
+        build_package(chosen, friction_fit(), fit, tmp_path / "p.zip", rng())
+
+
+def test_friction_that_would_drive_the_motion_is_refused(tmp_path: Path) -> None:
+    chosen = recipe()
+    friction = friction_fit(angle_slope=4.0, angle_curvature=0.0)
+    with pytest.raises(InputError, match="friction drives the motion at 12 degrees"):
+        build_package(chosen, friction, cut_fit(chosen), tmp_path / "p.zip", rng())
+
+
+def test_tables_worse_than_the_scene_bears_are_not_handed_out(tmp_path: Path) -> None:
+    chosen = recipe(tolerance_percent=0.01)
+    with pytest.raises(VerdictError, match=r"was not written.*raise its tolerance"):
+        build_package(
+            chosen, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng(), tolerance=1e-2
+        )
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_best_point_outside_its_own_posterior_is_not_handed_out(tmp_path: Path) -> None:
+    chosen = recipe(render_friction=False)
+    fit = cut_fit(chosen)
+    with pytest.raises(VerdictError, match="not typical of its posterior"):
+        build_package(
+            chosen, None, replace(fit, map_point=fit.map_point * 1.5), tmp_path / "p.zip", rng()
+        )
+
+
+def test_a_failed_fit_is_carried_along_and_said(tmp_path: Path) -> None:
+    chosen = recipe()
+    bad = Verdict("fit.cut", "k-hat", "fail", 1.2, 0.7, "Its intervals cannot be trusted.")
+    fit = replace(cut_fit(chosen), verdicts=(bad,))
+    summary = build_package(chosen, friction_fit(), fit, tmp_path / "p.zip", rng())
+    judged = {verdict.check: verdict for verdict in summary.verdicts}
+    assert judged["fits"].status == "fail"
+    assert "cannot be trusted" in judged["fits"].why
+    assert any("cannot be trusted" in sentence for sentence in summary.warnings)
+    assert check_package(summary.path) == summary.verdicts
+
+
+def test_an_unsigned_package_says_so(paper: PackageSummary) -> None:
+    assert any("not signed" in sentence for sentence in paper.warnings)
+    signature = next(verdict for verdict in paper.verdicts if verdict.check == "signature")
+    assert signature.status == "not_evaluated"
+
+
+def test_draws_are_thinned_to_what_the_band_needs(paper: PackageSummary, tmp_path: Path) -> None:
+    assert open_package(paper.path).draws == 200
+    chosen = recipe()
+    few = cut_fit(chosen, draws=60)
+    summary = build_package(chosen, friction_fit(), few, tmp_path / "p.zip", rng())
+    assert open_package(summary.path).draws == 60
+
+
+@pytest.mark.parametrize("law", ["coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"])
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_every_rung_of_friction_compiles(law: str, symmetric: bool, tmp_path: Path) -> None:
+    chosen = recipe()
+    summary = build_package(
+        chosen,
+        friction_fit(law=law, symmetric=symmetric),
+        cut_fit(chosen),
+        tmp_path / "p.zip",
+        rng(),
+    )
+    assert summary.manifest.bound.share < 1e-3
+    package = open_package(summary.path)
+    opening = np.radians(49.0)
+    both = package.torque(opening, [-0.4, 0.4], 0.06)
+    assert (both[0] == pytest.approx(-both[1], rel=1e-5)) == symmetric
