@@ -14,7 +14,7 @@ PYTEST_ARGS ?=
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check kernel setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check c-tests kernel setup clean
 
 demo: $(STAMP)
 	$(RUN)/scissorcal demo
@@ -43,6 +43,10 @@ schemas: $(STAMP)
 
 schemas-check: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --check
+
+# Strict, and again under the address and undefined-behaviour sanitizers.
+c-tests:
+	$(MAKE) --no-print-directory -C tests/c check BUILD=$(CURDIR)/build/c-tests
 
 setup kernel: $(STAMP)
 

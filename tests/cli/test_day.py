@@ -1,0 +1,140 @@
+"""The day in a workspace by its commands: each does its part, once, and says what comes next."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.recording import write_recording
+from scissorcal.workday.workspace import Workspace
+from tests.calibration.truth import Stroke, Truth, make_recording, sweep
+from tests.workday.made import quick_workspace, record_friction
+
+from .conftest import Cli
+
+ONE_RUNG = '[fit.cut]\nresponse = "power"\nfracture = "smooth"\n'
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A workspace with both captures, made up, and few choices for the fits."""
+    workspace = quick_workspace(tmp_path_factory.mktemp("day") / "paper")
+    text = workspace.recipe_path.read_text(encoding="utf-8").replace("[fit.cut]\n", ONE_RUNG)
+    workspace.recipe_path.write_text(text, encoding="utf-8")
+    record_friction(workspace)
+    opening, advance, strokes = [], [], []
+    for place, speed in ((-0.018, 0.6), (0.016, 0.9)):
+        for start, end, kind, rate in ((0.85, 0.22, "closing", speed), (0.22, 0.85, "opening", 1)):
+            strokes.append(Stroke(len(strokes), kind, rate, 0))
+            opening.append(sweep(start, end, rate))
+            advance.append(place)
+    rng = np.random.default_rng(3)
+    made = make_recording("cut", opening, advance, strokes, Truth(), rng, True)
+    write_recording(replace(made, recipe_toml=text), workspace.new_recording("cut"))
+    return workspace
+
+
+def test_the_day_from_captures_to_package(
+    recorded: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(recorded.captures_dir)
+    assert cli("plan", "--json").envelope["result"]["next_command"] == "scissorcal fit friction"
+    assert cli("report").code == 5
+    assert cli("package", "build").code == 5
+
+    fitted = cli("fit", "--json")
+    assert fitted.code == 0
+    result = fitted.envelope["result"]
+    names = [parameter["name"] for parameter in result["parameters"]]
+    assert names[:2] == ["inertia", "offset"]
+    assert names[-3:] == ["response_force", "response_exponent", "fracture_energy"]
+    keys = ["name", "unit", "mean", "sd", "q05", "q50", "q95", "identifiability"]
+    assert all(list(parameter) == keys for parameter in result["parameters"])
+    assert [fit["cached"] for fit in result["fits"]] == [False, False]
+    assert fitted.envelope["files"] == [str(recorded.fit_path(w)) for w in ("friction", "cut")]
+
+    again = cli("fit", "--json")
+    assert [fit["cached"] for fit in again.envelope["result"]["fits"]] == [True, True]
+    assert again.envelope["files"] == []
+    assert again.envelope["result"]["parameters"] == result["parameters"]
+    assert "nothing changed since the last fit" in cli("fit").out
+
+    built = cli("package", "build", "--json")
+    assert built.code == 0
+    assert built.envelope["result"]["bound"]["stated_Nm"] > 0
+    assert cli("package", "build", "--json").envelope["result"]["cached"]
+    checked = cli("package", "check", "--json")
+    assert checked.code == 0
+    assert {v["scope"] for v in checked.envelope["verdicts"]} == {"package"}
+
+    reported = cli("report", "--json")
+    assert reported.code == 0
+    assert len(reported.envelope["result"]["fits"]) == 2
+    assert {"fit.friction", "fit.cut", "package"} <= {
+        verdict["scope"] for verdict in reported.envelope["verdicts"]
+    }
+
+    plan = cli("plan", "--json").envelope["result"]
+    assert {step["status"] for step in plan["steps"]} == {"done"}
+    assert plan["next_command"] is None
+
+
+def test_a_package_whose_bytes_were_changed_is_refused(
+    recorded: Workspace, cli: Cli, tmp_path: Path
+) -> None:
+    source = recorded.package_path(recorded.recipe())
+    assert source.is_file()
+    data = bytearray(source.read_bytes())
+    data[len(data) // 2] ^= 1
+    changed = tmp_path / "changed.zip"
+    changed.write_bytes(data)
+    said = cli("package", "check", changed)
+    assert said.code == 2
+    assert "changed.zip" in said.err
+    assert "scissorcal package build" in said.err
+    assert cli("package", "check", tmp_path / "nowhere.zip").code == 5
+
+
+def test_a_recipe_with_a_typo_stops_every_command(cli: Cli, workspace: Path) -> None:
+    recipe = workspace / "recipe.toml"
+    recipe.write_text(recipe.read_text().replace("thickness_mm = 0.10", "thickness_cm = 0.01"))
+    for words in (["plan"], ["fit"], ["report"], ["package", "build"], ["capture", "friction"]):
+        device = ["--device", "sim"] if words[0] == "capture" else []
+        said = cli(*words, *device)
+        assert said.code == 2
+        assert "material.thickness_cm: unknown key. Did you mean thickness_mm?" in said.err
+
+
+@pytest.mark.parametrize("words", [["plan"], ["fit"], ["report"], ["package", "build"]])
+def test_outside_a_workspace_the_next_step_is_named(
+    words: list[str], cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = cli(*words)
+    assert said.code == 5
+    assert "scissorcal init" in said.err
+
+
+def test_an_interrupted_capture_is_recovered_by_the_next_command(cli: Cli, workspace: Path) -> None:
+    path = record_friction(Workspace(workspace))
+    path.rename(path.with_name(path.name + ".part"))
+    said = cli("plan", "--json")
+    assert "was recovered from an interrupted capture" in said.err
+    (step, *_) = said.envelope["result"]["steps"]
+    assert (step["name"], step["status"]) == ("capture friction", "done")
+    assert path.is_file()
+    assert "recovered" not in cli("plan").err
+
+
+def test_a_friction_recording_without_motion_is_refused_by_the_fit(
+    cli: Cli, workspace: Path
+) -> None:
+    still = [np.full(6000, 0.5)]
+    strokes = [Stroke(0, "closing", 0.1)]
+    rng = np.random.default_rng(1)
+    made = make_recording("friction", still, [0.0], strokes, Truth(), rng, False)
+    write_recording(made, Workspace(workspace).new_recording("friction"))
+    said = cli("fit", "friction")
+    assert said.code == 2
+    assert "Traceback" not in said.err
