@@ -7,7 +7,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -52,6 +52,7 @@ def test_what_stands_in_a_file_follows_the_schema(tmp_path: Path) -> None:
         jsonschema.validate(document, stored())
 
 
+@settings(deadline=None)
 @given(
     recipe=st.text(),
     device=st.dictionaries(st.text(), st.none() | st.integers() | st.text() | st.floats()),

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -42,6 +42,7 @@ def test_constant_speeds_are_found_with_their_rests_left_out() -> None:
         assert moving <= (len(here) + 1) * 1e-3 <= moving + 0.11
 
 
+@settings(deadline=None)
 @given(
     noise=st.floats(0, 0.01),
     step=st.sampled_from([0.0, 1e-4, 5e-3]),
@@ -59,6 +60,7 @@ def test_noise_and_encoder_steps_split_no_stroke(
     assert [s.kind for s in labels.strokes] == (kinds[1:] + kinds[:1] if mirrored else kinds)
 
 
+@settings(deadline=None)
 @given(
     values=st.lists(st.floats(-10, 10), max_size=60),
     min_travel=st.floats(1e-3, 5),

@@ -44,16 +44,15 @@ def import_table(
     ``columns`` says which column holds which channel: ``time``, ``opening``, ``advance``,
     ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
     number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
-    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``). Time is a column
-    or ``rate_Hz``, not both. What is not named is 0 throughout, which a note says.
+    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``); and ``time`` or
+    ``rate_Hz``. What is not named is 0 throughout, which a note says.
 
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
     of the .mat file joined by * and /, as in ``{"motor_torque": "gtau"}`` for a gain in N/V.
 
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
-    it and notes it. ``device_time_us`` is rounded to 1 us, the clock of a recording; it and
-    ``host_time_ns`` begin at 0.
+    it and notes it. Both clocks begin at 0 and are rounded to 1 us.
 
     Raises InputError, naming the line (or row), the column and the mend: text, empty cells, NaN,
     time that stands still or goes back, gaps, unknown columns and units.
@@ -75,9 +74,8 @@ def import_table(
         for channel in columns
     }
     samples = empty_samples(table.length)
-    for channel in columns:
-        if channel != "time":
-            samples[channel] = table.columns[channel].values * quantities[channel].factor
+    for channel in set(columns) - {"time"}:
+        samples[channel] = table.columns[channel].values * quantities[channel].factor
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
