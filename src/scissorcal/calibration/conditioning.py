@@ -17,6 +17,10 @@ EDGE_SAMPLES = 50
 """Samples left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
 
 GAP_FACTOR = 1.5
+REST_MARGIN = 4
+JITTER = 0.1
+"""Motion slower than this share of the recording's rms rate is jitter, not sliding."""
+STICKS_PER_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -24,9 +28,10 @@ class Bins:
     """Band-limited motion and drive in bins of a few milliseconds; all arrays (n,).
 
     ``opening``, ``rate``, ``acceleration``, ``drive``, ``advance`` are means over a bin, in the
-    joint's SI units. ``moving`` is false where the rate's sign is not certain throughout the bin.
-    ``series`` numbers pieces without a gap, ``recording`` and ``stroke`` say what a bin came from
-    (stroke -1 between strokes, numbered across recordings), ``sheet`` which piece of material.
+    joint's SI units. ``moving`` is false where the rate's sign is not certain throughout the
+    bin, and next to rests where the joint sticks and slips. ``series`` numbers pieces without a
+    gap, ``recording`` and ``stroke`` say what a bin came from (stroke -1 between strokes,
+    numbered across recordings), ``sheet`` which piece of material.
     ``bin_s`` is the width of a bin, ``rate_floor`` the speed below which the sign is noise.
     """
 
@@ -136,7 +141,8 @@ def _bin_piece(
         return np.asarray(values[kept].reshape(count, width).mean(axis=1))
 
     windows = rate[kept].reshape(count, width)
-    moving = (windows.min(axis=1) > floor) | (windows.max(axis=1) < -floor)
+    certain = (windows.min(axis=1) > floor) | (windows.max(axis=1) < -floor)
+    moving = _away_from_rests(certain, windows.mean(axis=1))
     middle = np.arange(count) * width + EDGE_SAMPLES + width // 2
     stroke = np.asarray(samples["stroke"], dtype=np.int64)
     return Bins(
@@ -154,6 +160,35 @@ def _bin_piece(
         bin_s=width / rate_Hz,
         rate_floor=floor,
     )
+
+
+def _away_from_rests(certain: NDArray[np.bool_], rate: Array) -> NDArray[np.bool_]:
+    """Where the joint sticks and slips, leave out the neighbours of every rest and reversal.
+
+    A stick is an interruption between motion in one direction that is no mere jitter on either
+    side. A low-pass filter smears the rest into the slip, and then inertia comes out too large and
+    Stribeck friction too small; bins within ``REST_MARGIN`` of an interruption are therefore left
+    out. Motion without sticks keeps all its bins: it passes zero once a reversal, and those
+    bins tell Coulomb friction from the rest.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], certain, [True]]).astype(int)))
+    rests = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    if not np.any(certain):
+        return certain
+    fast = JITTER * float(np.sqrt(np.mean(rate[certain] ** 2)))
+
+    def sticks(low: int, high: int) -> bool:
+        before, after = rate[max(low - REST_MARGIN, 0) : low], rate[high : high + REST_MARGIN]
+        if len(before) == 0 or len(after) == 0 or before[-1] * after[0] <= 0:
+            return False
+        return bool(min(np.abs(before).max(), np.abs(after).max()) > fast)
+
+    kept = certain.copy()
+    found = sum(sticks(low, high) for low, high in rests)
+    if found >= STICKS_PER_S * np.count_nonzero(certain) * BIN_S:
+        for low, high in rests:
+            kept[max(low - REST_MARGIN, 0) : high + REST_MARGIN] = False
+    return kept
 
 
 def _central(values: Array, rate_Hz: float) -> Array:

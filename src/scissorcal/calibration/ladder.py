@@ -27,7 +27,11 @@ NEGLIGIBLE = 0.0175
 just notice in a force (Jones 2000, Kinesthetic sensing)."""
 FALSE_ALARM = 0.05
 FEWEST_FOR_RANKS = 6
-"""With fewer strokes no ranking can reach 5 %; one nat per stroke then counts as better."""
+"""With fewer strokes no ranking can reach 5 %, and the evidence alone decides."""
+
+POSITIVE_EVIDENCE = 3.0
+"""Held-out log density, counting independent observations only, that a better rung must gain: a
+factor of 20 (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572, call this strong)."""
 
 SEARCH_REACH = 8.0
 """Half-width of the search, in prior standard deviations."""
@@ -190,11 +194,12 @@ def choose(climbed: list[Climbed], signal_rms: float = 0.0) -> Climbed:
     needs a ``signal_rms``, and suits rungs that differ in their mean only.
     """
     best = max(climbed, key=lambda candidate: float(candidate.scores.sum()))
+    share = common_share(climbed)
     for candidate in climbed:
         added = candidate.held_out_rms**2 - best.held_out_rms**2
         if added <= (NEGLIGIBLE * signal_rms) ** 2 and signal_rms > 0:
             return candidate
-        if not _beaten(candidate.scores, best.scores):
+        if not _beaten(candidate.scores * share, best.scores * share):
             return candidate
     return best
 
@@ -203,10 +208,10 @@ def _beaten(scores: Array, best: Array) -> bool:
     from scipy.stats import wilcoxon
 
     gained = best - scores
-    if np.all(gained == 0):
+    if float(gained.sum()) < POSITIVE_EVIDENCE:
         return False
     if len(gained) < FEWEST_FOR_RANKS:
-        return float(gained.sum()) > len(gained)
+        return True
     return float(wilcoxon(gained, alternative="greater").pvalue) < FALSE_ALARM
 
 
