@@ -1,0 +1,122 @@
+"""What a report is told besides the fits: recordings in brief, and sheets of facts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.report.numbers import Scalar, scalar
+from scissorcal.verdicts import Verdict
+
+UNIT_SUFFIXES = {
+    "s": "s",
+    "ms": "ms",
+    "us": "µs",
+    "ns": "ns",
+    "m": "m",
+    "mm": "mm",
+    "J": "J",
+    "N": "N",
+    "Nm": "N m",
+    "Hz": "Hz",
+    "rad": "rad",
+    "deg": "°",
+    "bytes": "bytes",
+    "percent": "%",
+}
+
+
+@dataclass(frozen=True)
+class RecordingSummary:
+    """A recording without its samples: what the report says about where data come from.
+
+    ``source`` is the file as the fit names it in ``FitResult.sources``; ``duration_s`` is on the
+    device clock.
+    """
+
+    source: str
+    content_hash: str
+    kind: str
+    joint: str
+    samples: int
+    duration_s: float
+    strokes: tuple[Stroke, ...]
+    device: Mapping[str, Any]
+    recipe_toml: str
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The file's name without its folder."""
+        return PurePath(self.source).name or "recording without a file"
+
+
+def summarise_recording(recording: Recording) -> RecordingSummary:
+    """Reduce a recording to what the report prints about it."""
+    return RecordingSummary(
+        source=recording.source,
+        content_hash=recording.content_hash,
+        kind=recording.kind,
+        joint=recording.joint.kind,
+        samples=len(recording.samples),
+        duration_s=recording.duration_s,
+        strokes=recording.strokes,
+        device=recording.device,
+        recipe_toml=recording.recipe_toml,
+        notes=recording.notes,
+    )
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One line of a fact sheet; ``unit`` is empty where none applies."""
+
+    label: str
+    value: Scalar
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class FactSheet:
+    """A section made elsewhere: what a package promises, how a run of the loop went.
+
+    ``anchor`` is the section's address on the page (letters, digits, hyphens).
+    """
+
+    title: str
+    anchor: str
+    facts: tuple[Fact, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def sheet_from_mapping(
+    title: str,
+    anchor: str,
+    facts: Mapping[str, Any],
+    *,
+    verdicts: Sequence[Verdict] = (),
+    notes: Sequence[str] = (),
+) -> FactSheet:
+    """Make a sheet from nested names and values, such as a package's manifest.
+
+    A unit at the end of a name becomes the unit of the line; nested names are joined.
+
+    >>> sheet_from_mapping("Loop", "loop", {"latency": {"p99_us": 112.0}}).facts
+    (Fact(label='latency p99', value=112.0, unit='µs'),)
+    """
+    return FactSheet(title, anchor, tuple(_facts(facts, ())), tuple(verdicts), tuple(notes))
+
+
+def _facts(facts: Mapping[str, Any], above: tuple[str, ...]) -> list[Fact]:
+    found: list[Fact] = []
+    for name, value in facts.items():
+        if isinstance(value, Mapping):
+            found += _facts(value, (*above, str(name)))
+            continue
+        stem, _, suffix = str(name).rpartition("_")
+        unit = UNIT_SUFFIXES.get(suffix, "") if stem else ""
+        words = " ".join((*above, stem if unit else str(name))).replace("_", " ")
+        found.append(Fact(words, scalar(value), unit))
+    return found

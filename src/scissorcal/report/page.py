@@ -1,0 +1,124 @@
+"""The page: facts and figures through the templates into one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from scissorcal.report import numbers
+from scissorcal.report.document import FitMaterial, FitSection, ReportDocument
+from scissorcal.report.sections.held_out import draw_held_out
+from scissorcal.report.sections.residuals import StrokeResidual, draw_residuals
+from scissorcal.report.sections.torque import along
+from scissorcal.report.sections.torque_figures import draw_stroke, draw_torque
+from scissorcal.report.svg import CARD, Svg, drawing_style
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+MOST_CARDS = 12
+KEY_MARKS = {"closing": "●", "opening": "▲", "excitation": "■", "press": "◆"}
+
+
+@dataclass(frozen=True)
+class StrokeCard:
+    """A stroke that has its own figure on the page."""
+
+    row: StrokeResidual
+    figure: Svg
+
+
+@dataclass(frozen=True)
+class FitView:
+    """A fit's facts with its figures; ``cards`` are its worst strokes, worst first."""
+
+    section: FitSection
+    torque: tuple[Svg, ...]
+    residuals: tuple[Svg, ...]
+    held_out: tuple[Svg, ...]
+    cards: tuple[StrokeCard, ...]
+
+    @property
+    def key(self) -> tuple[tuple[str, str], ...]:
+        """Kinds of strokes that the figures show, each with its mark."""
+        kinds = dict.fromkeys(row.name.kind for row in self.section.residuals)
+        return tuple((kind, KEY_MARKS.get(kind, "▼")) for kind in sorted(kinds))
+
+    @property
+    def carded(self) -> frozenset[str]:
+        """Anchors of the strokes that have a card."""
+        return frozenset(card.row.name.anchor for card in self.cards)
+
+
+def draw_fit(material: FitMaterial) -> FitView:
+    """Draw all figures of one fit."""
+    fit, section, strokes = material.fit, material.section, material.strokes
+    by_anchor = {stroke.name.anchor: stroke for stroke in strokes}
+    with drawing_style():
+        return FitView(
+            section,
+            draw_torque(fit, strokes, section.torque, section.anchor),
+            draw_residuals(fit, strokes, section.residuals, section.anchor),
+            draw_held_out(fit, section.held_out, section.anchor),
+            tuple(
+                StrokeCard(
+                    row,
+                    draw_stroke(
+                        fit,
+                        by_anchor[row.name.anchor],
+                        CARD,
+                        along(row.name),
+                        f"{row.name.anchor}-f",
+                    ),
+                )
+                for row in section.residuals[:MOST_CARDS]
+            ),
+        )
+
+
+def page_text(document: ReportDocument, views: Sequence[FitView]) -> str:
+    """Write the page; every value from outside is escaped."""
+    environment = _environment()
+    style = resources.files("scissorcal.report").joinpath("templates/style.css")
+    template = environment.get_template("report.html.j2")
+    return template.render(document=document, views=views, style=style.read_text(encoding="utf-8"))
+
+
+def prose(sentence: str) -> Markup:
+    """Escape a sentence; what stands between backticks becomes code."""
+    from markupsafe import Markup, escape
+
+    parts = sentence.split("`")
+    if len(parts) % 2 == 0:
+        return escape(sentence)
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if place % 2 else escape(part)
+        for place, part in enumerate(parts)
+    )
+
+
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("scissorcal.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        significant=numbers.significant,
+        display=numbers.display,
+        short=numbers.short,
+        percent=numbers.percent,
+        unit=numbers.unit_text,
+        with_unit=numbers.with_unit,
+        with_decimals=numbers.with_decimals,
+        prose=prose,
+    )
+    environment.globals["decimals_for"] = numbers.decimals_for
+    return environment

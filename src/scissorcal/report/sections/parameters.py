@@ -1,0 +1,60 @@
+"""The parameter table: posterior summaries, and in a word whether the data speak."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.report.numbers import Number, finite
+
+IDENTIFIED_BELOW = 0.3
+PRIOR_ONLY_FROM = 0.8
+
+Word = Literal["identified", "weak", "prior only", "not available"]
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter; ``identifiability`` is posterior sd / prior sd, ``word`` its meaning."""
+
+    name: str
+    meaning: str
+    unit: str
+    mean: Number
+    sd: Number
+    q05: Number
+    q50: Number
+    q95: Number
+    identifiability: Number
+    word: Word
+
+
+def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
+    """One row per parameter, in the fit's order."""
+    return tuple(
+        ParameterRow(
+            parameter.name,
+            parameter.meaning,
+            parameter.unit,
+            finite(parameter.mean),
+            finite(parameter.sd),
+            finite(parameter.q05),
+            finite(parameter.q50),
+            finite(parameter.q95),
+            finite(parameter.identifiability),
+            identifiability_word(finite(parameter.identifiability)),
+        )
+        for parameter in fit.parameters
+    )
+
+
+def identifiability_word(ratio: Number) -> Word:
+    """Say what the ratio of posterior to prior standard deviation means.
+
+    >>> identifiability_word(0.02), identifiability_word(0.5), identifiability_word(0.99)
+    ('identified', 'weak', 'prior only')
+    """
+    if ratio is None:
+        return "not available"
+    if ratio < IDENTIFIED_BELOW:
+        return "identified"
+    return "weak" if ratio < PRIOR_ONLY_FROM else "prior only"

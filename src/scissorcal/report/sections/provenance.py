@@ -1,0 +1,95 @@
+"""Where everything comes from: recordings, hashes, devices, the recipe's text."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recipe.schema import Recipe
+from scissorcal.report.inputs import RecordingSummary
+from scissorcal.report.numbers import Number, Scalar, finite, scalar
+from scissorcal.report.strokes import summary_of
+
+
+@dataclass(frozen=True)
+class DeviceFact:
+    """One line of the identity that a rig stated."""
+
+    name: str
+    value: Scalar
+
+
+@dataclass(frozen=True)
+class SourceRow:
+    """One recording with its hash, and the fits that used it."""
+
+    source: str
+    content_hash: str
+    kind: str
+    joint: str
+    samples: int | None
+    duration_s: Number
+    strokes: int | None
+    used_by: tuple[str, ...]
+    device: tuple[DeviceFact, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FitOrigin:
+    """A fit's inputs: equal hashes need no second fit."""
+
+    fit: str
+    inputs_hash: str
+    sources: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """All sources, the fits' inputs, and the recipe as text."""
+
+    sources: tuple[SourceRow, ...]
+    fits: tuple[FitOrigin, ...]
+    recipe_text: str
+    recipe_text_origin: str
+
+
+def trace(
+    recipe: Recipe,
+    recipe_text: str,
+    fits: Sequence[FitResult],
+    recordings: Sequence[RecordingSummary],
+) -> Provenance:
+    """Tie recordings to fits, and name sources of fits whose recording was not handed in."""
+    rows = [_row(recording, fits, recordings) for recording in recordings]
+    for fit in fits:
+        for source in fit.sources:
+            if summary_of(source, recordings) is None and all(row.source != source for row in rows):
+                users = tuple(other.what for other in fits if source in other.sources)
+                rows.append(SourceRow(source, "", "", "", None, None, None, users, (), ()))
+    origins = tuple(FitOrigin(fit.what, fit.inputs_hash, fit.sources) for fit in fits)
+    if recipe_text:
+        return Provenance(tuple(rows), origins, recipe_text, "as written")
+    return Provenance(tuple(rows), origins, recipe.model_dump_json(indent=2), "as read, in JSON")
+
+
+def _row(
+    recording: RecordingSummary, fits: Sequence[FitResult], recordings: Sequence[RecordingSummary]
+) -> SourceRow:
+    users = tuple(
+        fit.what
+        for fit in fits
+        if any(summary_of(source, recordings) is recording for source in fit.sources)
+    )
+    device = tuple(DeviceFact(str(name), scalar(value)) for name, value in recording.device.items())
+    return SourceRow(
+        recording.source or "recording without a file",
+        recording.content_hash,
+        recording.kind,
+        recording.joint,
+        recording.samples,
+        finite(recording.duration_s),
+        len(recording.strokes),
+        users,
+        device,
+        recording.notes,
+    )
