@@ -29,9 +29,11 @@ def arc_edge(curvature: float, offset: float = EDGE_OFFSET, slope: float = EDGE_
     return Table(s, offset + slope * s + 0.5 * curvature * s**2, slope + curvature * s)
 
 
-def power_response(force: float = 2.0, exponent: float = 1.5, last: float = 2e-3) -> Table:
+def power_response(
+    force: float = 2.0, exponent: float = 1.5, last: float = 2e-3, knots: int = 200
+) -> Table:
     """g = force (delta / 0.3 mm)^exponent up to ``last``, knots denser towards 0."""
-    x = np.linspace(0.0, 1.0, 200) ** 2 * last
+    x = np.linspace(0.0, 1.0, knots) ** 2 * last
     y = force * (x / REFERENCE) ** exponent
     with np.errstate(divide="ignore"):
         slope = force * exponent / REFERENCE * (x / REFERENCE) ** (exponent - 1.0)

@@ -50,7 +50,7 @@ class Table:
         Beyond the ends the table goes on straight with the end's slope, or, if ``held``, keeps
         the end's value.
         """
-        places = np.ascontiguousarray(x, dtype=np.float32)
+        places = np.asarray(x, dtype=np.float32, order="C")
         values = np.empty_like(places)
         table, _keep = table_struct(self)
         lib.sc_table_many(

@@ -5,7 +5,8 @@
 
 static const float RESPONSE_CAP = 1e6f; /* N: far beyond any rig, keeps all that follows finite */
 static const float PARALLEL = 1e-6f;    /* tan(psi) up to which edges count as parallel */
-static const float CLOSE_ENOUGH = 2e-6f;
+static const float CLOSE_ENOUGH = 2e-6f;  /* of the target */
+static const float RESOLUTION = 1.5e-7f;  /* of a station: as fine as float tells places apart */
 
 enum { MOST_STEPS = 48 };
 
@@ -55,37 +56,42 @@ static float excess_at(const sc_model *model, sc_turn turn, float target, float 
     return sc_release_at(model, point) - target;
 }
 
-/* The excess changes sign between low and high: regula falsi (Illinois), every third step a
- * bisection, so that the bracket shrinks whatever the response's shape. */
-static void close_bracket(const sc_model *model, sc_turn turn, float target, float low,
-                          float excess_low, float high, float excess_high, sc_edge_point *point)
+/* How far a Newton step goes from a point: the release falls as the edge rises out of the material
+ * (its change of slope matters less, and the bracket makes up for it). */
+static float newton_step(const sc_model *model, sc_turn turn, const sc_edge_point *point,
+                         float excess)
 {
-    int side = 0;
+    float stiffness;
+    (void)sc_table_at(&model->response, model->upper_face - point->y, &stiffness);
+    const float rise = turn.sine + point->taper * turn.cosine;
+    return excess / ((float)model->moving_blades * stiffness * rise * point->slope);
+}
+
+/* The excess changes sign between low, where *point stands, and high. Newton steps that stay inside
+ * the shrinking bracket, every third step a bisection, so that it shrinks whatever the shape. */
+static void close_bracket(const sc_model *model, sc_turn turn, float target, float high,
+                          float excess, sc_edge_point *point)
+{
+    float low = point->station;
     for (int i = 0; i < MOST_STEPS; i++) {
-        float station = 0.5f * (low + high);
-        if (i % 3 != 2) {
-            const float chord = high - excess_high * (high - low) / (excess_high - excess_low);
-            if (chord > low && chord < high) {
-                station = chord;
-            }
+        float station = point->station + newton_step(model, turn, point, excess);
+        if (fabsf(station - point->station) <= RESOLUTION * high) {
+            return;
+        }
+        if (i % 3 == 2 || !(station > low && station < high)) {
+            station = 0.5f * (low + high);
         }
         if (!(station > low && station < high)) {
             break;
         }
-        const float excess = excess_at(model, turn, target, station, point);
+        excess = excess_at(model, turn, target, station, point);
+        if (fabsf(excess) <= CLOSE_ENOUGH * target) {
+            return;
+        }
         if (excess > 0.0f) {
             low = station;
-            excess_low = excess;
-            excess_high *= side > 0 ? 0.5f : 1.0f;
-            side = 1;
         } else {
             high = station;
-            excess_high = excess;
-            if (excess >= -CLOSE_ENOUGH * target) {
-                return;
-            }
-            excess_low *= side < 0 ? 0.5f : 1.0f;
-            side = -1;
         }
     }
     (void)excess_at(model, turn, target, high, point);
@@ -115,30 +121,28 @@ static float next_stop(const sc_model *model, sc_turn turn, int32_t *knot, float
 int sc_run_out(const sc_model *model, sc_turn turn, float target, sc_edge_point *point)
 {
     int32_t knot = 0;
-    float low = point->station;
-    float excess_low = sc_release_at(model, point) - target;
-    if (!(excess_low > 0.0f)) {
+    float excess = sc_release_at(model, point) - target;
+    if (!(excess > 0.0f)) {
         return 1;
     }
     for (int i = 0; i <= SC_TABLE_MAX; i++) {
-        float high = next_stop(model, turn, &knot, low);
+        float high = next_stop(model, turn, &knot, point->station);
         const int at_tip = high >= model->tip_station;
         if (at_tip) {
             high = model->tip_station;
         }
-        const float excess = excess_at(model, turn, target, high, point);
-        if (!(excess > 0.0f)) {
-            close_bracket(model, turn, target, low, excess_low, high, excess, point);
+        sc_edge_point far_end;
+        const float far_excess = excess_at(model, turn, target, high, &far_end);
+        if (!(far_excess > 0.0f)) {
+            close_bracket(model, turn, target, high, excess, point);
             return 1;
         }
-        if (at_tip) {
-            return 0;
+        const int ends = !(high > point->station); /* rounding at the material's very end */
+        *point = far_end;
+        excess = far_excess;
+        if (at_tip || ends) {
+            return !at_tip;
         }
-        if (!(high > low)) {
-            break; /* nothing left to change: rounding at the very end of the material */
-        }
-        low = high;
-        excess_low = excess;
     }
     return 1;
 }

@@ -13,9 +13,9 @@ float sc_stored_energy(const sc_model *model, float indentation);
 /* Energy released per metre of crack at a place of the edge [N]; 0 where edges are parallel. */
 float sc_release_at(const sc_model *model, const sc_edge_point *point);
 
-/* From where the release exceeds target, go outwards to the first place where it does not. The
- * result lies on the far side of that place. 0 if it is not met before the blade's tip; *point is
- * then the tip. */
+/* From where the release exceeds target, go outwards to the first place where it does not, to 2e-6
+ * of the target or as well as float resolves it. 0 if it is not met before the blade's tip; *point
+ * is then the tip. */
 int sc_run_out(const sc_model *model, sc_turn turn, float target, sc_edge_point *point);
 
 #endif

@@ -1,0 +1,177 @@
+#include "check.h"
+#include "json.h"
+#include "sc_model.h"
+
+#include <stddef.h>
+#include <string.h>
+
+typedef struct {
+    float x[SC_TABLE_MAX], y[SC_TABLE_MAX], slope[SC_TABLE_MAX], area[SC_TABLE_MAX];
+} storage;
+
+static sc_table load_table(const json *columns, storage *room)
+{
+    sc_table table = {room->x, room->y, room->slope, room->area, 0};
+    table.size = (int32_t)json_floats(json_get(columns, "x"), room->x, SC_TABLE_MAX);
+    json_floats(json_get(columns, "y"), room->y, SC_TABLE_MAX);
+    json_floats(json_get(columns, "slope"), room->slope, SC_TABLE_MAX);
+    sc_table_accumulate(&table, room->area);
+    return table;
+}
+
+static double largest(const json *column)
+{
+    double most = 0.0;
+    for (size_t i = 0; i < column->size; i++) {
+        most = fmax(most, fabs(column->items[i].number));
+    }
+    return most;
+}
+
+static void check_tables(const char *folder)
+{
+    json vectors = json_load(folder, "tables.json");
+    const double tolerance = json_number(&vectors, "tolerance");
+    const json *cases = json_get(&vectors, "tables");
+    for (size_t i = 0; i < cases->size; i++) {
+        static storage room;
+        const json *one = &cases->items[i];
+        const char *title = json_text(one, "title");
+        const sc_table table = load_table(one, &room);
+        const json *at = json_get(one, "at"), *value = json_get(one, "value");
+        const json *grade = json_get(one, "grade"), *held = json_get(one, "held");
+        const json *integral = json_get(one, "integral");
+        CHECK(sc_table_is_sound(&table), title);
+        for (size_t k = 0; k < at->size; k++) {
+            float slope;
+            const float x = (float)at->items[k].number;
+            NEAR(sc_table_at(&table, x, &slope), value->items[k].number,
+                 tolerance * largest(value), "value", title);
+            NEAR(slope, grade->items[k].number, 10.0 * tolerance * largest(grade), "slope", title);
+            NEAR(sc_table_held(&table, x), held->items[k].number, tolerance * largest(value),
+                 "held", title);
+            NEAR(sc_table_area(&table, x), integral->items[k].number,
+                 tolerance * largest(integral), "integral", title);
+        }
+        room.x[1] = room.x[0];
+        CHECK(!sc_table_is_sound(&table), title);
+        room.x[1] = NAN;
+        CHECK(!sc_table_is_sound(&table), title);
+    }
+    json_free(&vectors);
+}
+
+static sc_model load_model(const json *from, storage rooms[5])
+{
+    sc_model model;
+    memset(&model, 0, sizeof model);
+    model.edge = load_table(json_get(from, "edge"), &rooms[0]);
+    model.response = load_table(json_get(from, "response"), &rooms[1]);
+    model.friction_opening = load_table(json_get(from, "friction_opening"), &rooms[2]);
+    model.friction_closing = load_table(json_get(from, "friction_closing"), &rooms[3]);
+    model.friction_angle = load_table(json_get(from, "friction_angle"), &rooms[4]);
+    model.moving_blades = (int32_t)json_number(from, "moving_blades");
+    model.closure =
+        strcmp(json_text(from, "closure"), "eq4") == 0 ? SC_CLOSURE_EQ4 : SC_CLOSURE_WORK;
+    model.render_friction = (int32_t)json_number(from, "render_friction");
+    model.upper_face = (float)json_number(from, "upper_face");
+    model.fracture_energy = (float)json_number(from, "fracture_energy");
+    model.kappa = (float)json_number(from, "kappa");
+    model.rate_damping = (float)json_number(from, "rate_damping");
+    model.friction_rate_eps = (float)json_number(from, "friction_rate_eps");
+    model.handle_radius = (float)json_number(from, "handle_radius");
+    model.tip_station = (float)json_number(from, "tip_station");
+    model.opening_min = (float)json_number(from, "opening_min");
+    model.opening_max = (float)json_number(from, "opening_max");
+    model.contact_min = (float)json_number(from, "contact_min");
+    model.contact_max = (float)json_number(from, "contact_max");
+    return model;
+}
+
+typedef struct {
+    const char *name;
+    size_t offset;
+} column;
+
+static const column COLUMNS[] = {
+    {"torque", offsetof(sc_step_output, torque)},
+    {"force", offsetof(sc_step_output, force)},
+    {"contact", offsetof(sc_step_output, contact)},
+    {"indentation", offsetof(sc_step_output, indentation)},
+    {"height", offsetof(sc_step_output, height)},
+    {"response", offsetof(sc_step_output, response)},
+    {"friction_torque", offsetof(sc_step_output, friction_torque)},
+    {"stored_J", offsetof(sc_step_output, stored_J)},
+    {"fracture_J", offsetof(sc_step_output, fracture_J)},
+    {"arrest_J", offsetof(sc_step_output, arrest_J)},
+};
+
+static float number_at(const json *array, size_t i)
+{
+    return (float)array->items[i].number;
+}
+
+static void check_steps(const json *one)
+{
+    static storage rooms[5];
+    const char *title = json_text(one, "title");
+    const double tolerance = json_number(one, "tolerance");
+    const sc_model model = load_model(json_get(one, "model"), rooms);
+    const json *opening = json_get(one, "opening"), *rate = json_get(one, "rate");
+    const json *advance = json_get(one, "advance");
+    sc_crack state = {0.0f, 0};
+    CHECK(sc_model_is_sound(&model), title);
+    for (size_t i = 0; i < opening->size; i++) {
+        sc_step_output out;
+        const float before = state.crack;
+        sc_model_step(&model, &state, number_at(opening, i), number_at(rate, i),
+                      number_at(advance, i), &out);
+        CHECK(state.crack >= before, title);
+        for (size_t k = 0; k < sizeof COLUMNS / sizeof *COLUMNS; k++) {
+            const json *wanted = json_get(one, COLUMNS[k].name);
+            float got;
+            memcpy(&got, (const char *)&out + COLUMNS[k].offset, sizeof got);
+            NEAR(got, wanted->items[i].number, tolerance * largest(wanted) + 1e-12,
+                 COLUMNS[k].name, title);
+        }
+        const json *settled = json_get(one, "settled_torque");
+        NEAR(sc_model_settled_torque(&model, number_at(opening, i), number_at(rate, i),
+                                     number_at(json_get(one, "settled_contact"), i)),
+             settled->items[i].number, tolerance * largest(settled) + 1e-12, "settled", title);
+    }
+    NEAR(state.crack, json_number(one, "crack"), 4e-7, "crack", title);
+}
+
+/* Numbers that no rig gives: nothing but finite torques may come out. */
+static void check_absurd(const json *one)
+{
+    static storage rooms[5];
+    static const float odd[] = {0.0f,  -0.0f, 1e-30f, -1e-30f, 1.0f,     -1.0f,    3.1f,
+                                -3.1f, 1e6f,  -1e6f,  1e30f,   INFINITY, -INFINITY, NAN};
+    const char *title = json_text(one, "title");
+    const sc_model model = load_model(json_get(one, "model"), rooms);
+    const size_t n = sizeof odd / sizeof *odd;
+    for (size_t i = 0; i < n * n * n; i++) {
+        sc_crack state = {0.0f, 0};
+        sc_step_output out;
+        const float theta = odd[i % n], rate = odd[i / n % n], advance = odd[i / n / n];
+        sc_model_step(&model, &state, theta, rate, advance, &out);
+        CHECK(isfinite(out.torque) && isfinite(out.force) && isfinite(state.crack), title);
+        CHECK(state.crack >= 0.0f, title);
+        CHECK(isfinite(sc_model_settled_torque(&model, theta, rate, advance)), title);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const char *folder = argc > 1 ? argv[1] : "../golden";
+    json vectors = json_load(folder, "model.json");
+    const json *cases = json_get(&vectors, "cases");
+    check_tables(folder);
+    for (size_t i = 0; i < cases->size; i++) {
+        check_steps(&cases->items[i]);
+        check_absurd(&cases->items[i]);
+    }
+    json_free(&vectors);
+    return checks_done("tables and model");
+}
