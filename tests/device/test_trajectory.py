@@ -20,22 +20,11 @@ from scissorcal.device.trajectory import (
 )
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
 from tests.device.conftest import IDENTITY
+from tests.device.recipes import changed
 
 TICK_S = 1e-3
 CUTTING = ("paper-80gsm", "cotton-cloth")
-
-
-def changed(name: str, **tables: dict[str, object]) -> Recipe:
-    """Return a recipe of the library with some keys changed, table by table ("rig__edge")."""
-    plain = builtin_recipe(name).model_dump()
-    for table, keys in tables.items():
-        place = plain
-        for part in table.split("__"):
-            place = place[part]
-        place.update(keys)
-    return Recipe.model_validate(plain)
 
 
 @given(

@@ -25,6 +25,7 @@ CaptureProgress = Callable[[float, str, CoverageGrid], None]
 SUPERVISOR_S = 1.0
 RATE_CUTOFF_HZ = 120.0
 FAULT_CLEARINGS = 20
+FAULT_CLEARINGS_PER_S = 0.2
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
 
@@ -133,8 +134,12 @@ def capture_cut(
         return _finish(recorder, motion)
 
 
-def servo_config(recipe: Recipe, identity: Identity) -> ServoConfig:
-    """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits."""
+def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) -> ServoConfig:
+    """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
+
+    A computer that hesitates for 10 ms makes the device brake and latch a fault. That spoils a few
+    samples and no capture, so it is cleared, unless it comes more often than once in 5 s and a few.
+    """
     limits, control = recipe.limits, recipe.rig.control
     return ServoConfig(
         torque_limit=min(limits.torque_Nm, identity.torque_limit),
@@ -152,7 +157,7 @@ def servo_config(recipe: Recipe, identity: Identity) -> ServoConfig:
         opening_error_limit=OPENING_ERROR_RAD,
         advance_error_limit=ADVANCE_ERROR_M,
         supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
-        fault_clearings=FAULT_CLEARINGS,
+        fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
     )
 
@@ -187,7 +192,7 @@ class _Drive:
         begun = self._done
         for samples in self._motion.track(segment.reference):
             passed = self._motion.track_index - self._motion.way_there
-            self._done = begun + int(np.clip(passed, 0, len(segment.reference)))
+            self._done = max(self._done, begun + min(passed, len(segment.reference)))
             self._take(samples, self._doing(samples))
         self._done = begun + len(segment.reference)
 
@@ -207,7 +212,7 @@ class _Drive:
 
 
 def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
-    config = servo_config(recipe, link.identity)
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
 

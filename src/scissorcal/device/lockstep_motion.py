@@ -151,8 +151,8 @@ class LockstepMotion(Motion):
             self._last_sequence = int(sequence[-1])
         return np.asarray(samples[fresh])
 
-    def _stopped(self) -> DeviceError:
-        return self._failure or DeviceError(self.stop_reason.sentence)
+    def _why_lost(self) -> DeviceError | None:
+        return self._failure
 
     def _leave_track(self) -> None:
         if self.mode is Mode.TRACK:

@@ -191,7 +191,20 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def _pass_time(self) -> Samples: ...
 
     @abstractmethod
-    def _stopped(self) -> DeviceError: ...
+    def _why_lost(self) -> DeviceError | None:
+        """Say why the rig is out of reach, None where the servo itself stopped."""
+
+    def _stopped(self) -> DeviceError:
+        lost = self._why_lost()
+        if lost is not None:
+            return lost
+        sentence = self.stop_reason.sentence
+        if self.stop_reason is StopReason.TRACKING_LOST:
+            sentence += (
+                " Where the port is slow ('scissorcal device doctor' tells), lower the gains in "
+                "the recipe's rig.control."
+            )
+        return DeviceError(sentence)
 
     def _for_ticks(self, ticks: int) -> Iterator[Samples]:
         first: int | None = None

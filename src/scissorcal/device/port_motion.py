@@ -138,10 +138,13 @@ class PortMotion(Motion):
             self._block.beat()
         return self._block.read()
 
-    def _stopped(self) -> DeviceError:
-        if not self._process.alive and self._block.stop_reason is StopReason.NONE:
+    def _why_lost(self) -> DeviceError | None:
+        reason = self._block.stop_reason
+        if reason is StopReason.NONE and not self._process.alive:
             return self._process.why_dead()
-        return DeviceError(f"{self._link.name}: {self._block.stop_reason.sentence}")
+        if reason in (StopReason.HANGUP, StopReason.SILENCE, StopReason.LINE_ERROR):
+            return DeviceError(f"{self._link.name}: {reason.sentence}")
+        return None
 
     def _go_idle(self) -> None:
         """Switch the motors off and wait until that holds."""

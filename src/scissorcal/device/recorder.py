@@ -1,6 +1,7 @@
 """Between a motion and a recording: appends samples, counts coverage, notes what went wrong."""
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from scissorcal.device.coverage import CoverageGrid
 from scissorcal.kernel import StateFlag
 from scissorcal.recording import RecordingWriter
 
-NOTES_OF_A_KIND = 10
+NOTES_OF_A_KIND = 3
 U32 = 2**32
 
 
@@ -27,8 +28,8 @@ class Tally:
 class Recorder:
     """Takes blocks of samples as they come and keeps the writer's file close behind.
 
-    Each gap, fault and garbled frame becomes a note at once, so that it survives a killed
-    capture; after ten of a kind only the total is noted, at the end.
+    The first gaps, faults and garbled frames become notes at once, so that they survive a killed
+    capture; of what follows only the total is noted, at the end.
     """
 
     def __init__(self, writer: RecordingWriter, coverage: CoverageGrid) -> None:
@@ -38,6 +39,7 @@ class Recorder:
         self.last: NDArray[np.void] | None = None
         self._faulty = False
         self._enabled_once = False
+        self._noted: Counter[str] = Counter()
 
     @property
     def sample_count(self) -> int:
@@ -56,7 +58,7 @@ class Recorder:
             self.last = samples[-1:].copy()
         if garbled > self.tally.garbled:
             self.tally.garbled = garbled
-            self._note(garbled, f"{garbled} frames had arrived garbled by {self._when()}.")
+            self._note("garbled", f"{_frames(garbled)} had arrived garbled by {self._when()}.")
 
     def resume(self, sentence: str) -> None:
         """Begin anew after a pause in which nothing was recorded; it counts as no gap."""
@@ -67,12 +69,14 @@ class Recorder:
     def finish(self, overrun: int = 0) -> None:
         """Note the totals; ``overrun`` counts samples that were never fetched from the loop."""
         tally = self.tally
-        if tally.gaps > NOTES_OF_A_KIND:
-            self.writer.note(f"{tally.lost} frames were lost in {tally.gaps} gaps in all.")
-        if tally.garbled > NOTES_OF_A_KIND:
-            self.writer.note(f"{tally.garbled} frames arrived garbled in all.")
-        if tally.faults > NOTES_OF_A_KIND:
-            self.writer.note(f"The device latched a fault {tally.faults} times in all.")
+        totals = {
+            "gap": f"{_frames(tally.lost)} lost in {tally.gaps} gaps in all.",
+            "garbled": f"{_frames(tally.garbled)} arrived garbled in all.",
+            "fault": f"The device latched a fault {tally.faults} times in all.",
+        }
+        for kind, sentence in totals.items():
+            if self._noted[kind] > NOTES_OF_A_KIND:
+                self.writer.note(sentence)
         if overrun:
             self.writer.note(f"{overrun} samples were lost because the disk was too slow.")
 
@@ -85,7 +89,7 @@ class Recorder:
             self.tally.gaps += 1
             self.tally.lost += missing
             at = f"frame {sequence[index]} ({self._sample_time(samples[index]):.3f} s)"
-            self._note(self.tally.gaps, f"{missing} frames are missing before {at}.")
+            self._note("gap", f"{_frames(missing)} missing before {at}.")
 
     def _note_faults(self, samples: NDArray[np.void]) -> None:
         """Note each time a fault latches after the motors were first enabled."""
@@ -98,12 +102,13 @@ class Recorder:
             flags = StateFlag(int(samples["flags"][index]) & 0xFFFF)
             names = ", ".join(flag.name or "" for flag in flags)
             at = f"{self._sample_time(samples[index]):.3f} s"
-            self._note(self.tally.faults, f"The device latched a fault at {at} ({names}).")
+            self._note("fault", f"The device latched a fault at {at} ({names}).")
         self._faulty = bool(faulty[-1])
         self._enabled_once = bool(since[-1])
 
-    def _note(self, number: int, sentence: str) -> None:
-        if number <= NOTES_OF_A_KIND:
+    def _note(self, kind: str, sentence: str) -> None:
+        self._noted[kind] += 1
+        if self._noted[kind] <= NOTES_OF_A_KIND:
             self.writer.note(sentence)
 
     def _when(self) -> str:
@@ -112,3 +117,7 @@ class Recorder:
     @staticmethod
     def _sample_time(sample: np.void) -> float:
         return float(sample["device_time_us"]) * 1e-6
+
+
+def _frames(count: int) -> str:
+    return "1 frame" if count == 1 else f"{count} frames"

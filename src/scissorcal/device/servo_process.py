@@ -25,7 +25,8 @@ class ServoProcess:
     """Runs the loop on a link's port in another process; a context manager.
 
     The process has the port to itself from :meth:`start` to :meth:`close`. It gets no Ctrl-C (it
-    stands in a session of its own); when this process dies, the missing heartbeat stops it.
+    stands in a session of its own). When this process dies the end of a pipe stops it, and when
+    this process hangs the missing heartbeat does.
     """
 
     def __init__(self, link: PortLink, block: LoopBlock) -> None:
@@ -55,7 +56,7 @@ class ServoProcess:
         self._process = subprocess.Popen(
             [sys.executable, "-m", "scissorcal.device.servo_main", str(line), str(memory)],
             pass_fds=(line, memory),
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=self._errors,
             start_new_session=True,
@@ -73,6 +74,8 @@ class ServoProcess:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
         self._errors.close()
 
     @contextmanager
