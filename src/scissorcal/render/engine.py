@@ -1,0 +1,315 @@
+"""Render a package on a rig: hold the loop to its limits, watch it, record it, judge it."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.capture import identity_facts
+from scissorcal.device.link import Link
+from scissorcal.device.loading import Confirm, is_simulator
+from scissorcal.device.motion import Motion, Samples, open_motion
+from scissorcal.errors import InputError
+from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
+from scissorcal.package import ModelPackage
+from scissorcal.recipe.schema import Limits
+from scissorcal.recording import Joint, RecordingWriter, label_strokes
+from scissorcal.render.latency import latency_of
+from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+
+Progress = Callable[[float, str], None]
+
+SUPERVISOR_S = 0.2
+"""Silence of this process after which only damping is left; after five times as much, nothing."""
+
+RATE_CUTOFF_HZ = 100.0
+FALLBACK_DAMPING = 0.02
+FAULT_CLEARINGS = 3
+TRAVEL_SHARE = 0.2
+THINNED_S = 0.01
+LOOK_EVERY_S = 0.25
+AT_REST_S = 0.5
+LIMITED_WARNING = 0.01
+
+REQUEST = (
+    "Take everything out from between the blades, and hold the handles loosely: they will push "
+    "back as soon as you go on."
+)
+
+
+@dataclass(frozen=True)
+class VirtualStrokes:
+    """What the hand of a simulator does: so many closing strokes, at this mean rate (rad/s)."""
+
+    count: int = 4
+    rate_rad_per_s: float = 0.3
+
+
+def render(
+    link: Link,
+    package: ModelPackage,
+    *,
+    seconds: float = 30.0,
+    limits: Limits | None = None,
+    strokes: VirtualStrokes | None = None,
+    writer: RecordingWriter | None = None,
+    progress: Progress | None = None,
+    confirm: Confirm | None = None,
+) -> RenderResult:
+    """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
+
+    The loop runs in a process of its own, paced by the device's frames, or frame by frame in
+    virtual time on a LockstepLink. It never leaves the tightest of three limits: ``limits`` (a
+    recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
+    On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
+    with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
+    ``writer`` records every sample; see `open_writer`.
+
+    Raises InputError, before anything moves, where package and device do not fit each other or
+    nobody can be asked; DeviceError where the rig fails, and what was recorded stays.
+    """
+    identity = link.identity
+    applied = _applied(package, limits, identity)
+    warnings = package.warnings + _mismatches(package, identity)
+    config = _servo_config(applied, identity)
+    if not is_simulator(identity) and confirm is None:
+        raise InputError(
+            "Rendering has to ask somebody to clear the blades first: give it a confirm callback "
+            "that shows a sentence and returns when that is done."
+        )
+    if not 0.0 < seconds < float("inf"):
+        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
+    watch = _Watch(package, writer, progress or _silent, seconds)
+    with open_motion(link, config, package.tables) as motion:
+        watch.wanted = _prepare(motion, strokes, confirm)
+        motion.fresh_sheet(0.0)
+        for samples in motion.render(seconds):
+            if watch.take(samples):
+                break
+        for samples in motion.idle(LOOK_EVERY_S):
+            watch.record(samples)
+        if is_simulator(identity):
+            motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
+    report = motion.report()
+    latency = latency_of(np.concatenate(watch.latency)) if watch.latency else None
+    limited = watch.limited / max(1, watch.frames)
+    result = RenderResult(
+        seconds=watch.frames * motion.tick_s,
+        frames=report.counters.frames,
+        strokes=watch.strokes,
+        latency=latency,
+        interval=report.interval,
+        misses=report.counters.misses,
+        garbled=report.garbled,
+        stalls=report.stalls,
+        unsent=report.unsent,
+        overrun=report.overrun,
+        faults=report.counters.faults,
+        fallback_frames=report.counters.fallback_frames,
+        limited_share=limited,
+        largest_torque_Nm=watch.largest_torque,
+        ledger=report.ledger,
+        limits=applied,
+        package_hash=package.manifest.content_hash,
+        verdicts=render_verdicts(report, latency, identity.tick_us),
+        warnings=warnings + _limited_warning(limited, applied),
+    )
+    _note(writer, result)
+    return result
+
+
+def open_writer(
+    path: Path, link: Link, package: ModelPackage, recipe_toml: str = ""
+) -> RecordingWriter:
+    """Open the recording of a rendering; the package's manifest travels in it.
+
+    ``recipe_toml`` is the recipe's text as it stands in its file. Raises as RecordingWriter does.
+    """
+    writer = RecordingWriter(
+        path,
+        "render",
+        Joint("rotary"),
+        recipe_toml,
+        identity_facts(link.identity),
+        link.identity.handle_radius,
+        min_travel=_travel(package),
+    )
+    manifest = package.manifest.model_dump_json(indent=2).encode("utf-8")
+    writer.attach("package-manifest.json", manifest, "application/json")
+    return writer
+
+
+class _Watch:
+    """Records what is rendered, and knows when it is over."""
+
+    def __init__(
+        self, package: ModelPackage, writer: RecordingWriter | None, tell: Progress, seconds: float
+    ) -> None:
+        self.wanted: int | None = None
+        self.frames = 0
+        self.limited = 0
+        self.strokes = 0
+        self.largest_torque = 0.0
+        self.latency: list[NDArray[np.uint32]] = []
+        self._travel = _travel(package)
+        self._writer = writer
+        self._tell = tell
+        self._seconds = seconds
+        self._time: list[NDArray[np.float64]] = []
+        self._opening: list[NDArray[np.float64]] = []
+        self._looked_at = 0.0
+
+    def take(self, samples: Samples) -> bool:
+        """Take a block of the rendering; whether all that was wanted has been done."""
+        self.record(samples)
+        if len(samples) == 0:
+            return False
+        self.frames += len(samples)
+        met = int(SampleFlag.TORQUE_LIMITED | SampleFlag.FORCE_LIMITED)
+        self.limited += int(np.count_nonzero(samples["flags"] & met))
+        self.largest_torque = max(
+            self.largest_torque, float(np.max(np.abs(samples["torque_command"])))
+        )
+        self.latency.append(samples["latency_ns"].copy())
+        time_s = samples["device_time_us"] * 1e-6
+        every = max(1, round(THINNED_S * len(samples) / max(float(np.ptp(time_s)), THINNED_S)))
+        self._time.append(time_s[::every])
+        self._opening.append(samples["opening"][::every].copy())
+        if time_s[-1] - self._looked_at < LOOK_EVERY_S:
+            return False
+        self._looked_at = float(time_s[-1])
+        return self._look()
+
+    def record(self, samples: Samples) -> None:
+        """Keep a block, whatever mode it comes from."""
+        if self._writer is None:
+            return
+        if len(samples):
+            self._writer.append(samples)
+        else:
+            self._writer.poll(time.time_ns())
+
+    def _look(self) -> bool:
+        """Count the strokes so far; whether the last one wanted is made and all is at rest."""
+        at, opening = np.concatenate(self._time), np.concatenate(self._opening)
+        found = label_strokes(opening, at, self._travel).strokes
+        self.strokes = sum(stroke.kind == "closing" for stroke in found)
+        passed = float(at[-1] - at[0]) / self._seconds
+        if self.wanted is None:
+            self._tell(min(passed, 1.0), f"rendering, {self.strokes} strokes so far")
+            return False
+        share = max(passed, self.strokes / max(1, self.wanted))
+        self._tell(min(share, 1.0), f"rendering, stroke {self.strokes} of {self.wanted}")
+        recent = opening[at > at[-1] - AT_REST_S]
+        resting = float(np.ptp(recent)) < 0.1 * self._travel
+        opened = opening[-1] > opening.min() + 0.5 * float(np.ptp(opening))
+        return self.strokes >= self.wanted and resting and bool(opened)
+
+
+def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -> AppliedLimits:
+    own = package.manifest.limits
+    recipe = limits or own
+    translates = "translation_force" in package.manifest.mechanics.render
+    return AppliedLimits(
+        torque_Nm=min(recipe.torque_Nm, own.torque_Nm, identity.torque_limit),
+        torque_slew_Nm_per_s=min(recipe.torque_slew_Nm_per_s, own.torque_slew_Nm_per_s),
+        force_N=min(recipe.force_N, own.force_N, identity.force_limit) if translates else 0.0,
+        force_slew_N_per_s=min(recipe.force_slew_N_per_s, own.force_slew_N_per_s),
+        engagement_ramp_s=max(recipe.engagement_ramp_s, own.engagement_ramp_s),
+    )
+
+
+def _servo_config(applied: AppliedLimits, identity: Identity) -> ServoConfig:
+    return ServoConfig(
+        torque_limit=applied.torque_Nm,
+        torque_slew=applied.torque_slew_Nm_per_s,
+        force_limit=applied.force_N,
+        force_slew=applied.force_slew_N_per_s,
+        ramp_s=applied.engagement_ramp_s,
+        damping_Nm_s_per_rad=FALLBACK_DAMPING,
+        rate_cutoff_Hz=RATE_CUTOFF_HZ,
+        supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
+        fault_clearings=FAULT_CLEARINGS,
+        tick_us=identity.tick_us,
+    )
+
+
+def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
+    """What of the device differs from what the package was made for, as sentences.
+
+    Raises InputError where the scene and the device have no opening in common.
+    """
+    manifest = package.manifest
+    low, high = manifest.ranges.opening_rad
+    if identity.opening_max <= low or identity.opening_min >= high:
+        raise InputError(
+            f"The package {manifest.name} is for openings of {np.degrees(low):.0f} to "
+            f"{np.degrees(high):.0f} degrees, and this device moves between "
+            f"{np.degrees(identity.opening_min):.0f} and {np.degrees(identity.opening_max):.0f}: "
+            "build a package for this rig."
+        )
+    found = []
+    rate = 1e6 / identity.tick_us
+    if abs(rate - manifest.mechanics.loop_rate_Hz) > 0.01 * rate:
+        found.append(
+            f"The device runs at {rate:.0f} Hz and the package was made for "
+            f"{manifest.mechanics.loop_rate_Hz:.0f} Hz."
+        )
+    radius = manifest.mechanics.handle_radius_m
+    if abs(identity.handle_radius - radius) > 0.01 * radius:
+        found.append(
+            f"The device states a handle radius of {identity.handle_radius * 1e3:.1f} mm and the "
+            f"package was made for {radius * 1e3:.1f} mm: forces at the handles differ by that."
+        )
+    return tuple(found)
+
+
+def _prepare(motion: Motion, strokes: VirtualStrokes | None, confirm: Confirm | None) -> int | None:
+    """Clear the blades and wake the virtual hand; how many strokes it will make, if any."""
+    if not is_simulator(motion.identity):
+        assert confirm is not None
+        with motion.paused():
+            confirm(REQUEST)
+        return None
+    strokes = strokes or VirtualStrokes()
+    motion.configure(ConfigKey.MATERIAL, 0.0)
+    motion.configure(ConfigKey.HAND_STROKES, float(strokes.count))
+    motion.configure(ConfigKey.HAND_SPEED_rad_per_s, strokes.rate_rad_per_s)
+    return strokes.count
+
+
+def _travel(package: ModelPackage) -> float:
+    low, high = package.manifest.ranges.opening_rad
+    return TRAVEL_SHARE * (high - low)
+
+
+def _limited_warning(share: float, applied: AppliedLimits) -> tuple[str, ...]:
+    if share <= LIMITED_WARNING:
+        return ()
+    return (
+        f"In {share:.0%} of the frames the model asked for more than the limits allow "
+        f"({applied.torque_Nm:g} N m): what was felt is weaker than the model.",
+    )
+
+
+def _note(writer: RecordingWriter | None, result: RenderResult) -> None:
+    if writer is None:
+        return
+    writer.note(f"Rendered package {result.package_hash} for {result.seconds:.1f} s.")
+    for sentence in result.warnings:
+        writer.note(sentence)
+    for count, words in (
+        (result.misses, "frames never came."),
+        (result.garbled, "frames arrived garbled."),
+        (result.faults, "times the device latched a fault."),
+        (result.overrun, "samples were fetched too late and lost."),
+    ):
+        if count:
+            writer.note(f"{count} {words}")
+
+
+def _silent(done: float, sentence: str) -> None:
+    pass

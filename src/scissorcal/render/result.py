@@ -1,0 +1,121 @@
+"""What a rendering was: how fast, how complete, how much energy, and whether it may be trusted."""
+
+from dataclasses import dataclass
+
+from scissorcal.device.motion import Latency, MotionReport
+from scissorcal.kernel import EnergyLedger
+from scissorcal.verdicts import Status, Verdict
+
+SCOPE = "render"
+MOST_MISSED = 0.01
+MOST_CREATED = 0.1
+NEGLIGIBLE_J = 5e-3
+"""What the ramp at engagement leaves unpaid: the model's books are full from the start."""
+
+
+@dataclass(frozen=True)
+class AppliedLimits:
+    """The tightest of recipe's, package's and device's limits: what the loop was held to.
+
+    ``force_N`` is 0 where the scene renders no translation force: the advance motor is off then.
+    """
+
+    torque_Nm: float
+    torque_slew_Nm_per_s: float
+    force_N: float
+    force_slew_N_per_s: float
+    engagement_ramp_s: float
+
+
+@dataclass(frozen=True)
+class RenderResult:
+    """How a rendering went. Counts are frames, ``seconds`` the device's time spent rendering.
+
+    ``latency`` (us) runs from a frame's arrival to the command's departure, ``interval`` (us)
+    between frames by the host's clock; both None in virtual time, where they mean nothing.
+    ``misses`` are frames that never came, ``garbled`` those that came damaged, ``stalls`` pauses
+    of more than five ticks, ``unsent`` commands that the line did not take, ``overrun`` samples
+    that this process fetched too late. ``limited_share`` is the share of rendering frames in which
+    torque or force met its limit. ``strokes`` counts closings of the blades, ``package_hash`` is
+    the content hash of what was rendered. ``warnings`` are sentences for whoever stands at the
+    rig.
+    """
+
+    seconds: float
+    frames: int
+    strokes: int
+    latency: Latency | None
+    interval: Latency | None
+    misses: int
+    garbled: int
+    stalls: int
+    unsent: int
+    overrun: int
+    faults: int
+    fallback_frames: int
+    limited_share: float
+    largest_torque_Nm: float
+    ledger: EnergyLedger
+    limits: AppliedLimits
+    package_hash: str
+    verdicts: tuple[Verdict, ...]
+    warnings: tuple[str, ...]
+
+
+def render_verdicts(
+    report: MotionReport, latency: Latency | None, tick_us: int
+) -> tuple[Verdict, ...]:
+    """Judge a rendering: on time, complete, supervised, passive."""
+    return (
+        _deadline(latency, tick_us),
+        _complete(report),
+        _supervised(report),
+        _passive(report.ledger),
+    )
+
+
+def _deadline(latency: Latency | None, tick_us: int) -> Verdict:
+    if latency is None:
+        why = "In virtual time nothing can be late."
+        return Verdict(SCOPE, "deadline", "not_evaluated", None, float(tick_us), why)
+    status: Status = "pass" if latency.p99 < tick_us else "fail"
+    why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
+    if status == "fail":
+        why += " 'scissorcal device doctor' says what is slow."
+    return Verdict(SCOPE, "deadline", status, latency.p99, float(tick_us), why)
+
+
+def _complete(report: MotionReport) -> Verdict:
+    counters = report.counters
+    share = counters.misses / max(1, counters.frames + counters.misses)
+    status: Status = "pass" if share <= MOST_MISSED else "fail"
+    why = f"{counters.misses} of {counters.frames + counters.misses} frames never came."
+    if status == "fail":
+        why += " Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
+    return Verdict(SCOPE, "misses", status, share, MOST_MISSED, why)
+
+
+def _supervised(report: MotionReport) -> Verdict:
+    count = report.counters.fallback_frames
+    if count == 0:
+        why = "The supervising process was never silent for too long."
+        return Verdict(SCOPE, "supervision", "pass", 0.0, 0.0, why)
+    why = (
+        f"For {count} frames only damping was rendered, because the supervising process was "
+        "silent: close what keeps the computer busy."
+    )
+    return Verdict(SCOPE, "supervision", "fail", float(count), 0.0, why)
+
+
+def _passive(ledger: EnergyLedger) -> Verdict:
+    """Whether more came out than went in: energy from nothing is felt as buzzing."""
+    taken = ledger.fracture_J + ledger.arrest_J + ledger.friction_J
+    allowed = max(NEGLIGIBLE_J, MOST_CREATED * taken)
+    status: Status = "pass" if ledger.created_J <= allowed else "fail"
+    why = (
+        f"The motors put {ledger.delivered_J:.3g} J into the handles, and the model took up "
+        f"{taken:.3g} J: {max(ledger.created_J, 0.0):.2g} J came from nothing."
+    )
+    if status == "fail":
+        why += " Limits, ramp or a slow loop distort the model: lower its stiffness or speed."
+    return Verdict(SCOPE, "passivity", status, ledger.created_J, allowed, why)

@@ -1,0 +1,28 @@
+"""Rendering through a real pseudo-terminal, in real time. No time is asserted."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scissorcal.device.link import open_link
+from scissorcal.device.sim.process import SimProcess
+from scissorcal.kernel import ConfigKey
+from scissorcal.package import ModelPackage
+from scissorcal.recording import read_recording
+from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
+
+
+def test_a_port_is_served_by_a_process_of_its_own(paper: ModelPackage, tmp_path: Path) -> None:
+    path = tmp_path / "r.mcap"
+    with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
+        with open_writer(path, link, paper) as writer:
+            result = render(link, paper, seconds=3.0, strokes=VirtualStrokes(1, 0.6), writer=writer)
+        link.configure(ConfigKey.STREAM, 1.0)
+        assert link.state().flags & 1 == 0, "the motors stayed on"
+    recording = read_recording(path)
+    assert result.frames >= 2500
+    assert result.latency is not None
+    assert 0.0 < result.latency.p50 <= result.latency.p99 <= result.latency.worst
+    assert latency_of(recording.samples["latency_ns"]) is not None
+    assert np.any(recording.samples["torque_command"] != 0.0)
+    assert np.all(np.abs(recording.samples["torque_command"]) <= result.limits.torque_Nm)
