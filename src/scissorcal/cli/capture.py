@@ -7,7 +7,7 @@ import click
 
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import device_option, seed_option, workspace_option
+from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
 from scissorcal.cli.output import Answer, command, note
 
 if TYPE_CHECKING:
@@ -19,10 +19,6 @@ _COMMANDS = {
     "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
     "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
 }
-
-yes_option = click.option(
-    "--yes", is_flag=True, help="Ask nobody: blades are clear and material is loaded."
-)
 
 
 @click.group("capture", cls=LazyGroup, lazy=_COMMANDS)
@@ -74,13 +70,13 @@ def cut(device: str, hand: bool, yes: bool, seed: int, folder: Path | None) -> A
 def _capture(
     kind: "CaptureKind", device: str, *, hand: bool, yes: bool, seed: int, folder: Path | None
 ) -> Answer:
-    from scissorcal.cli.capture_view import CaptureView
+    from scissorcal.cli.live_view import LiveView
     from scissorcal.workday.captures import capture_into
 
     workspace = open_workspace(folder)
     before = set(workspace.recordings(kind))
     try:
-        with CaptureView(ask=not yes) as view:
+        with LiveView(ask=not yes) as view:
             captured = capture_into(
                 workspace,
                 kind,

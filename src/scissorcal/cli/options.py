@@ -31,3 +31,7 @@ device_option: Decorator = click.option(
     metavar="PORT|sim",
     help='Serial port of the rig, such as /dev/ttyUSB0, or "sim" for a virtual one.',
 )
+
+yes_option: Decorator = click.option(
+    "--yes", is_flag=True, help="Ask nobody: blades are clear, or material is loaded."
+)

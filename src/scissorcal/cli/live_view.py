@@ -1,4 +1,4 @@
-"""What a person sees of a capture: how far it is, what it covers, and what to load."""
+"""What a person at the rig sees: how far it is, what is covered, and what to load."""
 
 import sys
 import time
@@ -19,7 +19,7 @@ _LINE_EVERY_S = 5.0
 _DRAW_EVERY_S = 0.1
 
 
-class CaptureView:
+class LiveView:
     """Shows progress and coverage on stderr, live on a terminal and as lines elsewhere.
 
     ``ask`` says whether a person is asked to load material and to press Enter.
@@ -29,6 +29,7 @@ class CaptureView:
         self._ask = ask
         self._live: Live | None = None
         self._drawn_s = float("-inf")
+        self._finished = False
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
@@ -48,16 +49,17 @@ class CaptureView:
         if self._live is not None:
             self._live.stop()
 
-    def show(self, done: float, sentence: str, coverage: "CoverageGrid") -> None:
-        """Show how far the capture is."""
+    def show(self, done: float, sentence: str, coverage: "CoverageGrid | None" = None) -> None:
+        """Show how far the work at the rig is, and what a capture covers so far."""
         now = time.monotonic()
         every = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
-        if now - self._drawn_s < every and done < 1.0:
+        finished = done >= 1.0 and not self._finished
+        if now - self._drawn_s < every and not finished:
             return
-        self._drawn_s = now
+        self._drawn_s, self._finished = now, done >= 1.0
         head = f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}"
         if self._live is None:
-            click.echo(f"{head}; {coverage.sentence()}", err=True)
+            click.echo(f"{head}; {coverage.sentence()}" if coverage else head, err=True)
         else:
             self._live.update(_drawing(done, head, coverage), refresh=True)
 
@@ -83,9 +85,10 @@ class CaptureView:
         self._live = live
 
 
-def _drawing(done: float, head: str, coverage: "CoverageGrid") -> Any:
+def _drawing(done: float, head: str, coverage: "CoverageGrid | None") -> Any:
     from rich.console import Group
     from rich.progress_bar import ProgressBar
     from rich.text import Text
 
-    return Group(Text(head), ProgressBar(total=1.0, completed=done, width=40), coverage)
+    bar = ProgressBar(total=1.0, completed=done, width=40)
+    return Group(Text(head), bar, coverage) if coverage else Group(Text(head), bar)

@@ -1,0 +1,118 @@
+"""``scissorcal render``"""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
+from scissorcal.cli.output import Answer, command, note, table
+
+if TYPE_CHECKING:
+    from scissorcal.workday.renders import Rendered
+
+
+@click.command("render")
+@device_option
+@click.option(
+    "--package",
+    "package_path",
+    type=click.Path(path_type=Path),
+    help="The package to render; the workspace's if not given.",
+)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    default=30.0,
+    show_default=True,
+    help="How long to render, by the rig's clock.",
+)
+@click.option("--strokes", type=click.IntRange(1), default=4, show_default=True, help="sim only.")
+@click.option(
+    "--rate-rad-per-s",
+    type=click.FloatRange(min=0, min_open=True),
+    default=0.3,
+    show_default=True,
+    help="Speed of the virtual hand; sim only.",
+)
+@click.option("--no-record", is_flag=True, help="Keep no recording.")
+@yes_option
+@seed_option
+@workspace_option
+@command
+def render(
+    device: str,
+    package_path: Path | None,
+    seconds: float,
+    strokes: int,
+    rate_rad_per_s: float,
+    no_record: bool,
+    yes: bool,
+    seed: int,
+    folder: Path | None,
+) -> Answer:
+    """Render the cut on a rig: hold the handles and close them.
+
+    The loop runs in C, in a process of its own, within the recipe's limits. With --device sim a
+    virtual hand makes the strokes.
+
+    \b
+    Example:
+      $ scissorcal render --device sim
+      rendered 4 strokes in 14.2 s on scissorcal-sim office-paper
+      latency (us)   p50 9   p99 24   p99.9 96   worst 402
+    """
+    from scissorcal.cli.live_view import LiveView
+    from scissorcal.render import VirtualStrokes
+    from scissorcal.workday.renders import package_has_fallen_behind, render_workspace
+
+    workspace = open_workspace(folder)
+    if package_path is None and package_has_fallen_behind(workspace):
+        note("The package is not of the fits and recipe as they are now; see 'scissorcal plan'.")
+    with LiveView(ask=not yes) as view:
+        rendered = render_workspace(
+            workspace,
+            device,
+            package_path=package_path,
+            seconds=seconds,
+            strokes=VirtualStrokes(strokes, rate_rad_per_s),
+            record=not no_record,
+            seed=seed,
+            progress=view.show,
+            confirm=view.confirm,
+        )
+    result = asdict(rendered.result)
+    verdicts = rendered.result.verdicts
+    del result["verdicts"]
+    files = [rendered.recording] if rendered.recording else []
+    return Answer({**result, "rig": rendered.rig}, _text(rendered), verdicts, files)
+
+
+def _text(rendered: "Rendered") -> str:
+    result = rendered.result
+    lines = [f"rendered {result.strokes} strokes in {result.seconds:.1f} s on {rendered.rig}"]
+    if result.latency is not None:
+        at = result.latency
+        rows = [["latency (us)", "p50", "p99", "p99.9", "worst"]]
+        rows.append(["", *(f"{value:.0f}" for value in (at.p50, at.p99, at.p999, at.worst))])
+        lines += ["", table(rows, right=[1, 2, 3, 4])]
+    lines += [
+        "",
+        f"{result.misses} frames missed, {result.garbled} garbled, {result.stalls} stalls, "
+        f"{result.faults} faults; {100 * result.limited_share:.1f} % of the frames at a limit",
+        f"largest torque {result.largest_torque_Nm:.3g} N m",
+        "",
+    ]
+    ledger = [["energy", "mJ"]]
+    ledger += [
+        [name.removesuffix("_J"), f"{value * 1e3:.2f}"]
+        for name, value in asdict(result.ledger).items()
+        if name.endswith("_J") and math.isfinite(value)
+    ]
+    lines.append(table(ledger, right=[1]))
+    if result.warnings:
+        lines += ["", *(f"note: {warning}" for warning in result.warnings)]
+    return "\n".join(lines)
