@@ -95,7 +95,7 @@ def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
 def test_a_rig_with_a_bad_line_is_found_out() -> None:
     told: list[float] = []
     with (
-        SimProcess("office-paper", seed=3, faults=("drop=0.02", "garble=0.02")) as sim,
+        SimProcess("office-paper", seed=3, faults=("drop=0.01", "garble=0.01")) as sim,
         open_link(sim.port) as link,
     ):
         found = examine(link, seconds=1.0, progress=lambda done, sentence: told.append(done))

@@ -149,7 +149,7 @@ class PortLink(AbstractContextManager["PortLink"]):
             "baud rate."
         )
 
-    def round_trip(self, timeout: float = 0.5) -> float:
+    def round_trip(self, timeout: float = 0.2) -> float:
         """Seconds from HELLO to IDENTITY, the latency of port and device together; NaN if lost."""
         nonce = self._nonce()
         sent = time.perf_counter()

@@ -10,6 +10,7 @@ from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    Command,
     ConfigKey,
     Histogram,
     LoopBlock,
@@ -125,7 +126,8 @@ class PortMotion(Motion):
         self._process.close()
         self._final = self.report()
         self._block.close()
-        with suppress(DeviceError):  # an unplugged device has stopped streaming anyway
+        with suppress(DeviceError):  # an unplugged device has released its motors anyway
+            self._link.send(Command(0, 0, 0.0, 0.0))
             self._link.configure(ConfigKey.STREAM, 0.0)
             self._link.flush()
 

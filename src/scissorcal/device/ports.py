@@ -2,6 +2,7 @@
 
 import errno
 import os
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -10,18 +11,27 @@ from scissorcal.errors import DeviceError
 if TYPE_CHECKING:
     import serial
 
+BUSY = (errno.EBUSY, errno.EAGAIN)
+BUSY_PATIENCE_S = 0.5
+
 
 def open_port(port: str, baud: int) -> "serial.Serial":
     """Open a port for one user alone, raw, without blocking, and without its adapter's delay.
 
+    A busy port is tried for half a second, in which a capture that was killed lets go of it.
     Raises DeviceError, with what to do next, where it is missing, busy, forbidden or no port.
     """
     import serial
 
-    try:
-        opened = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True)
-    except (OSError, ValueError) as error:
-        raise DeviceError(_why_not_open(port, baud, error)) from error
+    patient_until = time.monotonic() + BUSY_PATIENCE_S
+    while True:
+        try:
+            opened = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True)
+            break
+        except (OSError, ValueError) as error:
+            if _errno_of(error) not in BUSY or time.monotonic() > patient_until:
+                raise DeviceError(_why_not_open(port, baud, error)) from error
+        time.sleep(0.02)
     # Adapters hold data back for up to 16 ms unless told not to; a pty has no such setting.
     with suppress(ValueError, OSError, NotImplementedError, AttributeError):
         opened.set_low_latency_mode(True)
@@ -47,7 +57,7 @@ def _why_not_open(port: str, baud: int, error: Exception) -> str:
             f"You may not open {port}: join the group that owns it (on most Linux systems "
             "'sudo usermod -aG dialout $USER'), log in again, and retry."
         )
-    if number in (errno.EBUSY, errno.EAGAIN):
+    if number in BUSY:
         return f"{port} is in use by another program: close that one first."
     if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):
         return f"{port} is no serial port, or cannot do {baud} baud: name the rig's port."
