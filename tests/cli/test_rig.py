@@ -1,0 +1,93 @@
+"""Commands that speak to a rig: through a real pseudo-terminal, served by another process."""
+
+import os
+import pty
+import re
+from pathlib import Path
+
+import pytest
+
+from scissorcal.device.sim.process import SimProcess
+
+from .conftest import Cli
+
+
+@pytest.fixture
+def quick(workspace: Path) -> Path:
+    """The workspace, with a recipe that records little."""
+    recipe = workspace / "recipe.toml"
+    text = recipe.read_text()
+    text = re.sub(r"speeds_rad_per_s = \[.*\]", "speeds_rad_per_s = [1.0]", text)
+    text = text.replace("repeats = 2", "repeats = 1").replace(
+        "excitation_s = 10.0", "excitation_s = 1.0"
+    )
+    text = text.replace("strokes_per_sheet = 4", "strokes_per_sheet = 1").replace(
+        "sheets = 3", "sheets = 1"
+    )
+    recipe.write_text(text)
+    return workspace
+
+
+def test_captures_on_the_virtual_rig_fill_the_plan(quick: Path, cli: Cli) -> None:
+    said = cli("capture", "friction", "--device", "sim", "--seed", "3", "--json")
+    assert said.code == 0, said.err
+    result = said.envelope["result"]
+    assert result["samples"] > 2000
+    assert result["coverage"]["share"] > 0
+    (path,) = said.envelope["files"]
+    assert Path(path).parent == quick / "captures"
+    said = cli("capture", "cut", "--device", "sim")
+    assert said.code == 0, said.err
+    assert "cells filled" in said.out
+    steps = cli("plan", "--json").envelope["result"]["steps"]
+    assert [step["status"] for step in steps[:3]] == ["done", "done", "missing"]
+
+
+def test_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
+    with SimProcess("office-paper", faults=["unplug=1.5"]) as sim:
+        said = cli("capture", "friction", "--device", sim.port)
+    assert said.code == 4
+    kept = re.search(r"kept in (captures/friction-\S+\.mcap)\.", said.err)
+    assert kept, said.err
+    shown = cli("recording", "show", quick / kept[1], "--json").envelope["result"]["recording"]
+    assert shown["samples"] > 500
+
+
+@pytest.mark.parametrize("words", [["capture", "friction"], ["device", "doctor"], ["render"]])
+def test_a_missing_port_is_a_device_fault(words: list[str], quick: Path, cli: Cli) -> None:
+    said = cli(*words, "--device", "/dev/ttyNOWHERE", "--json")
+    if words == ["render"]:
+        assert said.code == 5
+        assert "scissorcal package build" in said.err
+        return
+    assert said.code == 4
+    assert "/dev/ttyNOWHERE" in said.envelope["result"]["error"]
+    assert not list(quick.glob("captures/*.mcap*"))
+
+
+def test_a_port_that_speaks_something_else_is_said_to(quick: Path, cli: Cli) -> None:
+    master, slave = pty.openpty()
+    try:
+        os.write(master, b"login: \r\npassword: \r\n" * 20)
+        said = cli("device", "doctor", "--device", os.ttyname(slave))
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert said.code == 4
+    assert "Traceback" not in said.err
+
+
+def test_the_doctor_examines_the_virtual_rig(cli: Cli) -> None:
+    said = cli("device", "doctor", "--device", "sim", "--seconds", "0.5", "--json")
+    assert said.code in (0, 3)
+    assert said.envelope["result"]["identity"]["name"] == "scissorcal-sim"
+    assert said.envelope["verdicts"]
+
+
+def test_ports_are_listed(cli: Cli) -> None:
+    assert "sim" in cli("device", "list").out
+
+
+def test_an_unknown_specimen_or_fault_is_named(cli: Cli) -> None:
+    assert cli("device", "simulate", "granite").code == 2
+    assert cli("device", "simulate", "--fault", "lightning=1").code == 2

@@ -1,0 +1,45 @@
+"""Progress is plain lines where nobody watches, and nobody is asked where nobody is there."""
+
+import pytest
+
+from scissorcal.cli import progress as progress_module
+from scissorcal.cli.live_view import LiveView
+from scissorcal.cli.progress import progress
+from scissorcal.device.coverage import CoverageGrid
+from scissorcal.errors import InputError
+
+
+def test_lines_are_printed_where_the_sentence_changes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 1.0, 2.0, 9.0])
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: next(clock))
+    with progress() as tell:
+        tell(0.0, "reading")
+        tell(0.1, "reading")
+        tell(0.5, "fitting")
+        tell(1.7, "fitting")
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.splitlines() == ["  0 %  reading", " 50 %  fitting", "100 %  fitting"]
+
+
+def test_a_capture_says_what_it_covers(capsys: pytest.CaptureFixture[str]) -> None:
+    grid = CoverageGrid((0.1,), ((0.2, 0.3), (0.3, 0.4)))
+    with LiveView() as view:
+        view.show(0.0, "closing", grid)
+        view.show(0.1, "closing", grid)
+        view.show(1.0, "done", grid)
+        view.show(1.0, "done", grid)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert "0 of 4 cells filled" in lines[0]
+    assert lines[1].startswith("100 %  done")
+
+
+def test_nobody_is_asked_where_nobody_is_there(capsys: pytest.CaptureFixture[str]) -> None:
+    with LiveView() as view, pytest.raises(InputError, match=r"Clear the blades\. .*--yes"):
+        view.confirm("Clear the blades.")
+    with LiveView(ask=False) as view:
+        view.confirm("Clear the blades.")
+    assert "Clear the blades. (--yes: taken as done)" in capsys.readouterr().err
