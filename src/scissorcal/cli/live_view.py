@@ -32,12 +32,7 @@ class LiveView:
         self._finished = False
 
     def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.live import Live
-
-            self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=True)
-            self._live.start()
+        self._start()
         return self
 
     def __exit__(
@@ -46,8 +41,7 @@ class LiveView:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._live is not None:
-            self._live.stop()
+        self._stop()
 
     def show(self, done: float, sentence: str, coverage: "CoverageGrid | None" = None) -> None:
         """Show how far the work at the rig is, and what a capture covers so far."""
@@ -76,13 +70,22 @@ class LiveView:
                 f"{request} Nobody can be asked here: run this at a terminal, or give --yes once "
                 "it is done."
             )
-        live, self._live = self._live, None
-        if live is not None:
-            live.stop()
+        self._stop()
         click.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
-        if live is not None:
-            live.start()
-        self._live = live
+        self._start()
+
+    def _start(self) -> None:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=True)
+            self._live.start()
+
+    def _stop(self) -> None:
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
 
 
 def _drawing(done: float, head: str, coverage: "CoverageGrid | None") -> Any:
