@@ -200,7 +200,7 @@ def model_cases() -> dict[str, tuple[ModelTables, Motion, float]]:
             2e-5,
         ),
         "steep response": (make_tables(response=steep), stroke, 1e-4),
-        "stiff response": (make_tables(response=stiff), stroke, 4e-3),
+        "stiff response": (make_tables(response=stiff), stroke, 6e-3),
         "edges become parallel": (
             make_tables(response=coarse, edge=line_edge(slope=0.0), upper_face=2e-3),
             parallel,

@@ -6,9 +6,9 @@
 static const float RESPONSE_CAP = 1e6f; /* N: far beyond any rig, keeps all that follows finite */
 static const float PARALLEL = 1e-6f;    /* tan(psi) up to which edges count as parallel */
 static const float CLOSE_ENOUGH = 2e-6f;  /* of the target */
-static const float RESOLUTION = 1.5e-7f;  /* of a station: as fine as float tells places apart */
+static const float RESOLUTION = 1e-7f;      /* of a station: about what float tells apart */
 
-enum { MOST_STEPS = 48 };
+enum { MOST_STEPS = 75 }; /* 25 bisections: the whole blade down to float's resolution */
 
 float sc_response_at(const sc_model *model, float indentation)
 {
@@ -57,27 +57,39 @@ static float excess_at(const sc_model *model, sc_turn turn, float target, float 
 }
 
 /* How far a Newton step goes from a point: the release falls as the edge rises out of the material
- * (its change of slope matters less, and the bracket makes up for it). */
+ * (its change of slope matters less, and the bracket makes up for it). Infinite where the response
+ * stands at its cap. */
 static float newton_step(const sc_model *model, sc_turn turn, const sc_edge_point *point,
                          float excess)
 {
     float stiffness;
-    (void)sc_table_at(&model->response, model->upper_face - point->y, &stiffness);
+    const float force =
+        sc_table_at(&model->response, model->upper_face - point->y, &stiffness);
     const float rise = turn.sine + point->taper * turn.cosine;
+    if (force >= RESPONSE_CAP) {
+        return INFINITY;
+    }
     return excess / ((float)model->moving_blades * stiffness * rise * point->slope);
 }
 
 /* The excess changes sign between low, where *point stands, and high. Newton steps that stay inside
- * the shrinking bracket, every third step a bisection, so that it shrinks whatever the shape. */
+ * the shrinking bracket, every third step a bisection, so that it shrinks whatever the shape. Done
+ * when the next step would be too short for float to tell the places apart; such a step back from
+ * the far side is lengthened to as much, to bracket the root. */
 static void close_bracket(const sc_model *model, sc_turn turn, float target, float high,
                           float excess, sc_edge_point *point)
 {
     float low = point->station;
     for (int i = 0; i < MOST_STEPS; i++) {
-        float station = point->station + newton_step(model, turn, point, excess);
-        if (fabsf(station - point->station) <= RESOLUTION * high) {
-            return;
+        const float shortest = RESOLUTION * fabsf(point->station);
+        float step = newton_step(model, turn, point, excess);
+        if (fabsf(step) < shortest) {
+            if (excess > 0.0f) {
+                return;
+            }
+            step = -shortest;
         }
+        float station = point->station + step;
         if (i % 3 == 2 || !(station > low && station < high)) {
             station = 0.5f * (low + high);
         }

@@ -96,7 +96,9 @@ static void fracture(const sc_model *model, sc_crack *state, sc_turn turn, float
         return;
     }
     sc_edge_point stop = start;
-    (void)sc_run_out(model, turn, model->kappa * model->fracture_energy, &stop);
+    if (model->kappa < 1.0f) {
+        (void)sc_run_out(model, turn, model->kappa * model->fracture_energy, &stop);
+    }
     const float length = stop.x - start.x;
     if (!(length > SHORTEST_RUN)) {
         book_advance(state, advance + start.x, model->fracture_energy, out);
