@@ -13,15 +13,12 @@ from tests.workday.made import quick_workspace, record_friction
 
 from .conftest import Cli
 
-ONE_RUNG = '[fit.cut]\nresponse = "power"\nfracture = "smooth"\n'
-
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """A workspace with both captures, made up, and few choices for the fits."""
     workspace = quick_workspace(tmp_path_factory.mktemp("day") / "paper")
-    text = workspace.recipe_path.read_text(encoding="utf-8").replace("[fit.cut]\n", ONE_RUNG)
-    workspace.recipe_path.write_text(text, encoding="utf-8")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
     record_friction(workspace)
     opening, advance, strokes = [], [], []
     for place, speed in ((-0.018, 0.6), (0.016, 0.9)):

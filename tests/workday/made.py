@@ -6,24 +6,56 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.recording import write_recording
-from scissorcal.workday.workspace import Workspace, create_workspace
+from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
 
-QUICK = """
+RECIPE = """
+format = "scissorcal-recipe/1"
+name = "made-up"
+description = "For tests: few choices, quick to fit."
+specimen = "office-paper"
+
+[rig]
+handle_radius_mm = 60.0
+
+[rig.edge]
+offset_mm = -8.0
+taper_deg = 2.0
+length_mm = 75.0
+
+[material]
+name = "paper"
+thickness_mm = 0.10
+
+[scene]
+opening_deg = [12.0, 50.0]
+opening_rate_rad_per_s = [0.05, 1.0]
+contact_mm = [15.0, 60.0]
+tolerance_percent = 7.0
+
+[capture.friction]
+speeds_rad_per_s = [0.1, 0.3, 0.8]
+
 [fit]
 effort = "draft"
 
 [fit.friction]
 rung = "coulomb+viscous"
 symmetry = "symmetric"
+
+[fit.cut]
+response = "power"
+fracture = "smooth"
+reference_indentation_mm = 0.15
+toughness_J_per_m2 = { median = 5000.0, factor_90 = 10.0 }
 """
 
 
 def quick_workspace(folder: Path) -> Workspace:
-    """Make a workspace for paper whose friction fit tries one rung only, at draft effort."""
-    workspace = create_workspace(folder, "paper-80gsm")
-    with workspace.recipe_path.open("a", encoding="utf-8") as recipe:
-        recipe.write(QUICK)
+    """Make a workspace whose fits try one rung only, at draft effort."""
+    folder.mkdir(parents=True)
+    workspace = Workspace(folder)
+    workspace.recipe_path.write_text(RECIPE, encoding="utf-8")
     return workspace
 
 

@@ -81,7 +81,7 @@ def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:
 
 def test_a_change_elsewhere_in_the_recipe_leaves_it_fresh(copied: Workspace) -> None:
     edit(copied, "tolerance_percent = 7.0", "tolerance_percent = 5.0")
-    edit(copied, "speeds_rad_per_s = [0.05, 0.12,", "speeds_rad_per_s = [0.06, 0.12,")
+    edit(copied, "speeds_rad_per_s = [0.1,", "speeds_rad_per_s = [0.2,")
     plan = make_plan(copied)
     assert states(plan)["capture friction"] == "done"
     assert states(plan)["fit friction"] == "done"
