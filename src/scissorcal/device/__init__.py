@@ -1,0 +1,1 @@
+"""The link to a rig, what it is made to do, and what it says: ports, motions, captures."""

@@ -21,6 +21,7 @@ from scissorcal.kernel import (
 )
 
 FAREWELLS = 3
+SILENCE_S = 1.0
 
 
 @runtime_checkable
@@ -55,6 +56,7 @@ class LockstepMotion(Motion):
         self._ticks = max(1, round(BLOCK_S / self.tick_s))
         self._failure: DeviceError | None = None
         self._last_sequence = -1
+        self._silent_s = 0.0
         self._garbled_before = link.garbled
         link.configure(ConfigKey.STREAM, 1.0)
         self.step()
@@ -129,6 +131,9 @@ class LockstepMotion(Motion):
                 rows += self._exchange()
         except DeviceError as error:
             self._failure = error
+        self._silent_s = 0.0 if rows else self._silent_s + self._ticks * self.tick_s
+        if self._silent_s > SILENCE_S and not stopped:
+            self._failure = DeviceError(StopReason.SILENCE.sentence)
         samples = np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE)
         return self._without_repeats(samples)
 

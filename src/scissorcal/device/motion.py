@@ -89,7 +89,9 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def position(self) -> tuple[float, float]:
         """Opening (rad) and advance (m) of the last sample; DeviceError if there was none."""
         if self._position is None:
-            raise DeviceError("The device has not said yet where it stands.")
+            raise DeviceError(
+                "The device sends no usable opening and advance: check its encoders and cables."
+            )
         return self._position
 
     @property
@@ -133,8 +135,9 @@ class Motion(AbstractContextManager["Motion"], ABC):
         """Let about 50 ms pass and return the samples that came; shows that the host lives."""
         samples = self._pass_time()
         if len(samples):
-            last = samples[-1]
-            self._position = (float(last["opening"]), float(last["advance"]))
+            place = (float(samples["opening"][-1]), float(samples["advance"][-1]))
+            if np.all(np.isfinite(place)):
+                self._position = place
         elif self.stop_reason is not StopReason.NONE:
             raise self._stopped()
         return samples

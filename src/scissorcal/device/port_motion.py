@@ -23,6 +23,7 @@ from scissorcal.kernel import (
 DRAIN_S = 0.05
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
+FIRST_PLACE_TIMEOUT_S = 2.0
 
 
 class PortMotion(Motion):
@@ -39,7 +40,8 @@ class PortMotion(Motion):
         self._final: MotionReport | None = None
         try:
             self._process.start()
-            while self._position is None:
+            until = time.monotonic() + FIRST_PLACE_TIMEOUT_S
+            while self._position is None and time.monotonic() < until:
                 self.step()
         except BaseException:
             self.close()
