@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording.recording import Stroke, StrokeKind
 from scissorcal.report import RecordingSummary
 from scissorcal.verdicts import Verdict
 
@@ -15,7 +15,11 @@ Array = NDArray[np.float64]
 FRICTION_SOURCE = "captures/friction-20250131T140500Z.mcap"
 CUT_SOURCE = "captures/cut-20250131T143000Z.mcap"
 LINEAR_SOURCE = "captures/friction-linear.mcap"
-HASH = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
+HASHES = {
+    FRICTION_SOURCE: "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+    CUT_SOURCE: "60303ae22b998861bce3b28f33eec1be758a213c86c93c076dbe9f558c11c752",
+    LINEAR_SOURCE: "fd61a03af4f77d870fc21e05e7e80678095c92d808cfb3b5c279ee04c74aca13",
+}
 RATE_HZ = 100.0
 
 
@@ -65,9 +69,7 @@ def friction_fit(seed: int = 1) -> FitResult:
         Verdict(
             "fit.friction", "whiteness", "pass", 0.19, 0.01, "Residuals look like white noise."
         ),
-        Verdict(
-            "fit.friction", "held-out error", "pass", 0.048, 0.07, "New strokes are predicted."
-        ),
+        Verdict("fit.friction", "held-out", "pass", 0.048, 0.07, "New strokes are predicted."),
         Verdict("fit.friction", "trust check", "not_evaluated", None, None, "Each speed ran once."),
     )
     return _fit("friction", "stribeck, symmetric", parameters, pieces, rungs, verdicts, rng)
@@ -107,7 +109,7 @@ def cut_fit(seed: int = 2) -> FitResult:
             0.01,
             "Residuals repeat over 0.02 rad: the ripple's phase is not modelled.",
         ),
-        Verdict("fit.cut", "held-out error", "pass", 0.066, 0.07, "New strokes are predicted."),
+        Verdict("fit.cut", "held-out", "pass", 0.066, 0.07, "New strokes are predicted."),
     )
     return _fit("cut", "power, rippled, work closure", parameters, pieces, rungs, verdicts, rng)
 
@@ -135,8 +137,9 @@ def linear_fit(seed: int = 3) -> FitResult:
         fit,
         effort_unit="N",
         position_unit="m",
-        sources=(LINEAR_SOURCE,),
-        structure={**fit.structure, "joint": "linear"},
+        notes=("Imported from a table.",),
+        sources=(f"{LINEAR_SOURCE} sha256:{HASHES[LINEAR_SOURCE]}",),
+        structure={**fit.structure, "joint": "linear", "angle_center": 0.12},
     )
 
 
@@ -169,7 +172,7 @@ def without_numbers(fit: FitResult) -> FitResult:
 def _recording(source: str, kind: str, joint: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
     return RecordingSummary(
         source=source,
-        content_hash=HASH,
+        content_hash=HASHES[source],
         kind=kind,
         joint=joint,
         samples=61234,
@@ -182,10 +185,10 @@ def _recording(source: str, kind: str, joint: str, strokes: tuple[Stroke, ...]) 
 
 
 def _friction_strokes() -> tuple[Stroke, ...]:
-    strokes = []
+    ways: tuple[StrokeKind, ...] = ("closing", "opening", "closing", "opening")
+    strokes: list[Stroke] = []
     for speed in (0.05, 0.12, 0.3, 0.7, 1.5):
-        for kind in ("closing", "opening", "closing", "opening"):
-            strokes.append(Stroke(len(strokes), kind, speed))
+        strokes += [Stroke(len(strokes) + place, kind, speed) for place, kind in enumerate(ways)]
     return (*strokes, Stroke(len(strokes), "excitation"))
 
 
@@ -247,7 +250,14 @@ def _parameter(
 
 
 def _rung(name: str, bic: float, error: float, *, chosen: bool = False) -> dict[str, object]:
-    return {"name": name, "bic": bic, "held_out_rms": error, "chosen": chosen}
+    return {
+        "name": name,
+        "parameters": 4 + len(name.split("+")),
+        "bic": bic,
+        "held_out_rms": error,
+        "held_out_score": -0.5 * bic,
+        "chosen": chosen,
+    }
 
 
 def _fit(
@@ -275,7 +285,7 @@ def _fit(
         what="friction" if what == "friction" else "cut",
         effort="standard",
         rung=rung,
-        structure={"law": rung, "joint": "rotary"},
+        structure={"law": rung, "joint": "rotary", "angle_center": 0.54},
         parameters=parameters,
         draws=mean + sd * rng.normal(size=(200, len(mean))),
         map_point=mean,
@@ -284,16 +294,16 @@ def _fit(
         rungs=rungs,
         diagnostics={
             "k_hat": 0.21,
-            "ess": 1804.2,
+            "effective_samples": 1804.2,
             "evaluations": 3120,
             "whiteness_p": 0.19,
             "residual_rms": 0.00127,
-            "optimiser": "nlopt LN_SBPLX, converged",
+            "search": "The search settled.",
         },
         verdicts=verdicts,
         effort_unit="N m",
         position_unit="rad",
-        inputs_hash=HASH,
-        sources=(source,),
+        inputs_hash="a8fdc205a9f19cc1c7507a60c4f01b13d11d7fd0",
+        sources=(f"{source} sha256:{HASHES[source]}",),
         notes=("Samples slower than 0.01 rad/s were left out: the sign of their rate is noise.",),
     )

@@ -11,6 +11,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import FactSheet, RecordingSummary
 from scissorcal.report.sections.diagnostics import Diagnostic, list_diagnostics
+from scissorcal.report.sections.friction_curve import FrictionCurve, trace_friction
 from scissorcal.report.sections.headline import Headline, write_headline
 from scissorcal.report.sections.held_out import HeldOutSection, gather_held_out
 from scissorcal.report.sections.left_out import LeftOut, list_left_out
@@ -39,6 +40,7 @@ class FitSection:
     effort_unit: str
     position_unit: str
     headline: Headline
+    friction_curve: FrictionCurve | None
     torque: TorqueSection
     residuals: tuple[StrokeResidual, ...]
     parameters: tuple[ParameterRow, ...]
@@ -119,6 +121,7 @@ def compose_fit(fit: FitResult, anchor: str, recordings: Sequence[RecordingSumma
         fit.effort_unit,
         fit.position_unit,
         write_headline(fit, held_out, parameters),
+        trace_friction(fit),
         compare_torque(fit, strokes),
         rank_residuals(fit, strokes),
         parameters,

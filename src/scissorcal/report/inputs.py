@@ -9,7 +9,7 @@ from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.numbers import Scalar, scalar
 from scissorcal.verdicts import Verdict
 
-UNIT_SUFFIXES = {
+UNITS = {
     "s": "s",
     "ms": "ms",
     "us": "µs",
@@ -115,8 +115,17 @@ def _facts(facts: Mapping[str, Any], above: tuple[str, ...]) -> list[Fact]:
         if isinstance(value, Mapping):
             found += _facts(value, (*above, str(name)))
             continue
-        stem, _, suffix = str(name).rpartition("_")
-        unit = UNIT_SUFFIXES.get(suffix, "") if stem else ""
-        words = " ".join((*above, stem if unit else str(name))).replace("_", " ")
+        stem, unit = _unit_of(str(name))
+        words = " ".join((*above, stem)).replace("_", " ")
         found.append(Fact(words, scalar(value), unit))
     return found
+
+
+def _unit_of(name: str) -> tuple[str, str]:
+    """Part a name from the unit at its end: rate_rad_per_s is a rate in rad/s."""
+    words = name.split("_")
+    if len(words) > 3 and words[-2] == "per" and words[-3] in UNITS and words[-1] in UNITS:
+        return "_".join(words[:-3]), f"{UNITS[words[-3]]}/{UNITS[words[-1]]}"
+    if len(words) > 1 and words[-1] in UNITS:
+        return "_".join(words[:-1]), UNITS[words[-1]]
+    return name, ""

@@ -188,4 +188,5 @@ def _exponent(number: float) -> int:
 
 
 def _round(number: float, digits: int) -> float:
-    return float(f"{number:.{digits - 1}e}")
+    rounded = float(f"{number:.{digits - 1}e}")
+    return rounded if math.isfinite(rounded) else number

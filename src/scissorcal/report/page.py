@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report import numbers
 from scissorcal.report.document import FitMaterial, FitSection, ReportDocument
+from scissorcal.report.sections.friction_curve import draw_friction
 from scissorcal.report.sections.held_out import draw_held_out
+from scissorcal.report.sections.parameters import IDENTIFIED_BELOW
 from scissorcal.report.sections.residuals import StrokeResidual, draw_residuals
 from scissorcal.report.sections.torque import along
 from scissorcal.report.sections.torque_figures import draw_stroke, draw_torque
+from scissorcal.report.strokes import kind_word
 from scissorcal.report.svg import CARD, Svg, drawing_style
 
 if TYPE_CHECKING:
@@ -21,6 +25,15 @@ if TYPE_CHECKING:
 
 MOST_CARDS = 12
 KEY_MARKS = {"closing": "●", "opening": "▲", "excitation": "■", "press": "◆"}
+
+
+@dataclass(frozen=True)
+class KeyEntry:
+    """A kind of stroke, the mark that its samples have, and its name."""
+
+    kind: str
+    mark: str
+    word: str
 
 
 @dataclass(frozen=True)
@@ -42,10 +55,11 @@ class FitView:
     cards: tuple[StrokeCard, ...]
 
     @property
-    def key(self) -> tuple[tuple[str, str], ...]:
-        """Kinds of strokes that the figures show, each with its mark."""
-        kinds = dict.fromkeys(row.name.kind for row in self.section.residuals)
-        return tuple((kind, KEY_MARKS.get(kind, "▼")) for kind in sorted(kinds))
+    def key(self) -> tuple[KeyEntry, ...]:
+        """What the figures' marks stand for."""
+        kinds = sorted({row.name.kind for row in self.section.residuals})
+        unit = self.section.position_unit
+        return tuple(KeyEntry(kind, KEY_MARKS[kind], kind_word(kind, unit)) for kind in kinds)
 
     @property
     def carded(self) -> frozenset[str]:
@@ -60,7 +74,8 @@ def draw_fit(material: FitMaterial) -> FitView:
     with drawing_style():
         return FitView(
             section,
-            draw_torque(fit, strokes, section.torque, section.anchor),
+            draw_friction(fit, strokes, section.friction_curve, section.anchor)
+            + draw_torque(fit, strokes, section.torque, section.anchor),
             draw_residuals(fit, strokes, section.residuals, section.anchor),
             draw_held_out(fit, section.held_out, section.anchor),
             tuple(
@@ -120,5 +135,9 @@ def _environment() -> Environment:
         with_decimals=numbers.with_decimals,
         prose=prose,
     )
-    environment.globals["decimals_for"] = numbers.decimals_for
+    environment.globals.update(
+        decimals_for=numbers.decimals_for,
+        identified_below=IDENTIFIED_BELOW,
+        prior_only=PRIOR_ONLY,
+    )
     return environment

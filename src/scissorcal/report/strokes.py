@@ -11,6 +11,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recording.recording import Stroke, StrokeKind
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.numbers import Number, finite, short
+from scissorcal.report.reduce import median
 
 KINDS: dict[str, StrokeKind] = {
     "closing": "closing",
@@ -25,8 +26,9 @@ BETWEEN = "between strokes"
 class StrokeName:
     """A stroke's identity: ``anchor`` is its address on the page, ``label`` its name in words.
 
-    ``recording`` is the source that the fit names; ``speed`` the nominal rate's magnitude in the
-    fit's position unit per second, None where the stroke has no single speed.
+    ``recording`` is the file that the fit names; ``stroke`` the number that the fit gives, which
+    counts on over its recordings; ``speed`` the planned rate's magnitude in the fit's position
+    unit per second, None where the stroke has no planned or no single speed.
     """
 
     anchor: str
@@ -53,68 +55,96 @@ def strokes_of(
     series = fit.series
     if len(series.stroke) == 0:
         return ()
-    keys = np.stack([series.recording, series.stroke])
+    keys = np.unique(np.stack([series.recording, series.stroke]), axis=1).T
+    planned = _planned_strokes(fit, recordings)
+    several = len({int(recording) for recording, _ in keys}) > 1
     found = []
-    for recording, stroke in np.unique(keys, axis=1).T:
-        places = np.flatnonzero((series.recording == recording) & (series.stroke == stroke))
-        rate = float(np.nanmedian(np.append(series.opening_rate[places], 0.0)))
-        source = source_of(fit, int(recording))
-        planned = _planned(fit, source, int(stroke), recordings, rate)
-        anchor = f"{fit_anchor}-r{recording}-s{stroke if stroke >= 0 else 'between'}"
-        several = len(np.unique(series.recording)) > 1
-        label = stroke_label(planned, fit.position_unit)
+    for recording, label in keys:
+        places = np.flatnonzero((series.recording == recording) & (series.stroke == label))
+        stroke = planned.get(int(label)) or _unplanned(fit, int(label), places)
+        words = stroke_label(stroke, int(label), fit.position_unit)
         if several:
-            label += f", recording {recording + 1}"
-        speed = finite(planned.speed)
-        name = StrokeName(anchor, label, source, int(stroke), planned.kind, speed, planned.sheet)
+            words += f", recording {recording + 1}"
+        name = StrokeName(
+            f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
+            words,
+            source_of(fit, int(recording)),
+            int(label),
+            stroke.kind,
+            finite(stroke.speed),
+            stroke.sheet,
+        )
         found.append(StrokeSamples(name, places))
     return tuple(found)
 
 
 def source_of(fit: FitResult, recording: int) -> str:
-    """The source that a recording's index in the series stands for."""
+    """The file that a recording's index in the series stands for."""
     if 0 <= recording < len(fit.sources):
-        return fit.sources[recording]
+        return split_source(fit.sources[recording])[0]
     return f"recording {recording + 1}"
 
 
-def stroke_label(stroke: Stroke, position_unit: str) -> str:
-    """Name a stroke in words.
+def split_source(source: str) -> tuple[str, str]:
+    """Part what a fit names as its source into file and hash, empty where it states none.
 
-    >>> stroke_label(Stroke(3, "closing", 0.25), "rad")
+    >>> split_source("captures/cut.mcap sha256:9f86")
+    ('captures/cut.mcap', '9f86')
+    """
+    path, mark, digest = source.rpartition(" sha256:")
+    return (path, digest) if mark else (source, "")
+
+
+def stroke_label(stroke: Stroke, number: int, position_unit: str) -> str:
+    """Name a stroke in words, with the number that the fit gives it.
+
+    >>> stroke_label(Stroke(3, "closing", 0.25), 3, "rad")
     'stroke 3, closing at 0.25 rad/s'
     """
-    if stroke.index < 0:
+    if number < 0:
         return BETWEEN
     speed = finite(stroke.speed)
     pace = f" at {short(speed)} {position_unit}/s" if speed is not None else ""
-    return f"stroke {stroke.index}, {stroke.kind}{pace}"
+    return f"stroke {number}, {kind_word(stroke.kind, position_unit)}{pace}"
+
+
+def kind_word(kind: str, position_unit: str) -> str:
+    """A stroke's kind in words: what slides moves forward and backward."""
+    if position_unit == "m":
+        return {"opening": "forward", "closing": "backward"}.get(kind, kind)
+    return kind
 
 
 def summary_of(source: str, recordings: Sequence[RecordingSummary]) -> RecordingSummary | None:
-    """Find the summary of a fit's source: by path, by file name, or by the hash it carries."""
+    """Find the summary of a fit's source: by hash where both state one, else by file."""
+    path, digest = split_source(source)
     for recording in recordings:
-        if recording.source and recording.source == source:
+        if digest and recording.content_hash == digest:
             return recording
     for recording in recordings:
-        same_file = recording.source and PurePath(recording.source).name == PurePath(source).name
-        same_hash = recording.content_hash and recording.content_hash in source
-        if same_file or same_hash:
+        if not digest and recording.source and recording.source == path:
+            return recording
+    for recording in recordings:
+        if not digest and recording.source and recording.name == PurePath(path).name:
             return recording
     return None
 
 
-def _planned(
-    fit: FitResult, source: str, stroke: int, recordings: Sequence[RecordingSummary], rate: float
-) -> Stroke:
-    summary = summary_of(source, recordings)
-    for planned in summary.strokes if summary else ():
-        if planned.index == stroke:
-            return planned
+def _planned_strokes(fit: FitResult, recordings: Sequence[RecordingSummary]) -> dict[int, Stroke]:
+    """Planned strokes by the number the fit gives them: they count on over its recordings."""
+    planned: list[Stroke] = []
+    for source in fit.sources:
+        summary = summary_of(source, recordings)
+        if summary is None:
+            break
+        planned += summary.strokes
+    return dict(enumerate(planned))
+
+
+def _unplanned(fit: FitResult, label: int, places: NDArray[np.int64]) -> Stroke:
+    """A stroke that no plan names: its kind as the fit states it, else by its direction."""
     for error in fit.held_out:
-        same = PurePath(error.recording).name == PurePath(source).name
-        if error.stroke == stroke and same and error.kind in KINDS:
-            return Stroke(stroke, KINDS[error.kind], error.speed)
-    if stroke < 0:
-        return Stroke(stroke, "excitation")
-    return Stroke(stroke, "closing" if rate < 0 else "opening" if rate > 0 else "excitation")
+        if error.stroke == label and error.kind in KINDS:
+            return Stroke(label, KINDS[error.kind])
+    rate = median(fit.series.opening_rate[places])
+    return Stroke(label, "closing" if rate < 0 else "opening" if rate > 0 else "excitation")

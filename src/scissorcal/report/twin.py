@@ -1,10 +1,6 @@
-"""The report's JSON twin, and the JSON Schema that it keeps.
-
-``python -m scissorcal.report.twin`` prints the schema as it stands in ``data_schemas``.
-"""
+"""The report's JSON twin, and the JSON Schema that it keeps."""
 
 import json
-import sys
 from typing import Any
 
 from scissorcal.report.document import ReportDocument
@@ -37,7 +33,3 @@ def report_schema() -> dict[str, Any]:
 def schema_text() -> str:
     """The schema as it stands in ``data_schemas/report.schema.json``."""
     return json.dumps(report_schema(), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(schema_text())

@@ -7,16 +7,21 @@ from scissorcal.report.numbers import Scalar, scalar
 
 MEANINGS = {
     "k_hat": "Tail of the importance weights: below 0.7 the draws can be used.",
-    "ess": "Effective number of posterior draws.",
-    "effective": "Effective number of posterior draws.",
+    "effective_samples": "What the posterior draws are worth as independent ones.",
     "evaluations": "Times the model was evaluated.",
+    "observations": "Bins of data that entered the likelihood.",
+    "independent_share": "Share of these that are worth an independent one.",
     "whiteness_p": "Chance of residuals at least this correlated if they were white.",
+    "first_lag_autocorrelation": "Correlation of a residual with its neighbour.",
+    "largest_inflation": "Factor by which correlated residuals widened the widest interval.",
     "residual_rms": "Root mean square of measured minus model.",
-    "noise_sd": "Standard deviation of the noise the likelihood assumes.",
-    "inflation": "Factor by which correlated noise widens the intervals.",
-    "null": "Directions that the data leave to the prior, by parameter.",
-    "samples": "Samples that entered the likelihood.",
-    "seconds": "Time the fit took.",
+    "relative_error": "The same over the root mean square of what was measured.",
+    "r_squared": "Share of the data's variance that the law explains.",
+    "starts_agreeing": "Starts of the search that ended at the same place.",
+    "search": "How the search ended.",
+    "rate_floor": "Slower samples were left out: the sign of their rate is noise.",
+    "bin_s": "Length of a bin, in seconds.",
+    "noise": "Standard deviation of the residuals.",
 }
 
 

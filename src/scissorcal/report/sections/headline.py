@@ -11,43 +11,51 @@ from scissorcal.report.sections.parameters import ParameterRow
 
 Stance = Literal["trust", "care", "reject"]
 
-ADVICE = (
+DRAFT_SKIPS = "k-hat"
+
+ADVICE: tuple[tuple[tuple[str, ...], str], ...] = (
     (
-        ("k-hat", "k_hat", "importance"),
-        "The posterior is far from its Laplace fit: fit at a higher effort, or "
-        "choose a simpler rung whose parameters the data can tell apart.",
+        ("k-hat",),
+        "The posterior is far from its approximation: record more varied strokes, or choose a "
+        "simpler rung in the recipe's `[fit]` table.",
     ),
     (
-        ("whiteness", "autocorrelation"),
-        "The residuals have structure: look at the worst strokes below, then try a richer "
-        "rung in the recipe's `[fit]` table.",
+        ("optimum",),
+        "The search did not settle: check the recording's units and signs, then fit again, with "
+        "`--effort standard` if this was a draft.",
     ),
     (
-        ("held-out", "held_out", "prediction"),
-        "New strokes are not predicted well: capture more strokes at the speeds of "
-        "the worst ones, or try a richer rung.",
+        ("bound",),
+        "A parameter ended at the edge of the search: check the recording's units and signs, then "
+        "its prior in the recipe.",
     ),
     (
-        ("trust", "halves", "half"),
+        ("whiteness",),
+        "The residuals have structure: look at the worst strokes below, then record longer or more "
+        "varied motion, or try a richer rung in the recipe's `[fit]` table.",
+    ),
+    (
+        ("held-out",),
+        "New strokes are not predicted well: record more strokes at the speeds of the worst ones, "
+        "or try a richer rung.",
+    ),
+    (
+        ("r-squared",),
+        "The law explains too little: check the recording's units and signs, and that what was "
+        "recorded is what the recipe says.",
+    ),
+    (
+        ("trust", "halves"),
         "Two halves of the data disagree by more than they claim: check that nothing moved or "
         "warmed up during the capture, then capture again.",
     ),
     (
-        ("bound", "start"),
-        "A parameter sits at its bound or where it started: capture the movement that "
-        "informs it, or widen its prior in the recipe.",
+        ("identifiability",),
+        "Some parameters repeat their prior: record the speeds or openings that would tell them "
+        "apart, or choose a rung without them.",
     ),
-    (
-        ("identif", "null", "prior"),
-        "Some parameters repeat their prior: capture the speeds or openings that would "
-        "tell them apart, or choose a rung without them.",
-    ),
-    (
-        ("coverage", "motion", "range"),
-        "The data do not cover what the scene needs: capture the missing speeds and openings.",
-    ),
-    (("draft", "effort"), "Fit again with `--effort standard`."),
 )
+"""What to do about a check that failed, by a word in its name."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,12 @@ def write_headline(
     a parameter that only repeats its prior ask for care.
     """
     failed = [verdict.check for verdict in fit.verdicts if verdict.status == "fail"]
-    open_checks = [verdict.check for verdict in fit.verdicts if verdict.status == "not_evaluated"]
+    draft = fit.effort == "draft"
+    open_checks = [
+        verdict.check
+        for verdict in fit.verdicts
+        if verdict.status == "not_evaluated" and not (draft and verdict.check == DRAFT_SKIPS)
+    ]
     silent = [row.name for row in parameters if row.word == "prior only"]
     error = _error_words(held_out)
     if failed:
@@ -86,7 +99,7 @@ def write_headline(
         named = _listed([f"`{name}`" for name in silent])
         doubts.append(f"{named} only repeat{'s' if len(silent) == 1 else ''} the prior")
         steps += _advice(fit, ["identifiability"])
-    if fit.effort == "draft":
+    if draft:
         doubts.append("its intervals are those of a draft")
         steps.append(f"Run `scissorcal fit {fit.what} --effort standard` for intervals to rely on.")
     if doubts:

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.calibration.result import FitResult, StrokeError
 from scissorcal.recording.recording import Stroke
-from scissorcal.report.numbers import Number, finite, percent
+from scissorcal.report.numbers import Number, finite, percent, short
 from scissorcal.report.reduce import median
 from scissorcal.report.strokes import KINDS, StrokeName, stroke_label
 from scissorcal.report.svg import PANEL, Svg, finish, look_of, new_axes
@@ -15,7 +15,10 @@ from scissorcal.report.svg import PANEL, Svg, finish, look_of, new_axes
 
 @dataclass(frozen=True)
 class HeldOutRow:
-    """One stroke's held-out error; ``anchor`` is empty where the page has no such stroke."""
+    """One stroke's held-out error; ``anchor`` is empty where the page has no such stroke.
+
+    ``speed`` is the planned one, or the median of the measured ones where nothing was planned.
+    """
 
     anchor: str
     label: str
@@ -56,12 +59,12 @@ def draw_held_out(fit: FitResult, section: HeldOutSection, anchor: str) -> tuple
         error = 100.0 * (row.relative_rms or 0.0)
         axes.plot(row.speed or 0.0, error, marker, color=colour, ms=6, mew=0, alpha=0.75)
     axes.set_xscale("log")
-    ticks = sorted({row.speed for row in known if row.speed})
-    axes.set_xticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    ticks = _apart(sorted({row.speed for row in known if row.speed}))
+    axes.set_xticks(ticks, labels=[short(tick, 2) for tick in ticks])
     axes.minorticks_off()
     axes.margins(x=0.08)
     axes.set_ylim(bottom=0)
-    axes.set_xlabel(f"nominal speed [{fit.position_unit}/s]")
+    axes.set_xlabel(f"speed [{fit.position_unit}/s]")
     axes.set_ylabel("held-out error [%]")
     caption = (
         "Each mark is a stroke, predicted by a fit that had not seen it: rms error over the rms of "
@@ -71,23 +74,27 @@ def draw_held_out(fit: FitResult, section: HeldOutSection, anchor: str) -> tuple
     return (finish(figure, f"{anchor}-heldout", "Held-out error over speed", caption),)
 
 
+def _apart(speeds: Sequence[float]) -> list[float]:
+    """Speeds that differ by enough for their labels to stand side by side."""
+    kept: list[float] = []
+    for speed in speeds:
+        if not kept or speed > 1.4 * kept[-1]:
+            kept.append(speed)
+    return kept
+
+
 def _row(error: StrokeError, position_unit: str, names: Sequence[StrokeName]) -> HeldOutRow:
-    match = next(
+    name = next(
         (n for n in names if n.stroke == error.stroke and n.recording == error.recording), None
     )
     kind = KINDS.get(error.kind, "excitation")
-    label = (
-        match.label
-        if match
-        else stroke_label(Stroke(error.stroke, kind, error.speed), position_unit)
-    )
     return HeldOutRow(
-        match.anchor if match else "",
-        label,
+        name.anchor if name else "",
+        name.label if name else stroke_label(Stroke(0, kind), error.stroke, position_unit),
         error.recording,
         error.stroke,
-        error.kind,
-        finite(error.speed),
+        name.kind if name else error.kind,
+        finite(error.speed) if name is None or name.speed is None else name.speed,
         finite(error.rms),
         finite(error.relative_rms),
     )

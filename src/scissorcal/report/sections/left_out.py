@@ -85,7 +85,9 @@ def _cost(row: RungRow, chosen: RungRow | None) -> str:
         words.append(f"its held-out error is {_compared(change)}")
     if not words or chosen is None:
         return "It was compared, but without figures."
-    return f"Against {chosen.name}, {' and '.join(words)}."
+    better = row.held_out_rms is not None and row.held_out_rms < (chosen.held_out_rms or 0.0)
+    reason = " That gain is too small to feel, or not steady over strokes." if better else ""
+    return f"Against {chosen.name}, {' and '.join(words)}.{reason}"
 
 
 def _compared(change: float) -> str:

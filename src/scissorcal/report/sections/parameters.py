@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite
 
 IDENTIFIED_BELOW = 0.3
-PRIOR_ONLY_FROM = 0.8
 
 Word = Literal["identified", "weak", "prior only", "not available"]
 
@@ -57,4 +57,4 @@ def identifiability_word(ratio: Number) -> Word:
         return "not available"
     if ratio < IDENTIFIED_BELOW:
         return "identified"
-    return "weak" if ratio < PRIOR_ONLY_FROM else "prior only"
+    return "weak" if ratio <= PRIOR_ONLY else "prior only"

@@ -7,7 +7,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.numbers import Number, Scalar, finite, scalar
-from scissorcal.report.strokes import summary_of
+from scissorcal.report.strokes import split_source, summary_of
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ def trace(
 ) -> Provenance:
     """Tie recordings to fits, and name sources of fits whose recording was not handed in."""
     rows = [_row(recording, fits, recordings) for recording in recordings]
-    for fit in fits:
-        for source in fit.sources:
-            if summary_of(source, recordings) is None and all(row.source != source for row in rows):
-                users = tuple(other.what for other in fits if source in other.sources)
-                rows.append(SourceRow(source, "", "", "", None, None, None, users, (), ()))
+    for source in dict.fromkeys(source for fit in fits for source in fit.sources):
+        if summary_of(source, recordings) is None:
+            users = tuple(fit.what for fit in fits if source in fit.sources)
+            path, digest = split_source(source)
+            rows.append(SourceRow(path, digest, "", "", None, None, None, users, (), ()))
     origins = tuple(FitOrigin(fit.what, fit.inputs_hash, fit.sources) for fit in fits)
     if recipe_text:
         return Provenance(tuple(rows), origins, recipe_text, "as written")

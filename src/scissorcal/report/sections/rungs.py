@@ -10,12 +10,17 @@ from scissorcal.report.numbers import Number, finite
 
 @dataclass(frozen=True)
 class RungRow:
-    """One rung: ``bic_excess`` is its BIC above the lowest, ``held_out_rms`` in the effort unit."""
+    """One rung: ``bic_excess`` is its BIC above the lowest, ``held_out_rms`` in the effort unit.
+
+    ``held_out_score`` is the log density of unseen strokes, higher where they are predicted better.
+    """
 
     name: str
+    parameters: int | None
     bic: Number
     bic_excess: Number
     held_out_rms: Number
+    held_out_score: Number
     chosen: bool
 
 
@@ -29,10 +34,13 @@ def compare_rungs(fit: FitResult) -> tuple[RungRow, ...]:
 def _row(rung: Mapping[str, Any], lowest: Number) -> RungRow:
     bic = finite(rung.get("bic"))
     excess = None if bic is None or lowest is None else bic - lowest
+    count = finite(rung.get("parameters"))
     return RungRow(
         str(rung.get("name", "unnamed")),
+        None if count is None else int(count),
         bic,
         excess,
         finite(rung.get("held_out_rms")),
+        finite(rung.get("held_out_score")),
         bool(rung.get("chosen", False)),
     )

@@ -1,6 +1,6 @@
 """Measured torque against the model's band: over opening by speed, over time where no speed is."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,9 +9,10 @@ import numpy as np
 from scissorcal.calibration.result import FitResult
 from scissorcal.report.numbers import Number, finite, finite_each, short
 from scissorcal.report.reduce import Array, block_means, median, rms
-from scissorcal.report.strokes import BETWEEN, StrokeName, StrokeSamples
+from scissorcal.report.strokes import BETWEEN, StrokeName, StrokeSamples, kind_word
 
 BLOCKS = 100
+SAME_SPEED = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,9 @@ class TorqueSection:
 def compare_torque(fit: FitResult, strokes: Sequence[StrokeSamples]) -> TorqueSection:
     """Group strokes by speed (a cut's also by kind) and reduce them to curves."""
     grouped: dict[tuple[str, float], list[StrokeSamples]] = {}
+    pace = _common_speeds([stroke.name.speed for stroke in strokes])
     for stroke in strokes:
-        grouped.setdefault(_key(fit, stroke.name), []).append(stroke)
+        grouped.setdefault(_key(fit, stroke.name, pace), []).append(stroke)
     groups = tuple(_group(fit, members) for _, members in sorted(grouped.items()))
     return TorqueSection(fit.effort_unit, fit.position_unit, groups)
 
@@ -78,12 +80,23 @@ def along(name: StrokeName) -> Literal["opening", "time"]:
     return "time" if name.label.startswith(BETWEEN) or name.kind == "excitation" else "opening"
 
 
-def _key(fit: FitResult, name: StrokeName) -> tuple[str, float]:
+def _key(fit: FitResult, name: StrokeName, pace: Mapping[float, float]) -> tuple[str, float]:
     against = along(name)
     if against == "time":
         return f"z {name.anchor}", 0.0
     kind = "" if fit.what == "friction" else name.kind
-    return kind, np.inf if name.speed is None else name.speed
+    return kind, np.inf if name.speed is None else pace[name.speed]
+
+
+def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
+    """Each speed with the slowest of those that are nearly the same, within ``SAME_SPEED``."""
+    common: dict[float, float] = {}
+    slowest = -np.inf
+    for speed in sorted({speed for speed in speeds if speed is not None}):
+        if speed > (1.0 + SAME_SPEED) * slowest:
+            slowest = speed
+        common[speed] = slowest
+    return common
 
 
 def _group(fit: FitResult, members: list[StrokeSamples]) -> TorqueGroup:
@@ -91,16 +104,19 @@ def _group(fit: FitResult, members: list[StrokeSamples]) -> TorqueGroup:
     against = along(first)
     places = np.concatenate([member.places for member in members])
     series = fit.series
+    unit = fit.position_unit
+    kinds = " and ".join(sorted({kind_word(member.name.kind, unit) for member in members}))
+    speeds = [member.name.speed or np.nan for member in members]
     if against == "time":
         title = first.label
+    elif first.speed is None:
+        title = f"{kinds}, no planned speed"
     else:
-        kinds = " and ".join(sorted({member.name.kind for member in members}))
-        speed = "" if first.speed is None else f" at {short(first.speed)}"
-        title = f"{kinds}{speed} {fit.position_unit}/s" if speed else f"{kinds}, any speed"
+        title = f"{kinds} at {short(median(np.array(speeds)))} {unit}/s"
     return TorqueGroup(
         title,
         against,
-        first.speed,
+        finite(median(np.array(speeds))),
         finite(rms(series.measured[places] - series.predicted[places])),
         finite(median(series.band_high[places] - series.band_low[places])),
         tuple(_curve(fit, member) for member in members),

@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.report.numbers import finite, significant, unit_text, with_unit
-from scissorcal.report.reduce import block_means, limits_of, mean, median, rms, thinned
+from scissorcal.report.reduce import block_means, limits_of, rms, thinned
 from scissorcal.report.sections.torque import (
     StrokeCurve,
     TorqueGroup,
@@ -35,7 +35,7 @@ Against = Literal["opening", "time"]
 def draw_torque(
     fit: FitResult, strokes: Sequence[StrokeSamples], section: TorqueSection, anchor: str
 ) -> tuple[Svg, ...]:
-    """One panel per group, all over opening with one scale; friction also over its rate."""
+    """One panel per group, all over opening with one scale."""
     samples = {stroke.name.anchor: stroke for stroke in strokes}
     over_opening = [group for group in section.groups if group.against == "opening"]
     directed = [samples[c.name.anchor] for group in over_opening for c in group.curves]
@@ -43,8 +43,6 @@ def draw_torque(
     shared = np.concatenate(places) if places else np.zeros(0, np.int64)
     limits = limits_of(fit.series.measured[shared], fit.series.predicted[shared])
     panels = []
-    if fit.what == "friction" and len(directed) > 1:
-        panels.append(_draw_over_rate(fit, directed, f"{anchor}-rate"))
     for number, group in enumerate(section.groups[:MOST_PANELS]):
         scale = limits if group.against == "opening" else None
         panels.append(_draw_group(fit, group, samples, f"{anchor}-torque{number}", scale))
@@ -108,31 +106,6 @@ def _draw_group(
     caption = _caption(fit, group, len(shown), dots)
     reading = f"Measured {effort_word(fit)} and model band against {group.against}. {caption}"
     return finish(figure, anchor, group.title, caption, reading + _reach(fit, group.curves))
-
-
-def _draw_over_rate(fit: FitResult, strokes: Sequence[StrokeSamples], anchor: str) -> Svg:
-    """The friction curve: means of strokes with their spread, and the model's means joined."""
-    figure, axes = new_axes(PANEL)
-    series = fit.series
-    joined: dict[str, list[tuple[float, float]]] = {}
-    for stroke in strokes:
-        at = stroke.places
-        rate, level = median(series.opening_rate[at]), mean(series.measured[at])
-        spread = rms(series.measured[at] - level)
-        colour, marker = look_of(stroke.name.kind)
-        axes.plot([rate, rate], [level - spread, level + spread], color=colour, lw=1.2, alpha=0.6)
-        axes.plot(rate, level, marker, color=colour, ms=4.5, mew=0, alpha=0.85)
-        joined.setdefault(stroke.name.kind, []).append((rate, mean(series.predicted[at])))
-    for points in joined.values():
-        axes.plot(*np.array(sorted(points)).T, color=INK, lw=1.0)
-    axes.axhline(0, color=MUTED, lw=0.8)
-    axes.set_xlabel(f"{position_word(fit)} rate [{fit.position_unit}/s]")
-    axes.set_ylabel(f"{effort_word(fit)} [{unit_text(fit.effort_unit)}]")
-    caption = (
-        "Each mark is the mean of one stroke, its whisker one standard deviation of its samples; "
-        "the line joins the model's means."
-    )
-    return finish(figure, anchor, f"Friction over the {position_word(fit)} rate", caption)
 
 
 def _put_stroke(

@@ -1,0 +1,169 @@
+"""The page stands alone, can be navigated, and says what the fits say."""
+
+import re
+
+import pytest
+
+from tests.report.conftest import Built
+from tests.report.fits import cut_fit, friction_fit
+
+FETCHING = ("src", "srcset", "poster", "data", "action", "background", "xlink:href")
+
+
+@pytest.fixture(params=["whole", "linear", "lost"])
+def any_report(request: pytest.FixtureRequest) -> Built:
+    report = request.getfixturevalue(request.param)
+    assert isinstance(report, Built)
+    return report
+
+
+def test_nothing_is_fetched_from_outside(any_report: Built) -> None:
+    page = any_report.page
+    assert not page.all("script")
+    assert not page.all("link")
+    for attribute in FETCHING:
+        assert not page.values(attribute)
+    assert all(target.startswith("#") for target in page.values("href"))
+    reached = re.findall(r"url\(\s*['\"]?([^)'\"]+)", page.source)
+    assert reached
+    assert all(target.startswith("#") for target in reached)
+    assert "@import" not in page.source
+    assert not re.search(r"https?://", page.source)
+    (policy,) = page.all("meta", **{"http-equiv": "Content-Security-Policy"})
+    assert policy["content"].startswith("default-src 'none'")
+
+
+def test_the_page_is_well_formed_and_small(any_report: Built) -> None:
+    assert any_report.page.unbalanced == []
+    size = len(any_report.page.source.encode())
+    assert 20_000 < size < 5_000_000
+
+
+def test_every_link_leads_somewhere_and_ids_are_unique(any_report: Built) -> None:
+    page = any_report.page
+    assert len(set(page.ids)) == len(page.ids)
+    wanted = {target.removeprefix("#") for target in page.values("href")}
+    wanted |= set(re.findall(r"url\(#([^)]+)\)", page.source))
+    wanted |= {name for names in page.values("aria-labelledby") for name in names.split()}
+    assert wanted <= set(page.ids)
+
+
+def test_every_figure_says_in_words_what_it_shows(whole: Built) -> None:
+    figures = whole.page.all("svg")
+    assert len(figures) > 30
+    for figure in figures:
+        assert figure["role"] in {"img", "group"}
+        assert len(figure["aria-label"]) > 40
+        assert "viewbox" in figure
+        assert "width" not in figure
+    assert len({figure["aria-label"] for figure in figures}) == len(figures)
+
+
+def test_figures_take_the_colours_of_the_page(whole: Built) -> None:
+    drawn = whole.page.source.partition("</style>")[2]
+    assert not re.search(r"#[0-9a-f]{6}\b", drawn)
+    used = set(re.findall(r"var\(--([a-z]+)\)", whole.page.source))
+    style = whole.page.source.partition("</style>")[0]
+    root, dark = style.split("@media (prefers-color-scheme: dark)")
+    for name in used:
+        assert f"--{name}:" in root
+    for name in ("ink", "paper", "muted", "grid", "link", "pass", "fail", "open"):
+        assert f"--{name}:" in dark
+
+
+def test_the_palette_is_legible_by_day_and_by_night(whole: Built) -> None:
+    style = whole.page.source.partition("</style>")[0]
+    day, night = style.split("@media (prefers-color-scheme: dark)")
+    for part in (day, night.split("}")[0]):
+        colours = dict(re.findall(r"--([a-z]+): (#[0-9a-f]{6})", part))
+        for text in ("ink", "muted", "link", "pass", "fail", "open"):
+            assert _contrast(colours[text], colours["paper"]) >= 4.5, text
+            assert _contrast(colours[text], colours["raised"]) >= 4.5, text
+        for mark in ("blue", "vermillion", "green"):
+            assert _contrast(colours[mark], colours["paper"]) >= 3.0, mark
+
+
+def test_verdicts_stand_on_top_and_failures_first(whole: Built) -> None:
+    ids = whole.page.ids
+    assert ids.index("summary") < ids.index("verdicts") < ids.index("friction") < ids.index("cut")
+    badges = [
+        attributes["class"].removeprefix("badge ")
+        for attributes in whole.page.all("span")
+        if attributes.get("class", "").startswith("badge ")
+    ]
+    listed = badges[badges.index("pass", 2) + 1 :][:8]
+    assert listed == ["fail", "not_evaluated"] + ["pass"] * 6
+    for verdict in (*friction_fit().verdicts, *cut_fit().verdicts):
+        assert verdict.why in whole.page.text
+
+
+def test_residuals_lead_to_their_strokes_from_the_worst(whole: Built) -> None:
+    rows = whole.twin["fits"][0]["residuals"]
+    sizes = [row["rms"] for row in rows]
+    assert sizes == sorted(sizes, reverse=True)
+    links = whole.page.values("href")
+    for place, row in enumerate(rows[:20]):
+        address = f"#{row['name']['anchor']}"
+        found = links.count(
+            address
+        )  # from its bar, the bar's label, and the table above its figure
+        assert found >= (3 if place < 12 else 2)
+    bars = [link for link in links if link.startswith("#friction-r")]
+    assert bars[0] == f"#{rows[0]['name']['anchor']}"
+
+
+def test_scrolling_parts_can_be_reached_by_keyboard(whole: Built) -> None:
+    regions = whole.page.all("div", **{"class": "scroll"})
+    assert len(regions) == 4
+    for region in (*regions, *whole.page.all("pre")):
+        assert region["tabindex"] == "0"
+        assert region["aria-label"]
+    first = next(attributes for tag, attributes in whole.page.elements if tag == "a")
+    assert first["class"] == "skip"
+
+
+def test_numbers_carry_the_digits_that_they_are_worth(whole: Built) -> None:
+    text = whole.page.text
+    assert "3.412 × 10⁻⁴ 4.1 × 10⁻⁶" in text  # inertia: mean, sd
+    assert "0.02103 0.00019 0.02072 0.02103 0.02134" in text  # coulomb: mean, sd, quantiles
+    assert "kg m²" in text
+    assert "kg m^2" not in text
+
+
+def test_a_sliding_joint_has_newtons_metres_and_kilograms(linear: Built) -> None:
+    text = linear.page.text
+    labels = " ".join(figure["aria-label"] for figure in linear.page.all("svg"))
+    for unit in ("N m", "rad", "torque", "Torque", "kg m"):
+        body = text.partition("Recipe, ")[0]  # the recipe's own keys name radians
+        assert not re.search(rf"\b{unit}\b", body), unit
+        assert not re.search(rf"\b{unit}\b", labels), unit
+    assert "95.11" in text
+    assert "force [N]" in text
+    assert "position [m]" in text
+
+
+def test_what_is_not_finite_is_said_to_be_not_available(lost: Built) -> None:
+    assert "not available" in lost.page.text
+    assert not re.search(r"\b(nan|NaN|inf|Infinity|None)\b", lost.page.text)
+    assert lost.twin["fits"][0]["parameters"][0]["mean"] is None
+    assert lost.twin["fits"][0]["rungs"][0]["bic"] is None
+
+
+def test_the_recipe_and_the_hashes_are_there(whole: Built, linear: Built) -> None:
+    assert "offset_mm = -8.0" in whole.page.source
+    for row in whole.twin["provenance"]["sources"]:
+        assert row["content_hash"] in whole.page.text
+        assert row["used_by"] in (["friction"], ["cut"])
+    assert "as read, in JSON" in linear.page.text
+
+
+def _contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours, as WCAG 2 defines it."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    channels = [int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

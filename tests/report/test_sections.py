@@ -1,0 +1,208 @@
+"""Sections: headlines, strokes over several recordings, groups, rungs, what was left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
+from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
+from scissorcal.report.document import compose_fit
+from scissorcal.report.sections.friction_curve import trace_friction
+from scissorcal.report.sections.headline import Headline
+from scissorcal.report.sections.left_out import list_left_out
+from scissorcal.report.sections.provenance import trace
+from scissorcal.report.sections.torque import compare_torque
+from scissorcal.report.strokes import strokes_of
+from scissorcal.verdicts import Verdict
+from tests.report.conftest import paper
+from tests.report.fits import (
+    cut_fit,
+    cut_recording,
+    friction_fit,
+    friction_recording,
+    linear_fit,
+    without_numbers,
+)
+
+
+def headline_of(fit: FitResult) -> Headline:
+    return compose_fit(fit, fit.what, []).section.headline
+
+
+def good(fit: FitResult) -> FitResult:
+    """The same fit with nothing against it."""
+    passed = tuple(replace(verdict, status="pass") for verdict in fit.verdicts)
+    sure = tuple(replace(parameter, identifiability=0.1) for parameter in fit.parameters)
+    return replace(fit, verdicts=passed, parameters=sure)
+
+
+def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
+    headline = headline_of(good(friction_fit()))
+    assert headline.stance == "trust"
+    assert "passed all 4 checks" in headline.sentence
+    assert "% (median; worst" in headline.sentence
+    assert headline.next_steps == ("Go on with `scissorcal package build`.",)
+
+
+def test_one_failure_rejects_and_says_what_to_do() -> None:
+    headline = headline_of(cut_fit())
+    assert headline.stance == "reject"
+    assert "whiteness failed" in headline.sentence
+    assert "residuals have structure" in headline.next_steps[0]
+    assert "scissorcal fit cut" in headline.next_steps[-1]
+
+
+def test_an_unknown_failure_still_names_a_step() -> None:
+    odd = Verdict("fit.cut", "phase of the moon", "fail", 1.0, 0.5, "It waxes.")
+    headline = headline_of(replace(cut_fit(), verdicts=(odd,)))
+    assert "Read why phase of the moon failed" in headline.next_steps[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"verdicts": ()}, "nothing was checked"),
+        ({"effort": "draft"}, "intervals are those of a draft"),
+        (
+            {"verdicts": (Verdict("f", "trust check", "not_evaluated", None, None, "No."),)},
+            "trust check could not be evaluated",
+        ),
+    ],
+)
+def test_doubts_ask_for_care(change: dict[str, object], words: str) -> None:
+    headline = headline_of(replace(good(friction_fit()), **change))  # type: ignore[arg-type]
+    assert headline.stance == "care"
+    assert words in headline.sentence
+    assert headline.next_steps
+
+
+def test_a_parameter_that_repeats_its_prior_asks_for_care() -> None:
+    fit = good(friction_fit())
+    silent = replace(fit.parameters[-1], identifiability=0.97)
+    headline = headline_of(replace(fit, parameters=(*fit.parameters[:-1], silent)))
+    assert headline.stance == "care"
+    assert "`angle_slope` only repeats the prior" in headline.sentence
+
+
+def test_strokes_are_numbered_on_over_recordings() -> None:
+    fit = cut_fit()
+    second = fit.series.stroke >= 6
+    series = replace(fit.series, recording=np.where(second, 1, 0).astype(np.int64))
+    fit = replace(fit, series=series, sources=("a.mcap sha256:aa", "b.mcap sha256:bb"))
+    strokes = cut_recording().strokes
+    halves = [
+        _summary("b.mcap", "bb", strokes[6:]),
+        _summary("elsewhere/a.mcap", "aa", strokes[:6]),
+    ]
+    found = [stroke.name for stroke in strokes_of(fit, "cut", halves)]
+    assert [name.stroke for name in found] == list(range(12))
+    assert [name.speed for name in found] == [stroke.speed for stroke in strokes]
+    assert found[7].label == "stroke 7, closing at 0.25 rad/s, recording 2"
+    assert found[7].recording == "b.mcap"
+
+
+def test_without_recordings_the_direction_names_a_stroke() -> None:
+    named = [stroke.name for stroke in strokes_of(replace(friction_fit(), held_out=()), "f", [])]
+    assert [name.kind for name in named[:4]] == ["closing", "opening", "closing", "opening"]
+    assert all(name.speed is None for name in named)
+
+
+def test_what_slides_moves_forward_and_backward() -> None:
+    fit = linear_fit()
+    way = np.where(fit.series.opening_rate > 0, 1, 0).astype(np.int64)
+    fit = replace(fit, series=replace(fit.series, stroke=way), held_out=())
+    labels = [stroke.name.label for stroke in strokes_of(fit, "f", [])]
+    assert labels == ["stroke 0, backward", "stroke 1, forward"]
+
+
+def test_speeds_that_are_nearly_the_same_share_a_group() -> None:
+    fit, recording = cut_fit(), cut_recording()
+    uneven = tuple(
+        replace(stroke, speed=stroke.speed * (1 + 0.004 * stroke.index))
+        for stroke in recording.strokes
+    )
+    strokes = strokes_of(fit, "cut", [replace(recording, strokes=uneven)])
+    groups = compare_torque(fit, strokes).groups
+    assert [len(group.curves) for group in groups] == [4, 4, 4]
+
+
+def test_groups_say_how_far_off_the_model_is() -> None:
+    fit = friction_fit()
+    strokes = strokes_of(fit, "friction", [friction_recording()])
+    section = compare_torque(fit, strokes)
+    titles = [group.title for group in section.groups]
+    assert titles[0] == "closing and opening at 0.05 rad/s"
+    assert titles[-1] == "stroke 20, excitation"
+    assert section.groups[-1].against == "time"
+    slowest = section.groups[0]
+    assert sum(curve.samples for curve in slowest.curves) == 4 * 1320
+    assert slowest.rms == pytest.approx(0.0011 / np.sqrt(1 - 0.25), rel=0.1)
+    assert slowest.median_band_width == pytest.approx(0.0004)
+    assert all(len(curve.opening) <= 100 for group in section.groups for curve in group.curves)
+
+
+def test_the_friction_curve_is_the_law_with_its_band() -> None:
+    fit = friction_fit()
+    curve = trace_friction(fit)
+    assert curve is not None
+    rate = np.array(curve.rate, dtype=float)
+    named = {p.name: p.mean for p in fit.parameters}
+    level = named["coulomb"] + named["viscous"] * np.abs(rate)
+    level += named["stribeck"] * np.exp(-((rate / named["stribeck_rate"]) ** 2))
+    assert np.allclose(np.array(curve.friction, dtype=float), np.sign(rate) * level, rtol=0.05)
+    low, high = np.array(curve.band_low, dtype=float), np.array(curve.band_high, dtype=float)
+    assert np.all(low < high)
+    assert trace_friction(cut_fit()) is None
+    assert trace_friction(without_numbers(fit)) is None
+
+
+def test_what_was_left_out_is_named() -> None:
+    recipe = paper()
+    told = {item.what: item for item in list_left_out(recipe, [friction_fit()])}
+    assert told["cut fit"].reason == "not there yet"
+    assert told["force along the cut"].reason == "not needed"
+    passed_over = told["friction: stribeck + angle, symmetric"]
+    assert passed_over.reason == "not chosen"
+    assert "BIC is 0.9 above" in passed_over.why
+    assert "0.84 % smaller" in passed_over.why
+    assert "friction: stribeck, symmetric" not in told
+
+
+def test_a_scene_that_only_presses_needs_no_toughness() -> None:
+    recipe = paper()
+    pressing = recipe.model_copy(update={"scene": recipe.scene.model_copy(update={"cut": False})})
+    told = {item.what for item in list_left_out(pressing, [])}
+    assert {"toughness and fracture", "press fit", "friction fit"} <= told
+
+
+def test_sources_whose_recording_is_missing_are_named_all_the_same() -> None:
+    origin = trace(paper(), "", [cut_fit(), friction_fit()], [friction_recording()])
+    assert [row.used_by for row in origin.sources] == [("friction",), ("cut",)]
+    assert origin.sources[1].samples is None
+    assert origin.sources[1].content_hash
+
+
+def test_a_recording_is_reduced_to_what_is_printed() -> None:
+    samples = np.zeros(3, SAMPLE_DTYPE)
+    samples["device_time_us"] = [0, 1000, 2500]
+    recording = Recording("cut", samples, (Stroke(0, "press"),), Joint("linear"), source="a/b.mcap")
+    summary = summarise_recording(recording)
+    assert (summary.name, summary.samples, summary.joint) == ("b.mcap", 3, "linear")
+    assert summary.duration_s == pytest.approx(0.0025)
+
+
+def test_a_sheet_takes_units_from_names() -> None:
+    facts = {"range": {"rate_rad_per_s": (0.05, 1.0)}, "file": "x.zip", "share": float("nan")}
+    sheet = sheet_from_mapping("Package", "package", facts)
+    told = [(fact.label, fact.value, fact.unit) for fact in sheet.facts]
+    assert told == [
+        ("range rate", "0.05, 1", "rad/s"),
+        ("file", "x.zip", ""),
+        ("share", None, ""),
+    ]
+
+
+def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
+    return replace(cut_recording(), source=source, content_hash=digest, strokes=strokes)
