@@ -171,6 +171,15 @@ def test_a_best_point_outside_its_own_posterior_is_not_handed_out(tmp_path: Path
         )
 
 
+def test_a_scene_that_is_mostly_beyond_the_torque_limit_is_built(tmp_path: Path) -> None:
+    chosen = recipe("press-only", opening_deg=(12.0, 25.0))
+    fit = cut_fit(chosen, energy=None, force=500.0)
+    summary = build_package(chosen, friction_fit(), fit, tmp_path / "p.zip", rng())
+    assert summary.manifest.bound.scene_torque_Nm == chosen.limits.torque_Nm
+    package = open_package(summary.path)
+    assert np.mean(package.torque(np.radians(13.0), -0.2, np.linspace(0.015, 0.06)) == 1.0) > 0.5
+
+
 def test_a_failed_fit_is_carried_along_and_said(tmp_path: Path) -> None:
     chosen = recipe()
     bad = Verdict("fit.cut", "k-hat", "fail", 1.2, 0.7, "Its intervals cannot be trusted.")

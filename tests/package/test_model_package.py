@@ -80,6 +80,15 @@ def test_the_band_holds_its_share_of_draws(paper: PackageSummary) -> None:
     assert width == pytest.approx(spread, rel=0.25)
 
 
+def test_torque_and_band_end_at_the_limit(pad: PackageSummary) -> None:
+    package = open_package(pad.path)
+    limit = package.manifest.limits.torque_Nm
+    opening = np.radians(12.0)
+    assert package.exact.torque(opening, -0.2, 0.015) > 1.5 * limit
+    assert package.torque(opening, -0.2, 0.015) == limit
+    assert package.band(opening, -0.2, 0.015) == (limit, limit)
+
+
 @pytest.mark.parametrize("probability", [0.0, 1.0, -0.1, 1.5, float("nan")])
 def test_a_probability_must_be_one(probability: float, paper: PackageSummary) -> None:
     with pytest.raises(ValueError, match="between 0 and 1"):

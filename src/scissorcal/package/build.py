@@ -75,7 +75,7 @@ def build_package(
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
-    The tables hold the law at the MAP point (docs/decisions/020-package-centre.md). ``rng`` picks
+    The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md). ``rng`` picks
     which posterior draws travel along for the band, at most 200; the same fits, recipe and seed
     give the same bytes. ``tolerance`` is each table's, as a share of its value.
 

@@ -94,7 +94,8 @@ def _centre(package: ModelPackage) -> Verdict:
     box = Box(ranges.opening_rad, ranges.opening_rate_rad_per_s, ranges.contact_m)
     points = spread_points(box, CENTRE_POINTS, slowest=manifest.bound.from_rate_rad_per_s)
     where = (points.opening, points.opening_rate, points.contact)
-    torque = package.exact.torque(*where)
+    limit = manifest.limits.torque_Nm
+    torque = np.clip(package.exact.torque(*where), -limit, limit)
     low, high = package.band(*where, probability=0.98)
     slack = manifest.bound.stated_Nm
     inside = float(np.mean((torque >= low - slack) & (torque <= high + slack)))

@@ -41,14 +41,15 @@ class ModelPackage:
     def torque(self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike) -> Array:
         """Torque in N m as felt on average, positive where it opens the blades.
 
-        Evaluated by the kernel from the tables, so it is what the loop renders, ripple averaged
-        out and before the torque limit; ``manifest.bound`` says how far it may be from the exact
-        model. Arguments (rad, rad/s, m) broadcast, and so does the result's shape. The crack
-        settles first: at a contact where the material would not hold, the torque is that of the
-        place where it does. See `covers` for where this is meant to be used.
+        Evaluated by the kernel from the tables and held to the package's torque limit, so it is
+        what the loop renders, ripple averaged out; ``manifest.bound`` says how far it may be from
+        the exact model. Arguments (rad, rad/s, m) broadcast, and so does the result's shape. The
+        crack settles first: at a contact where the material would not hold, the torque is that of
+        the place where it does. See `covers` for where this is meant to be used. Raises ValueError
+        for arguments that are not finite.
         """
         opening, rate, contact = _broadcast(opening, opening_rate, contact)
-        return self.average.torque(opening, rate, contact)
+        return self._limited(self.average.torque(opening, rate, contact))
 
     def band(
         self,
@@ -59,8 +60,8 @@ class ModelPackage:
     ) -> tuple[Array, Array]:
         """Equal-tailed interval that holds the torque with ``probability``: (low, high) in N m.
 
-        Each posterior draw in the package is evaluated with the exact model, without tables.
-        Arguments broadcast as in `torque`. Raises ValueError unless 0 < probability < 1.
+        Each posterior draw in the package is evaluated with the exact model, without tables, and
+        held to the torque limit as in `torque`. Arguments broadcast. Raises ValueError unless 0 < probability < 1.
         """
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability must lie between 0 and 1, not {probability:g}")
@@ -68,7 +69,7 @@ class ModelPackage:
         low, high = torque_quantiles(
             self._drawn, opening, opening_rate, contact, (tail, 1.0 - tail)
         )
-        return low, high
+        return self._limited(low), self._limited(high)
 
     def kernel(self) -> Kernel:
         """A new kernel with the step that the loop runs, ripple included, its crack at 0."""
@@ -126,6 +127,10 @@ class ModelPackage:
     def average(self) -> AverageTorque:
         """The average torque from the tables: what `torque` evaluates."""
         return AverageTorque(self.manifest.mechanics, self.manifest.ranges, self.arrays)
+
+    def _limited(self, torque: Array) -> Array:
+        limit = self.manifest.limits.torque_Nm
+        return np.clip(torque, -limit, limit)
 
     @cached_property
     def _drawn(self) -> ExactModel:
