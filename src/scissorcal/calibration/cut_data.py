@@ -16,6 +16,10 @@ from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
+INERTIA_TOLERANCE = 0.1
+"""Relative freedom of the inertia in a cut: the noise of an acceleration that is band-limited less
+than in empty motion hides part of it."""
+
 
 @dataclass(frozen=True)
 class CrackHistory:
@@ -35,7 +39,8 @@ class CutData:
 
     ``whole`` has every bin with a sheet in place, which the crack's history needs; ``used``
     (whole,) marks those within strokes and surely moving, ``bins`` holds them. ``begins`` (whole,)
-    marks the first bin of each sheet, ``strokes`` numbers the strokes of the used bins.
+    marks the first bin of each sheet, ``strokes`` numbers the strokes of the
+    used bins, ``runs`` their uninterrupted stretches.
     """
 
     def __init__(self, every: Bins, recipe: Recipe, friction: FitResult) -> None:
@@ -44,6 +49,7 @@ class CutData:
         self.used = self.whole.moving & (self.whole.stroke >= 0)
         self.bins = self.whole.where(self.used)
         self.strokes = self.bins.stroke
+        self.runs = np.cumsum(~self.used)[self.used] + len(self.used) * self.bins.stroke
         self.geometry = geometry_of(recipe)
         self.center = float(friction.structure["angle_center"])
         self.friction_layout, self.friction_mean, self.friction_precision = _friction_prior(
@@ -146,10 +152,14 @@ def _friction_prior(friction: FitResult) -> tuple[Layout, Array, Array]:
                 parameter.unit,
                 "identity" if signed_one else "log",
                 float(u.mean()),
-                float(u.std(ddof=1)),
+                float(
+                    np.hypot(u.std(ddof=1), INERTIA_TOLERANCE if parameter.name == "inertia" else 0)
+                ),
                 parameter.meaning,
             )
         )
     cloud = np.stack(columns, axis=1)
     covariance = np.cov(cloud, rowvar=False)
+    inertia = [row.name for row in rows].index("inertia")
+    covariance[inertia, inertia] += INERTIA_TOLERANCE**2
     return Layout(tuple(rows)), cloud.mean(axis=0), np.linalg.inv(covariance)

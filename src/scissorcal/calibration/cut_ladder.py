@@ -1,5 +1,6 @@
 """The ladder of a cut's laws: response families, smooth and rippled fracture."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut_data import CrackHistory, CutData, cutting_from
-from scissorcal.calibration.cut_likelihood import MaterialModel
+from scissorcal.calibration.cut_likelihood import MaterialModel, make_blocks, split
 from scissorcal.calibration.ladder import Climbed, Likelihood, Rung, climb
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.recipe.schema import Recipe
@@ -15,7 +16,9 @@ from scissorcal.recipe.schema import Recipe
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-NUISANCE = ("noise", "variation", "ripple_visibility")
+STARTS = 3
+
+NUISANCE = ("noise", "slow_noise", "variation", "variation_length", "ripple_visibility")
 """Parameters that describe the noise of a cut, not the cut."""
 
 
@@ -71,24 +74,25 @@ def _rung(
     key = {"response": family, "fracture": fracture}
     structure = {**key, **data.geometry}
     own = len(material.parameters)
+    blocks = make_blocks(data.runs)
     material_model = MaterialModel(data, structure, material, history)
 
     def residuals(u: Array) -> Array:
         return data.material_torque(u) - material_model(u[:own]).mean
 
     def normal(u: Array) -> tuple[Array, Array]:
-        sd = material_model(u[:own]).sd
-        return residuals(u) / sd, np.log(sd)
+        return split(residuals(u), material_model(u[:own]), blocks)
 
     precision = np.zeros((len(layout.names),) * 2)
     precision[:own, :own] = np.diag(1 / material.sd**2)
     precision[own:, own:] = data.friction_precision
+    likelihood = Likelihood(residuals, normal)
     return Rung(
         name=f"{family} response, " + {"none": "no fracture"}.get(fracture, f"{fracture} fracture"),
         key=key,
         layout=layout,
-        likelihood=Likelihood(residuals, normal),
-        starts=_starts(data, material),
+        likelihood=likelihood,
+        starts=_starts(data, material, residuals, likelihood),
         prior_mean=np.concatenate([material.mean, data.friction_mean]),
         prior_precision=precision,
     )
@@ -148,16 +152,18 @@ def _material_layout(data: CutData, recipe: Recipe, fracture: str) -> Layout:
                 "1",
                 "log",
                 0.0,
-                0.1,
+                0.4,
                 "how much of the ripple the band-limited data show",
             )
         )
-    rows.append(Parameter("noise", "N m", "log", float(np.log(noise)), 2.8, "noise of the torque"))
-    rows.append(
+    rows += [
+        Parameter("noise", "N m", "log", float(np.log(noise)), 2.8, "noise of single bins"),
+        Parameter("slow_noise", "N m", "log", float(np.log(noise)), 2.8, "noise of blocks"),
+        Parameter("variation", "1", "log", float(np.log(0.03)), 1.0, "unevenness of the material"),
         Parameter(
-            "variation", "1", "log", float(np.log(0.03)), 1.0, "relative unevenness of the material"
-        )
-    )
+            "variation_length", "m", "log", float(np.log(2e-3)), 0.7, "length of its unevenness"
+        ),
+    ]
     return Layout(tuple(rows))
 
 
@@ -191,19 +197,25 @@ def _from_neighbour(rung: Rung, neighbour: Climbed) -> Rung:
     return replace(rung, starts=np.stack(rows))
 
 
-def _starts(data: CutData, material: Layout) -> Array:
-    """Starts that differ in stiffness and fracture energy; friction starts at its mean."""
-    torque = data.material_torque(data.friction_mean)
-    noise = np.log(max(float(np.median(np.abs(torque))) * 0.3, 1e-6))
-    rows = []
-    for sign_force, sign_energy in ((0.0, 0.0), (0.8, -0.8), (-0.8, 0.8)):
-        point = material.mean.copy()
-        for index, parameter in enumerate(material.parameters):
-            if parameter.name == "response_force":
-                point[index] += sign_force * parameter.sd
-            elif parameter.name == "fracture_energy":
-                point[index] += sign_energy * parameter.sd
-            elif parameter.name == "noise":
-                point[index] = noise
-        rows.append(np.concatenate([point, data.friction_mean]))
-    return np.stack(rows)
+def _starts(
+    data: CutData, material: Layout, residuals: Callable[[Array], Array], likelihood: Likelihood
+) -> Array:
+    """The best three of a coarse grid over stiffness, its growth and fracture energy.
+
+    The noise at each place of the grid is what that place leaves; friction starts at its mean.
+    """
+    grid = {"response_force": (-1.2, -0.8, -0.4, 0.0, 0.4, 0.8), "response_exponent": (-0.5, 0.5)}
+    if "fracture_energy" in material.names:
+        grid["fracture_energy"] = (-1.2, -0.8, -0.5, -0.25, 0.0, 0.25, 0.5, 0.8, 1.2)
+    found = []
+    for steps in itertools.product(*grid.values()):
+        point = np.concatenate([material.mean, data.friction_mean])
+        for name, step in zip(grid, steps, strict=True):
+            index = material.names.index(name)
+            point[index] += step * material.sd[index]
+        left = float(np.log(max(float(np.std(residuals(point))), 1e-9)))
+        for name in ("noise", "slow_noise"):
+            point[material.names.index(name)] = left
+        found.append((float(likelihood.terms(point).sum()), point))
+    best = sorted(found, key=lambda pair: -pair[0])
+    return np.stack([point for _, point in best[:STARTS]])
