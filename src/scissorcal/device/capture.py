@@ -25,7 +25,7 @@ CaptureProgress = Callable[[float, str, CoverageGrid], None]
 SUPERVISOR_S = 1.0
 RATE_CUTOFF_HZ = 120.0
 FAULT_CLEARINGS = 20
-FAULT_CLEARINGS_PER_S = 0.2
+FAULT_CLEARINGS_PER_S = 1.0
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
 
@@ -138,7 +138,7 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
 
     A computer that hesitates for 10 ms makes the device brake and latch a fault. That spoils a few
-    samples and no capture, so it is cleared, unless it comes more often than once in 5 s and a few.
+    samples and no capture, so it is cleared, unless it comes more often than once a second.
     """
     limits, control = recipe.limits, recipe.rig.control
     return ServoConfig(
