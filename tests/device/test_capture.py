@@ -1,5 +1,6 @@
 """Captures in virtual time: driven, by hand, by a person who is asked, and with a bad line."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,16 @@ from scissorcal.device.paths import PathBuilder
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import Capability, ConfigKey, Mode, StateFlag
+from scissorcal.kernel import (
+    Capability,
+    ConfigKey,
+    FrameDecoder,
+    Mode,
+    State,
+    StateFlag,
+    decode,
+    encode,
+)
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from tests.device.conftest import IDENTITY
@@ -191,6 +201,13 @@ def test_a_person_cuts_by_hand_on_a_rig_without_motors_for_the_sledge(tmp_path: 
     assert not recording.samples["torque_command"].any()
 
 
+def test_a_hand_that_is_not_measured_is_refused(tmp_path: Path) -> None:
+    recipe = short("paper-80gsm")
+    link = like_a_real_rig(recipe, capabilities=int(Capability.ADVANCE_MOTOR))
+    with pytest.raises(DeviceError, match="does not measure the force"):
+        captured(tmp_path, link, recipe, "cut", hand=True, confirm=lambda request: None)
+
+
 def test_a_person_who_does_nothing_is_not_waited_for_for_ever(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -309,3 +326,32 @@ def test_the_same_seed_gives_the_same_recording(tmp_path: Path) -> None:
         link = link_for(recipe, seed=5)
         samples.append(captured(tmp_path / name, link, recipe, "friction")[0].samples)
     assert np.array_equal(*samples)
+
+
+def test_a_rig_that_falls_silent_is_given_up() -> None:
+    recipe = short("paper-80gsm")
+    link = link_for(recipe)
+    with open_motion(link, servo_config(recipe, link.identity)) as motion:
+        link.configure(ConfigKey.STREAM, 0.0)
+        with pytest.raises(DeviceError, match="stopped sending"):
+            for _ in motion.idle(5.0):
+                pass
+
+
+def test_places_that_are_no_numbers_move_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = short("paper-80gsm")
+    link = link_for(recipe)
+    exchange = link.exchange
+
+    def broken(frame: bytes | None) -> list[bytes]:
+        states = [decode(payload) for payload in exchange(frame)]
+        frames = [encode(s._replace(opening=math.nan)) for s in states if isinstance(s, State)]
+        return FrameDecoder().feed(b"".join(frames))
+
+    monkeypatch.setattr(link, "exchange", broken)
+    with open_motion(link, servo_config(recipe, link.identity)) as motion:
+        path = PathBuilder(0.5, -0.06, motion.tick_s)
+        path.rest(0.1)
+        with pytest.raises(DeviceError, match="check its encoders"):
+            next(motion.track(path.reference()))
+    assert abs(link.rig.rate) < 1e-6

@@ -11,7 +11,8 @@ from scissorcal.device.loading import Loader
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.trajectory import opening_range
-from scissorcal.kernel import ConfigKey, Identity
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import label_strokes
 
@@ -33,8 +34,14 @@ def hand_strokes(
     """Record the strokes that a hand makes through each sheet.
 
     A sheet is done once its strokes are made and the blades stand open again, or nothing has
-    moved for a minute (which becomes a note). Raises DeviceError where the rig fails.
+    moved for a minute (which becomes a note). Raises DeviceError where the rig fails, or has no
+    sensor for the force of the hand.
     """
+    if not motion.identity.capabilities & Capability.HANDLE_FORCE_SENSOR:
+        raise DeviceError(
+            f"The device {motion.identity.name} does not measure the force on its handles, so a "
+            "capture by hand would not know what drives the blades: capture without --hand."
+        )
     watch = _Watch(motion, recipe, recorder, tell)
     speeds = cycle(recipe.capture.cut.speeds_rad_per_s)
     for sheet, request in enumerate(hand_requests(recipe)):
@@ -47,9 +54,10 @@ def hand_strokes(
             watch.until(recipe.capture.cut.strokes_per_sheet, GIVE_UP_S)
             continue
         for number in range(recipe.capture.cut.strokes_per_sheet):
+            speed = next(speeds)
             motion.configure(ConfigKey.HAND_STROKES, 1.0)
-            motion.configure(ConfigKey.HAND_SPEED_rad_per_s, next(speeds))
-            if not watch.until(number + 1, GIVE_UP_SIMULATED_S):
+            motion.configure(ConfigKey.HAND_SPEED_rad_per_s, speed)
+            if not watch.until(number + 1, GIVE_UP_SIMULATED_S + watch.travel / speed):
                 break
         motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
 
@@ -70,7 +78,7 @@ class _Watch:
         self._motion = motion
         self._recorder = recorder
         self._tell = tell
-        self._travel = hand_travel(recipe, motion.identity)
+        self.travel = hand_travel(recipe, motion.identity)
         self._wanted = recipe.capture.cut.strokes_per_sheet
         self._sheets = recipe.capture.cut.sheets
         self._sheet = 0
@@ -93,7 +101,7 @@ class _Watch:
             done = (self._sheet + min(made / self._wanted, 1.0)) / self._sheets
             sentence = f"{made} of {self._wanted} strokes, piece {self._sheet + 1}"
             self._tell(done, sentence)
-            rest = _rest_s(time, opening, 0.1 * self._travel)
+            rest = _rest_s(time, opening, 0.1 * self.travel)
             if made >= strokes and rest >= SETTLED_S and not self._closed(opening):
                 return True
             if rest >= give_up_s:
@@ -112,12 +120,12 @@ class _Watch:
         """Closings so far, the one under way included."""
         if len(time) == 0:
             return 0
-        strokes = label_strokes(opening, time, self._travel).strokes
+        strokes = label_strokes(opening, time, self.travel).strokes
         return sum(stroke.kind == "closing" for stroke in strokes)
 
     def _closed(self, opening: NDArray[np.float64]) -> bool:
         """Whether the blades still stand where a closing left them."""
-        return float(opening[-1]) < float(opening.min()) + 0.5 * self._travel
+        return float(opening[-1]) < float(opening.min()) + 0.5 * self.travel
 
 
 def _bring_back(motion: Motion, recipe: Recipe, recorder: Recorder, loader: Loader) -> None:
