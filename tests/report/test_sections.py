@@ -9,6 +9,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
 from scissorcal.report.document import compose_fit
+from scissorcal.report.reduce import block_means
 from scissorcal.report.sections.friction_curve import trace_friction
 from scissorcal.report.sections.headline import Headline
 from scissorcal.report.sections.left_out import list_left_out
@@ -141,6 +142,22 @@ def test_groups_say_how_far_off_the_model_is() -> None:
     assert slowest.rms == pytest.approx(0.0011 / np.sqrt(1 - 0.25), rel=0.1)
     assert slowest.median_band_width == pytest.approx(0.0004)
     assert all(len(curve.opening) <= 100 for group in section.groups for curve in group.curves)
+
+
+def test_block_means_skip_what_is_missing() -> None:
+    values = np.array([1.0, 3.0, np.nan, 5.0, np.nan, np.nan])
+    assert np.array_equal(block_means(values, 3), [2.0, 5.0, np.nan], equal_nan=True)
+    assert np.array_equal(block_means(values, 100), values, equal_nan=True)
+    assert len(block_means(np.zeros(0), 5)) == 0
+
+
+def test_many_strokes_do_not_swell_the_report() -> None:
+    fit = friction_fit()
+    many = np.sort(np.arange(len(fit.series.stroke)) % 1500)
+    strokes = strokes_of(replace(fit, series=replace(fit.series, stroke=many)), "friction", [])
+    groups = compare_torque(fit, strokes).groups
+    points = sum(len(curve.opening) for group in groups for curve in group.curves)
+    assert points <= 15000
 
 
 def test_the_friction_curve_is_the_law_with_its_band() -> None:

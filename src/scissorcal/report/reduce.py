@@ -25,9 +25,18 @@ def median(values: Array) -> float:
 
 
 def block_means(values: Array, blocks: int) -> Array:
-    """Means over consecutive blocks of nearly equal length, shape (min(blocks, n),)."""
+    """Means of what is finite over consecutive blocks of nearly equal length.
+
+    Shape (min(blocks, n),); NaN for a block without a finite value.
+    """
     count = min(blocks, len(values))
-    return np.array([mean(block) for block in np.array_split(values, count)]) if count else values
+    if count == 0:
+        return np.zeros(0)
+    starts = np.arange(count) * len(values) // count
+    known = np.isfinite(values)
+    sums = np.add.reduceat(np.where(known, values, 0.0), starts)
+    counts = np.add.reduceat(known.astype(np.float64), starts)
+    return np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0)
 
 
 def thinned(places: NDArray[np.int64], most: int) -> NDArray[np.int64]:

@@ -11,13 +11,17 @@ from scissorcal.report.numbers import Number, finite, finite_each, short
 from scissorcal.report.reduce import Array, block_means, median, rms
 from scissorcal.report.strokes import BETWEEN, StrokeName, StrokeSamples, kind_word
 
-BLOCKS = 100
+MOST_BLOCKS = 100
+FEWEST_BLOCKS = 10
+ALL_BLOCKS = 6000
+"""Blocks of all strokes together, so that a recording of many strokes does not swell the twin."""
+
 SAME_SPEED = 0.05
 
 
 @dataclass(frozen=True)
 class StrokeCurve:
-    """One stroke in at most 100 block means; arrays share one length, units as in the section.
+    """One stroke in 10 to 100 block means; arrays share one length, units as in the section.
 
     ``time_s`` runs from the stroke's first sample; ``band_low`` and ``band_high`` are 5 % and 95 %
     of the posterior of the model's mean.
@@ -61,7 +65,8 @@ def compare_torque(fit: FitResult, strokes: Sequence[StrokeSamples]) -> TorqueSe
     pace = _common_speeds([stroke.name.speed for stroke in strokes])
     for stroke in strokes:
         grouped.setdefault(_key(fit, stroke.name, pace), []).append(stroke)
-    groups = tuple(_group(fit, members) for _, members in sorted(grouped.items()))
+    blocks = min(MOST_BLOCKS, max(FEWEST_BLOCKS, ALL_BLOCKS // max(len(strokes), 1)))
+    groups = tuple(_group(fit, members, blocks) for _, members in sorted(grouped.items()))
     return TorqueSection(fit.effort_unit, fit.position_unit, groups)
 
 
@@ -99,7 +104,7 @@ def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
     return common
 
 
-def _group(fit: FitResult, members: list[StrokeSamples]) -> TorqueGroup:
+def _group(fit: FitResult, members: list[StrokeSamples], blocks: int) -> TorqueGroup:
     first = members[0].name
     against = along(first)
     places = np.concatenate([member.places for member in members])
@@ -119,15 +124,15 @@ def _group(fit: FitResult, members: list[StrokeSamples]) -> TorqueGroup:
         finite(median(np.array(speeds))),
         finite(rms(series.measured[places] - series.predicted[places])),
         finite(median(series.band_high[places] - series.band_low[places])),
-        tuple(_curve(fit, member) for member in members),
+        tuple(_curve(fit, member, blocks) for member in members),
     )
 
 
-def _curve(fit: FitResult, stroke: StrokeSamples) -> StrokeCurve:
+def _curve(fit: FitResult, stroke: StrokeSamples, blocks: int) -> StrokeCurve:
     series, at = fit.series, stroke.places
 
     def reduced(values: Array) -> tuple[Number, ...]:
-        return finite_each(block_means(values, BLOCKS), 5)
+        return finite_each(block_means(values, blocks), 5)
 
     return StrokeCurve(
         stroke.name,
