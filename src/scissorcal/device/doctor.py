@@ -144,8 +144,14 @@ def _lateness() -> Array:
 
 
 def _realtime_priority() -> int:
-    """Highest real-time priority that this user may ask for; 0 where none."""
-    if os.geteuid() == 0:
-        return os.sched_get_priority_max(os.SCHED_FIFO)
+    """Highest real-time priority that this process may have; 0 where it gets none when it tries."""
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except OSError:
+        return 0
+    os.sched_setscheduler(0, policy, parameters)
+    highest = os.sched_get_priority_max(os.SCHED_FIFO)
     limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
-    return 99 if limit == resource.RLIM_INFINITY else limit
+    unlimited = os.geteuid() == 0 or limit == resource.RLIM_INFINITY
+    return highest if unlimited else min(limit, highest)
