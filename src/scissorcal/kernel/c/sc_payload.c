@@ -5,7 +5,7 @@
 
 uint64_t sc_schema_hash(void)
 {
-    return UINT64_C(0x18CE130DBF1411A3);
+    return UINT64_C(0xB09FB42A7F073F64);
 }
 
 static uint8_t *put_u8(uint8_t *at, uint8_t value)
