@@ -75,9 +75,9 @@ def build_package(
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
-    The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md). ``rng`` picks
-    which posterior draws travel along for the band, at most 200; the same fits, recipe and seed
-    give the same bytes. ``tolerance`` is each table's, as a share of its value.
+    The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
+    ``rng`` picks which posterior draws travel along for the band, at most 200; the same fits,
+    recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its value.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the

@@ -61,7 +61,8 @@ class ModelPackage:
         """Equal-tailed interval that holds the torque with ``probability``: (low, high) in N m.
 
         Each posterior draw in the package is evaluated with the exact model, without tables, and
-        held to the torque limit as in `torque`. Arguments broadcast. Raises ValueError unless 0 < probability < 1.
+        held to the torque limit as in `torque`. Arguments broadcast. Raises ValueError unless
+        0 < probability < 1.
         """
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability must lie between 0 and 1, not {probability:g}")
