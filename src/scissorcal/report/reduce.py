@@ -36,7 +36,9 @@ def block_means(values: Array, blocks: int) -> Array:
     known = np.isfinite(values)
     sums = np.add.reduceat(np.where(known, values, 0.0), starts)
     counts = np.add.reduceat(known.astype(np.float64), starts)
-    return np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0)
+    means = np.full(count, np.nan)
+    np.divide(sums, counts, out=means, where=counts > 0)
+    return means
 
 
 def thinned(places: NDArray[np.int64], most: int) -> NDArray[np.int64]:
