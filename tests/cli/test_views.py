@@ -9,19 +9,29 @@ from scissorcal.device.coverage import CoverageGrid
 from scissorcal.errors import InputError
 
 
-def test_lines_are_printed_where_the_sentence_changes(
+def test_lines_are_printed_now_and_then(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = iter([0.0, 1.0, 2.0, 9.0])
+    clock = iter([0.0, 3.0, 4.0, 5.0, 6.0, 11.0])
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: next(clock))
     with progress() as tell:
-        tell(0.0, "reading")
-        tell(0.1, "reading")
-        tell(0.5, "fitting")
-        tell(1.7, "fitting")
+        for done, sentence in (
+            (0.0, "reading"),
+            (0.1, "reading"),
+            (0.5, "fitting"),
+            (0.6, "sampling"),
+            (0.7, "judging"),
+            (1.7, "judging"),
+        ):
+            tell(done, sentence)
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.splitlines() == ["  0 %  reading", " 50 %  fitting", "100 %  fitting"]
+    assert captured.err.splitlines() == [
+        "  0 %  reading",
+        " 50 %  fitting",
+        " 70 %  judging",
+        "100 %  judging",
+    ]
 
 
 def test_a_capture_says_what_it_covers(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,8 @@ import click
 Progress = Callable[[float, str], None]
 
 _LINE_EVERY_S = 5.0
+_NEW_SENTENCE_AFTER_S = 2.0
+_LINES_APART_S = 1.0
 
 
 @contextmanager
@@ -45,7 +47,7 @@ def _bar() -> Iterator[Progress]:
 
 
 class _Lines:
-    """Print a line where the sentence changes, and every few seconds while it does not."""
+    """Print a line every few seconds, sooner where the sentence changes."""
 
     def __init__(self) -> None:
         self._last = ""
@@ -53,7 +55,8 @@ class _Lines:
 
     def __call__(self, done: float, sentence: str) -> None:
         now = time.monotonic()
-        if sentence == self._last and now - self._printed_s < _LINE_EVERY_S:
+        wait = _LINE_EVERY_S if sentence == self._last else _NEW_SENTENCE_AFTER_S
+        if now - self._printed_s < wait:
             return
         self._last, self._printed_s = sentence, now
         click.echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)

@@ -1,5 +1,6 @@
 """A workspace: a folder with a recipe.toml, and where everything in it lies."""
 
+import shutil
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +15,7 @@ RecordingKind = Literal["friction", "cut", "render"]
 FitKind = Literal["friction", "cut"]
 
 RECIPE_FILE = "recipe.toml"
+DEMO_MARKER = ".scissorcal-demo"
 
 
 @dataclass(frozen=True)
@@ -116,3 +118,24 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
             f"{workspace.root} cannot be made into a workspace: {error.strerror}."
         ) from None
     return workspace
+
+
+def demo_folder(folder: Path) -> Path:
+    """Make an empty folder for a demo; one that an earlier demo made is cleared first.
+
+    Raises InputError where the folder holds anything else, which is left as it is.
+    """
+    marker = folder / DEMO_MARKER
+    try:
+        if marker.is_file():
+            shutil.rmtree(folder)
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(
+                f"{folder} is there already and no demo made it, so it was left as it is: name "
+                "another folder with --folder."
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        marker.write_text("A demo made this folder; the next one replaces it.\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{folder} cannot be used for a demo: {error.strerror}.") from None
+    return folder

@@ -1,0 +1,96 @@
+"""``scissorcal demo``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from scissorcal.cli.options import seed_option
+from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.progress import progress
+
+if TYPE_CHECKING:
+    from scissorcal.workday.demo import DemoResult
+
+_ANSWERS = {True: "yes", False: "no", None: "-"}
+
+
+@click.command("demo")
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("demo-workspace"),
+    show_default=True,
+    help="Where the demo's workspace goes; that of an earlier demo is replaced.",
+)
+@click.option("--recipe", default="paper-80gsm", show_default=True, help="A built-in recipe.")
+@click.option(
+    "--effort",
+    type=click.Choice(["draft", "standard"]),
+    default=None,
+    help="Effort of the fits; the recipe's if not given.",
+)
+@seed_option
+@command
+def demo(
+    folder: Path, recipe: str, effort: Literal["draft", "standard"] | None, seed: int
+) -> Answer:
+    """Run the whole day on a virtual rig: capture, fit, report, package, render.
+
+    Time is virtual, so it goes as fast as the computer does. The specimen is drawn anew for each
+    seed and never seen by the fits; at the end, truth and estimate stand side by side.
+
+    \b
+    Example:
+      $ scissorcal demo --seed 1
+      parameter  unit    truth     estimate  5 %       95 %      inside?
+      inertia    kg m^2  0.000211  0.000212  0.000207  0.000216  yes
+    """
+    from scissorcal.workday.demo import run_demo
+    from scissorcal.workday.workspace import demo_folder
+
+    made = demo_folder(folder)
+    with progress() as tell:
+        found = run_demo(made, recipe_name=recipe, seed=seed, effort=effort, progress=tell)
+    result = {
+        "workspace": found.workspace,
+        "specimen": found.specimen,
+        "seed": seed,
+        "rungs": found.rungs,
+        "parameters": [
+            {**row.parameter.as_dict(), "truth": row.truth, "inside": row.inside}
+            for row in found.judged
+        ],
+        "share_inside": found.share_inside,
+        "torque_error": found.torque_error,
+        "rendering": found.rendering,
+    }
+    return Answer(result, _text(found), found.verdicts, found.files)
+
+
+def _text(found: "DemoResult") -> str:
+    rows = [["parameter", "unit", "truth", "estimate", "5 %", "95 %", "inside?"]]
+    for row in found.judged:
+        parameter = row.parameter
+        truth = "-" if row.truth is None else f"{row.truth:.4g}"
+        estimate = [f"{value:.4g}" for value in (parameter.mean, parameter.q05, parameter.q95)]
+        rows.append([parameter.name, parameter.unit, truth, *estimate, _ANSWERS[row.inside]])
+    inside = [row.inside for row in found.judged if row.inside is not None]
+    lines = [
+        *found.rungs,
+        "",
+        table(rows, right=[2, 3, 4, 5]),
+        "",
+        f"{sum(inside)} of {len(inside)} intervals (90 %) hold the truth",
+        f"rendered torque is off by {100 * found.torque_error:.2f} % (rms over the scene)",
+        f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
+        "",
+        f"look at {_shown(found.workspace / 'report' / 'report.html')}",
+    ]
+    return "\n".join(lines)
+
+
+def _shown(path: Path) -> Path:
+    """Name a path from here where that is shorter."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
