@@ -91,8 +91,8 @@ class LockstepLink:
             self._protocol.receive(command_frame)
         return [payload for payload in self._pass_tick() if _is_state(payload)]
 
-    def configure(self, key: int, value: float) -> None:
-        """Set a value of the device and wait for its echo.
+    def configure(self, key: int, value: float) -> float:
+        """Set a value of the device, wait for its echo and return the value that it holds now.
 
         Sent again (with a new nonce) if no echo arrives; ticks pass only while waiting for one.
         Raises DeviceError if the device does not know the key, refuses the value, or never
@@ -109,6 +109,7 @@ class LockstepLink:
                 "faults lose too many frames, so ask for fewer."
             )
         check_echo(self.name, answer, int(key), float(value))
+        return float(answer.value)
 
     def close(self) -> None:
         """Let go of the rig; doing so twice is fine."""
