@@ -41,4 +41,5 @@ class BuildWithData(build_py):
 setup(
     cmdclass={"build_py": BuildWithData},
     cffi_modules=["src/scissorcal/kernel/build_kernel.py:builder"],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},  # the C core uses the stable ABI
 )

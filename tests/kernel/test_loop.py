@@ -5,6 +5,7 @@ import os
 import pty
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
@@ -369,19 +370,18 @@ def test_samples_that_nobody_read_in_time_are_counted_as_lost(
 
 
 def test_memory_that_is_no_block_is_refused(block: LoopBlock) -> None:
-    small = os.memfd_create("small")
-    os.ftruncate(small, 100)
-    with pytest.raises(ValueError, match="too few"):
-        LoopBlock.attach(small)
-    os.close(small)
-    foreign = os.memfd_create("foreign")
-    os.ftruncate(foreign, os.fstat(block.fileno()).st_size)
-    with pytest.raises(ValueError, match="no block of this version"):
-        LoopBlock.attach(foreign)
+    with tempfile.TemporaryFile() as file:
+        os.ftruncate(file.fileno(), 100)
+        with pytest.raises(ValueError, match="too few"):
+            LoopBlock.attach(file.fileno())
+    with tempfile.TemporaryFile() as file:
+        os.ftruncate(file.fileno(), os.fstat(block.fileno()).st_size)
+        with pytest.raises(ValueError, match="no block of this version"):
+            LoopBlock.attach(file.fileno())
     other = LoopBlock.attach(os.dup(block.fileno()))
     other.pointer.version += 1
     with pytest.raises(ValueError, match="no block of this version"):
-        LoopBlock.attach(os.dup(block.fileno()))
+        LoopBlock.attach(block.fileno())
     other.close()
 
 

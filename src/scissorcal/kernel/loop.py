@@ -136,12 +136,16 @@ class LoopBlock:
 
     @classmethod
     def attach(cls, fd: int) -> Self:
-        """Map the block that another process created; ValueError if ``fd`` holds no such block."""
+        """Map the block that another process created; :meth:`close` then closes ``fd`` too.
+
+        Raises ValueError, and leaves ``fd`` alone, if it holds no such block.
+        """
         size = os.fstat(fd).st_size
         if size < ffi.sizeof("sc_block"):
             raise ValueError(f"Descriptor {fd} holds {size} bytes, too few for a loop's block.")
         block = cls(fd, size)
         if not lib.sc_block_is_sound(block.pointer, size):
+            block._unmap()
             raise ValueError(
                 f"Descriptor {fd} holds no block of this version of scissorcal; both processes "
                 "must run the same one."
@@ -155,11 +159,14 @@ class LoopBlock:
     def close(self) -> None:
         """Let go of the memory; the block cannot be used any more."""
         if self._fd >= 0:
-            ffi.release(self._keep)
-            self._memory.close()
+            self._unmap()
             os.close(self._fd)
             self._fd = -1
-            self.pointer = ffi.NULL
+
+    def _unmap(self) -> None:
+        self.pointer = ffi.NULL
+        ffi.release(self._keep)
+        self._memory.close()
 
     def engage(self, mode: Mode) -> None:
         """Order a mode; it engages with the next frame (RENDER from zero force)."""

@@ -10,6 +10,16 @@
  * a crack releases per metre. Above J_c h (fracture_energy) the crack runs until kappa J_c h is left.
  * X never decreases; with fracture_energy = 0 nothing is cut and X never moves.
  *
+ * At the edges of sense:
+ *   parallel edges, tan(psi) <= 1e-6   nothing is released; they press, the crack stays (NOT_CUTTING)
+ *   contact at or behind the pivot     the formulas go on (the lever may change its sign); flagged
+ *   contact at the tip or beyond       no force; what was stored is an arrest loss; the material is
+ *                                      met again only from outside, so no energy comes from nothing
+ *   deeper than the response's table   straight on with its last slope, up to 1e6 N
+ *   beyond the edge's table            the edge goes on straight
+ *   |rate| beyond the friction tables  the last value is held
+ *   opening beyond half a turn, or an edge steeper than some 87 deg: refused (INVALID)
+ *
  * No step returns anything that is not finite: what cannot be evaluated gives zero torque and
  * force with SC_STEP_INVALID set.
  */
