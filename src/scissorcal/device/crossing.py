@@ -48,7 +48,7 @@ class Blade:
         >>> from scissorcal.recipe.library import builtin_recipe
         >>> blade = Blade.of(builtin_recipe("paper-80gsm"))
         >>> np.round(1e3 * blade.crossing(np.radians([50.0, 12.0])), 1)
-        array([17.3, 57.4])
+        array([17.7, 57.8])
         """
         beta = np.asarray(opening, dtype=np.float64) / self.moving_blades
         sine, cosine = np.sin(beta), np.cos(beta)
