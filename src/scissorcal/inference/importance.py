@@ -61,7 +61,10 @@ def sample_by_importance(
 
 
 def _weigh(draws: Array, log_ratio: Array) -> Sampled:
-    import arviz
+    with warnings.catch_warnings():
+        # Once a day ArviZ announces its next major version, which this project does not use.
+        warnings.simplefilter("ignore", FutureWarning)
+        import arviz
 
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:

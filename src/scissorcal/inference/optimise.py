@@ -126,7 +126,7 @@ def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[
     search.set_lower_bounds(np.full(size, -1e3))
     search.set_upper_bounds(np.full(size, 1e3))
     search.set_initial_step(np.ones(size))
-    search.set_ftol_abs(0.1 * SETTLED)
+    search.set_ftol_abs(1e-3 * SETTLED)
     search.set_maxeval(25 * size)
     try:
         search.optimize(np.zeros(size))

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 SETTLING_STEPS = 40
 STEEPEST_START = 1e-9
+FARTHEST = 100.0
+"""Blade lengths beyond which no contact is looked for: a bent edge may have none at all."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +84,9 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     energy = np.asarray(cutting.fracture_energy)
     shape = np.broadcast_shapes(theta.shape, energy.shape, np.shape(cutting.kappa))
     station = np.full(shape, 0.5 * edge.length_m)
+    far = FARTHEST * edge.length_m
     cuts = np.ones(shape, dtype=bool)
-    steps = 2 if edge.curvature_per_m == 0.0 else SETTLING_STEPS
-    for _ in range(steps):
+    for _ in range(SETTLING_STEPS):
         taper = edge.slope_at(station)
         slope = (sine + taper * cosine) / (cosine - taper * sine)
         cuts = slope > STEEPEST_START
@@ -94,7 +96,7 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
         height = station * sine + edge.offset_at(station) * cosine
         rise = np.where(cuts, sine + taper * cosine, 1.0)
         step = np.where(cuts, (target - height) / rise, 0.0)
-        station = station + np.clip(step, -edge.length_m * 10, edge.length_m * 10)
+        station = np.clip(station + step, -far, far)
         if np.all(np.abs(step) < 1e-14):
             break
     x = station * cosine - edge.offset_at(station) * sine
