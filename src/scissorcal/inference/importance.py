@@ -1,5 +1,6 @@
 """Importance sampling from a Student-t around an optimum, Pareto-smoothed, with its own check."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
