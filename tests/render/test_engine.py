@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import Identity, StateFlag
+from scissorcal.kernel import ConfigKey, Identity, StateFlag
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Recording, read_attachments, read_recording
@@ -60,6 +60,7 @@ def test_strokes_are_rendered_recorded_and_judged(paper: ModelPackage, tmp_path:
     assert {verdict.check: verdict.status for verdict in result.verdicts} == {
         "deadline": "not_evaluated",
         "misses": "pass",
+        "faults": "pass",
         "supervision": "pass",
         "passivity": "pass",
     }
@@ -196,6 +197,23 @@ def test_lost_and_garbled_frames_are_counted_and_survived(
     assert "cable" in verdict.why
     assert any("garbled" in note for note in recording.notes)
     assert np.isfinite(recording.samples["torque_command"]).all()
+
+
+def test_a_device_that_brakes_is_engaged_anew_and_it_is_said(
+    paper: ModelPackage, tmp_path: Path
+) -> None:
+    link = rig(drop_share=0.1)
+    link.configure(ConfigKey.BRAKE_AFTER_MS, 3.0)
+    result, recording = rendered(paper, tmp_path / "r.mcap", link, seconds=4.0)
+    assert result.faults > 2
+    verdict = next(verdict for verdict in result.verdicts if verdict.check == "faults")
+    assert verdict.status == "fail"
+    assert "force began anew" in verdict.why
+    samples = recording.samples
+    latched = (samples["flags"] & int(StateFlag.FAULT_LATCHED)) != 0
+    cleared = np.flatnonzero(latched[:-1] & ~latched[1:]) + 1
+    assert np.all(np.abs(samples["torque_command"][latched]) == 0.0)
+    assert np.all(np.abs(samples["torque_command"][cleared[1:]]) < 0.002)
 
 
 def test_an_unplugged_rig_leaves_what_was_recorded(paper: ModelPackage, tmp_path: Path) -> None:

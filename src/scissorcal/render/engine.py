@@ -27,7 +27,10 @@ SUPERVISOR_S = 0.2
 
 RATE_CUTOFF_HZ = 100.0
 FALLBACK_DAMPING = 0.02
-FAULT_CLEARINGS = 3
+FAULT_CLEARINGS = 20
+FAULT_CLEARINGS_PER_S = 0.2
+"""So many faults of the device are cleared, each with a new ramp from zero; one more stops."""
+
 TRAVEL_SHARE = 0.2
 THINNED_S = 0.01
 LOOK_EVERY_S = 0.25
@@ -71,17 +74,17 @@ def render(
     Raises InputError, before anything moves, where package and device do not fit each other or
     nobody can be asked; DeviceError where the rig fails, and what was recorded stays.
     """
+    if not 0.0 < seconds < float("inf"):
+        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
     identity = link.identity
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
-    config = _servo_config(applied, identity)
+    config = _servo_config(applied, identity, seconds)
     if not is_simulator(identity) and confirm is None:
         raise InputError(
             "Rendering has to ask somebody to clear the blades first: give it a confirm callback "
             "that shows a sentence and returns when that is done."
         )
-    if not 0.0 < seconds < float("inf"):
-        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
     watch = _Watch(package, writer, progress or _silent, seconds)
     with open_motion(link, config, package.tables) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
@@ -222,7 +225,7 @@ def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -
     )
 
 
-def _servo_config(applied: AppliedLimits, identity: Identity) -> ServoConfig:
+def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) -> ServoConfig:
     return ServoConfig(
         torque_limit=applied.torque_Nm,
         torque_slew=applied.torque_slew_Nm_per_s,
@@ -232,7 +235,7 @@ def _servo_config(applied: AppliedLimits, identity: Identity) -> ServoConfig:
         damping_Nm_s_per_rad=FALLBACK_DAMPING,
         rate_cutoff_Hz=RATE_CUTOFF_HZ,
         supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
-        fault_clearings=FAULT_CLEARINGS,
+        fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
     )
 

@@ -9,6 +9,7 @@ from scissorcal.verdicts import Status, Verdict
 SCOPE = "render"
 MOST_MISSED = 0.01
 MOST_CREATED = 0.1
+MOST_FAULTS_PER_S = 0.1
 NEGLIGIBLE_J = 5e-3
 """What the ramp at engagement leaves unpaid: the model's books are full from the start."""
 
@@ -65,10 +66,11 @@ class RenderResult:
 def render_verdicts(
     report: MotionReport, latency: Latency | None, tick_us: int
 ) -> tuple[Verdict, ...]:
-    """Judge a rendering: on time, complete, supervised, passive."""
+    """Judge a rendering: on time, complete, without faults, supervised, passive."""
     return (
         _deadline(latency, tick_us),
         _complete(report),
+        _faultless(report, tick_us),
         _supervised(report),
         _passive(report.ledger),
     )
@@ -93,6 +95,20 @@ def _complete(report: MotionReport) -> Verdict:
     if status == "fail":
         why += " Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
     return Verdict(SCOPE, "misses", status, share, MOST_MISSED, why)
+
+
+def _faultless(report: MotionReport, tick_us: int) -> Verdict:
+    """Whether the device braked by itself more than now and then."""
+    counters = report.counters
+    allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
+    status: Status = "pass" if counters.faults <= allowed else "fail"
+    why = f"The device latched a fault {counters.faults} times, and each time force began anew."
+    if counters.faults:
+        why += (
+            " Where nothing else caused it, commands came too late: 'scissorcal device doctor' "
+            "says why."
+        )
+    return Verdict(SCOPE, "faults", status, float(counters.faults), allowed, why)
 
 
 def _supervised(report: MotionReport) -> Verdict:
