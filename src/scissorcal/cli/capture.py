@@ -40,8 +40,9 @@ def friction(device: str, yes: bool, seed: int, folder: Path | None) -> Answer:
     \b
     Example:
       $ scissorcal capture friction --device sim
-      captures/friction-20260102T030405Z.mcap: 110341 samples
+      captures/friction-20261121T132036Z.mcap: 109195 samples from scissorcal-sim office-paper
       80 of 80 cells filled
+      ...
     """
     return _capture("friction", device, hand=False, yes=yes, seed=seed, folder=folder)
 
@@ -61,8 +62,9 @@ def cut(device: str, hand: bool, yes: bool, seed: int, folder: Path | None) -> A
     \b
     Example:
       $ scissorcal capture cut --device sim
-      captures/cut-20260102T031500Z.mcap: 98012 samples
+      captures/cut-20261121T132227Z.mcap: 72842 samples from scissorcal-sim office-paper
       24 of 24 cells filled
+      ...
     """
     return _capture("cut", device, hand=hand, yes=yes, seed=seed, folder=folder)
 

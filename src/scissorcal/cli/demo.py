@@ -42,9 +42,13 @@ def demo(
 
     \b
     Example:
-      $ scissorcal demo --seed 1
-      parameter  unit    truth     estimate  5 %       95 %      inside?
-      inertia    kg m^2  0.000211  0.000212  0.000207  0.000216  yes
+      $ scissorcal demo
+      friction: stribeck + angle, symmetric
+      cut: power response, rippled fracture
+      ...
+      parameter          unit           truth   estimate        5 %       95 %  inside?
+      inertia            kg m^2      0.000189  0.0001879  0.0001843  0.0001912  yes
+      ...
     """
     from scissorcal.workday.demo import run_demo
     from scissorcal.workday.workspace import demo_folder

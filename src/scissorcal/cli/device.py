@@ -25,7 +25,7 @@ def list_() -> Answer:
     \b
     Example:
       $ scissorcal device list
-      /dev/ttyUSB0
+      /dev/ttyS0
       sim (a virtual rig; every --device takes it)
     """
     from scissorcal.device.ports import known_ports

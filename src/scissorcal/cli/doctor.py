@@ -25,9 +25,9 @@ def doctor(device: str, seconds: float, seed: int) -> Answer:
 
     \b
     Example:
-      $ scissorcal device doctor --device /dev/ttyUSB0
-      scissors-rig, serial 0042, firmware 3, one frame each 1 ms
-      pass  device  round trip  ...
+      $ scissorcal device doctor --device sim
+      scissorcal-sim, serial office-paper, firmware 1, one frame each 1 ms
+      ...
     """
     from scissorcal.device.doctor import examine
     from scissorcal.workday.rigs import open_rig

@@ -17,8 +17,9 @@ def export(recording: Path, table: Path, overwrite: bool) -> Answer:
 
     \b
     Example:
-      $ scissorcal export captures/friction-20260102T030405Z.mcap friction.parquet
-      friction.parquet: 110341 rows
+      $ scissorcal export captures/friction-20261121T131415Z.mcap friction.parquet
+      friction.parquet: 24841 rows
+      ...
     """
     from scissorcal.recording import export_table, read_recording
 

@@ -41,10 +41,13 @@ def fit(
     \b
     Example:
       $ scissorcal fit friction
-      friction: coulomb + viscous, symmetric (standard)
-      parameter  unit      mean  sd  5 %  95 %  identifiability
+      friction: stribeck + angle, symmetric (standard)
+      parameter        unit            mean         sd        5 %       95 %  identifiability
+      inertia          kg m^2     0.0002109  2.253e-06  0.0002072  0.0002144             0.00
+      ...
       $ scissorcal fit friction
-      friction: nothing changed since the last fit
+      friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
+      ...
     """
     from scissorcal.workday.fits import fit_workspace
 

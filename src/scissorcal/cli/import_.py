@@ -56,9 +56,10 @@ def import_(
 
     \b
     Example:
-      $ scissorcal import axis.mat -c time=t -c opening=q -c motor_torque=u \\
-          -u time=s -u opening=m -u motor_torque=V -s motor_torque=gain --joint linear
-      captures/friction-20260102T030405Z.mcap: 24841 samples, 24.8 s, 16 strokes, linear joint
+      $ scissorcal import DATA_EMPS.mat -c time=t -c opening=qm -c motor_torque=vir \\
+          -u time=s -u opening=m -u motor_torque=V -s motor_torque=gtau --joint linear
+      captures/friction-20261121T131415Z.mcap: 24841 samples, 24.8 s, 8 strokes, linear joint
+      ...
     """
     import math
 

@@ -24,7 +24,7 @@ def init(folder: Path, recipe: str) -> Answer:
     \b
     Example:
       $ scissorcal init my-paper --recipe paper-80gsm
-      my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.).
+      my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.)
       Edit my-paper/recipe.toml, then:
         cd my-paper
         scissorcal plan

@@ -35,8 +35,8 @@ def build(force: bool, seed: int, folder: Path | None) -> Answer:
     \b
     Example:
       $ scissorcal package build
-      package/paper-80gsm.zip: 5 tables, 200 draws, error bound 0.00012 N m
-      pass  package  bound  On 13337 places of its own the kernel is at most ...
+      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      ...
     """
     from scissorcal.workday.packages import build_workspace_package
 
@@ -61,8 +61,8 @@ def check(path: Path | None, folder: Path | None) -> Answer:
     \b
     Example:
       $ scissorcal package check package/paper-80gsm.zip
-      package/paper-80gsm.zip: 5 tables, 200 draws, error bound 0.00012 N m
-      pass  package  bound  On 13337 places of its own the kernel is at most ...
+      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      ...
     """
     from scissorcal.package import check_package, open_package
 

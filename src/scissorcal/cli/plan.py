@@ -24,8 +24,10 @@ def plan(folder: Path | None) -> Answer:
     \b
     Example:
       $ scissorcal plan
-      step              state    found                 needed for
-      capture friction  missing  nothing recorded yet  rendered, and taken off the torque ...
+      paper-80gsm:
+      ...
+      fit cut           missing  not fitted yet        response and toughness
+      ...
       next: scissorcal capture friction --device PORT
     """
     from scissorcal.workday.plan import make_plan

@@ -31,9 +31,9 @@ def show(path: Path) -> Answer:
 
     \b
     Example:
-      $ scissorcal recording show captures/friction-20260102T030405Z.mcap
-      friction, rotary joint: 110341 samples in 110.3 s at 1000 Hz, nothing missing
-      channel  unit  lowest  highest
+      $ scissorcal recording show captures/friction-20261121T131415Z.mcap
+      friction, linear joint: 24841 samples in 24.8 s at 1000 Hz, nothing missing
+      ...
     """
     from scissorcal.recording import read_recording, recover, summary
 

@@ -62,8 +62,10 @@ def render(
     \b
     Example:
       $ scissorcal render --device sim
-      rendered 4 strokes in 14.2 s on scissorcal-sim office-paper
-      latency (us)   p50 9   p99 24   p99.9 96   worst 402
+      rendered 4 strokes in 15.9 s on scissorcal-sim office-paper
+      ...
+      0 frames missed, 0 garbled, 20 stalls, 0 faults; 0.0 % of the frames at a limit
+      ...
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.render import VirtualStrokes

@@ -19,7 +19,7 @@ def report(folder: Path | None) -> Answer:
     Example:
       $ scissorcal report
       report/report.html and report/report.json show 2 fits
-      pass  fit.friction  optimum  The search settled.
+      ...
     """
     from scissorcal.workday.reports import reported_fits, write_workspace_report
 

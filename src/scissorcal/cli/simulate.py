@@ -27,7 +27,7 @@ def simulate(specimen: str, faults: tuple[str, ...], seed: int) -> Answer:
     \b
     Example:
       $ scissorcal device simulate office-paper --seed 1
-      /dev/pts/4
+      /dev/pts/0
     """
     from scissorcal.device.sim.faults import parse_faults
     from scissorcal.device.sim.server import serve
