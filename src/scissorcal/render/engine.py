@@ -74,17 +74,11 @@ def render(
     Raises InputError, before anything moves, where package and device do not fit each other or
     nobody can be asked; DeviceError where the rig fails, and what was recorded stays.
     """
-    if not 0.0 < seconds < float("inf"):
-        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
     identity = link.identity
+    _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
     config = _servo_config(applied, identity, seconds)
-    if not is_simulator(identity) and confirm is None:
-        raise InputError(
-            "Rendering has to ask somebody to clear the blades first: give it a confirm callback "
-            "that shows a sentence and returns when that is done."
-        )
     watch = _Watch(package, writer, progress or _silent, seconds)
     with open_motion(link, config, package.tables) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
@@ -210,6 +204,16 @@ class _Watch:
         resting = float(np.ptp(recent)) < 0.1 * self._travel
         opened = opening[-1] > opening.min() + 0.5 * float(np.ptp(opening))
         return self.strokes >= self.wanted and resting and bool(opened)
+
+
+def _refuse_impossible(identity: Identity, seconds: float, confirm: Confirm | None) -> None:
+    if not 0.0 < seconds < float("inf"):
+        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
+    if not is_simulator(identity) and confirm is None:
+        raise InputError(
+            "Rendering has to ask somebody to clear the blades first: give it a confirm callback "
+            "that shows a sentence and returns when that is done."
+        )
 
 
 def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -> AppliedLimits:
