@@ -1,5 +1,7 @@
 """Every command has help with an example, takes --json, and ends with the code it should."""
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -164,6 +166,17 @@ def test_a_failed_verdict_is_three_and_prose_leaves_stdout_to_the_object(
     assert said.envelope["verdicts"][0]["status"] == "fail"
     assert said.envelope["result"] == {"value": None}
     assert said.envelope["files"] == ["a.json"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_an_answer_that_cannot_be_written_is_said_to_be(tmp_path: Path) -> None:
+    program = "from scissorcal.cli import main; main()"
+    words = [sys.executable, "-c", program, "init", str(tmp_path / "work")]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert "could not be written" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_tables_line_up() -> None:

@@ -162,4 +162,4 @@ def _unexpected(error: Exception, show_traceback: bool) -> Answer:
 
 def is_interactive() -> bool:
     """Whether a person sits at both ends: stdin to answer, stderr to read."""
-    return sys.stdin.isatty() and sys.stderr.isatty()
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))

@@ -62,6 +62,9 @@ def run(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:
         sys.stderr.close()
         code = 1
+    except OSError as error:
+        click.echo(f"Error: The answer could not be written: {error.strerror}.", err=True)
+        code = 1
     sys.exit(code if isinstance(code, int) else 0)
 
 
