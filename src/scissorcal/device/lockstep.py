@@ -40,6 +40,7 @@ class LockstepLink:
     >>> from scissorcal.kernel import ConfigKey
     >>> link = LockstepLink("office-paper", np.random.default_rng(1))
     >>> link.configure(ConfigKey.STREAM, 1.0)
+    1.0
     >>> len(link.exchange(None))  # one tick, one STATE payload
     1
     """

@@ -139,7 +139,7 @@ def ripple_moments(cutting: Cutting, peak_force: ArrayLike) -> RippleMoments:
     Between two runs of the crack the indentation grows steadily from where g = kappa g_c to where
     g = g_c. The mean is that of g under a uniform indentation between both, exactly; the spread is
     that of a straight saw-tooth, (1 - kappa) / sqrt(12), which the curvature of g changes by
-    less than 1 % for kappa above 0.5 and exponents up to 4.
+    less than 1 % for kappa above 0.5 and exponents from 1 to 4 (by 2 % for a square root).
     """
     peak = np.asarray(peak_force, dtype=np.float64)
     response = cutting.response
