@@ -9,9 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
-enum { FRAMES = 500, REFERENCE = 64 };
+enum { FRAMES = 500, BACKLOG = 200, REFERENCE = 64 };
 
 typedef struct {
     int fd;
@@ -21,12 +22,13 @@ typedef struct {
     float largest;
     sc_command last;
     int hang_up;
+    int clears; /* a fault, once it is told to */
 } device;
 
-static void send_state(int fd, uint32_t sequence, int garble)
+static void send_state(int fd, uint32_t sequence, uint16_t flags, int garble)
 {
     uint8_t payload[SC_SIZE_STATE], frame[SC_FRAME_MAX];
-    const sc_state state = {SC_STATE_MOTOR_ENABLED, sequence, sequence * 1000u,
+    const sc_state state = {flags, sequence, sequence * 1000u,
                             0.6f - 1e-4f * (float)sequence, 0.0f, 0.0f, 0.0f};
     const size_t size = sc_pack_state(&state, payload);
     const size_t whole = sc_encode_frame(payload, size, frame, sizeof frame);
@@ -64,7 +66,7 @@ static void *play_device(void *argument)
     sc_decoder_init(&decoder);
     for (uint32_t sequence = 1; sequence <= FRAMES; sequence++) {
         const int garble = sequence % 10 == 5;
-        send_state(self->fd, sequence, garble);
+        send_state(self->fd, sequence, SC_STATE_MOTOR_ENABLED, garble);
         sc_block_beat(self->block);
         if (!garble) {
             read_answers(self, &decoder);
@@ -111,7 +113,7 @@ static void run_once(int hang_up)
     if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
         exit(2);
     }
-    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, hang_up};
+    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, hang_up, 0};
     sc_block_order(block, SC_MODE_DAMP);
     pthread_create(&thread, NULL, play_device, &rig);
     const uint32_t reason = sc_loop_run(ends[0], block);
@@ -128,6 +130,54 @@ static void run_once(int hang_up)
         close(ends[1]);
     }
     close(ends[0]);
+    free(block);
+}
+
+/* A host that stood still: a backlog of frames that all report the fault, then fresh ones. */
+static void *play_latched(void *argument)
+{
+    device *self = argument;
+    uint32_t sequence = 1;
+    sc_decoder decoder;
+    sc_decoder_init(&decoder);
+    for (; sequence <= BACKLOG; sequence++) {
+        send_state(self->fd, sequence, SC_STATE_FAULT_LATCHED, 0);
+    }
+    while (self->last.echo_sequence != BACKLOG) {
+        read_answers(self, &decoder);
+    }
+    CHECK(self->last.flags == (SC_COMMAND_ENABLE | SC_COMMAND_CLEAR_FAULT), "backlog");
+    while (self->last.flags != 0 && sequence < BACKLOG + FRAMES) {
+        const uint16_t flags = self->clears ? SC_STATE_MOTOR_ENABLED : SC_STATE_FAULT_LATCHED;
+        send_state(self->fd, sequence++, flags, 0);
+        nanosleep(&(struct timespec){0, 1000000}, NULL);
+        read_answers(self, &decoder);
+    }
+    sc_block_stop(self->block);
+    return NULL;
+}
+
+static void run_latched(int clears)
+{
+    const char *title = clears ? "backlog that clears" : "fault that stays";
+    int ends[2];
+    pthread_t thread;
+    sc_block *block = new_block();
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
+        exit(2);
+    }
+    block->config.fault_clearings = 1;
+    block->config.supervisor_ticks = 0;
+    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, 0, clears};
+    sc_block_order(block, SC_MODE_DAMP);
+    pthread_create(&thread, NULL, play_latched, &rig);
+    const uint32_t reason = sc_loop_run(ends[0], block);
+    pthread_join(thread, NULL);
+    CHECK(reason == (clears ? SC_STOP_ASKED : SC_STOP_DEVICE_FAULT), title);
+    CHECK(block->servo.frames > BACKLOG, title);
+    CHECK((rig.largest > 0.2f) == clears, title);
+    close(ends[0]);
+    close(ends[1]);
     free(block);
 }
 
@@ -168,6 +218,8 @@ int main(void)
     signal(SIGPIPE, SIG_IGN);
     run_once(0);
     run_once(1);
+    run_latched(1);
+    run_latched(0);
     check_ring();
     check_histogram();
     return checks_done("loop");

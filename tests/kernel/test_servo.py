@@ -327,6 +327,32 @@ def test_a_fault_that_cannot_be_cleared_stops() -> None:
     assert servo.stop_reason is StopReason.DEVICE_FAULT
 
 
+def test_a_backlog_from_before_any_clearing_does_not_stop() -> None:
+    """A host that stood still for 0.2 s finds 200 states, all older than its first clearing."""
+    servo = Servo(None, CONFIG)
+    servo.set_reference(np.full(1000, 0.6), np.zeros(1000), np.full(1000, -0.02), np.zeros(1000))
+    servo.engage(Mode.TRACK)
+    for tick in range(1, 51):
+        servo.step(state(tick))
+    index = servo.track_index
+    for tick in range(51, 251):
+        command = servo.step(state(tick, flags=StateFlag.FAULT_LATCHED), answered=tick == 250)
+    assert command == Command(ENABLE | CLEAR_FAULT, 250, 0.0, 0.0)
+    assert servo.step(state(251)).flags == ENABLE
+    assert servo.stop_reason is StopReason.NONE
+    assert servo.counters.faults == 1
+    assert servo.track_index == index + 1, "the reference waited for the blades"
+
+
+def test_clearings_that_were_sent_and_cleared_nothing_stop() -> None:
+    servo = Servo(None, CONFIG)
+    servo.engage(Mode.DAMP)
+    for tick in range(1, 1002):
+        assert servo.stop_reason is StopReason.NONE
+        servo.step(state(tick, flags=StateFlag.FAULT_LATCHED), answered=tick % 10 == 0)
+    assert servo.stop_reason is StopReason.DEVICE_FAULT
+
+
 def test_in_idle_a_fault_is_cleared_without_enabling() -> None:
     servo = Servo(None, CONFIG)
     assert servo.step(state(1, flags=StateFlag.FAULT_LATCHED)).flags == CLEAR_FAULT

@@ -142,9 +142,9 @@ class LockstepMotion(Motion):
         payloads = self._link.exchange(self._frame)
         self._frame = None
         rows = []
-        for payload in payloads:
-            now_ns = round(1e9 * self._link.virtual_time)
-            self._frame = self._servo.answer(payload, host_time_ns=now_ns)
+        now_ns = round(1e9 * self._link.virtual_time)
+        for left, payload in zip(range(len(payloads) - 1, -1, -1), payloads, strict=True):
+            self._frame = self._servo.answer(payload, host_time_ns=now_ns, answered=left == 0)
             rows.append(self._servo.telemetry().tobytes())
         return rows
 

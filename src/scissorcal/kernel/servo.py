@@ -248,28 +248,47 @@ class Servo:
         """Release the motors from the next frame on, for good."""
         self._orders.stop = 1
 
-    def step(self, state: State, *, heartbeat: bool = True, host_time_ns: int = 0) -> Command:
-        """Take a state, give the command. ``heartbeat=False`` plays a silent supervisor."""
+    def step(
+        self,
+        state: State,
+        *,
+        heartbeat: bool = True,
+        host_time_ns: int = 0,
+        answered: bool = True,
+    ) -> Command:
+        """Take a state, give the command.
+
+        ``heartbeat=False`` plays a silent supervisor. ``answered=False`` says that this command is
+        not sent, as for all but the newest of states that arrived at once: a fault that the
+        device has latched stops only once 100 commands that were sent have not cleared it.
+        """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
         c.opening, c.advance = state.opening, state.advance
         c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
-        self._step(heartbeat, host_time_ns)
+        self._step(heartbeat, host_time_ns, answered)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)
 
-    def answer(self, payload: bytes, *, heartbeat: bool = True, host_time_ns: int = 0) -> bytes:
+    def answer(
+        self,
+        payload: bytes,
+        *,
+        heartbeat: bool = True,
+        host_time_ns: int = 0,
+        answered: bool = True,
+    ) -> bytes:
         """Take a STATE payload, give the whole COMMAND frame: :meth:`step` for bytes, faster.
 
         Raises ValueError if the payload is no STATE.
         """
         if not lib.sc_unpack_state(ffi.from_buffer(payload), len(payload), self._state):
             raise ValueError(f"A payload of {len(payload)} bytes is no STATE.")
-        self._step(heartbeat, host_time_ns)
+        self._step(heartbeat, host_time_ns, answered)
         size = lib.sc_pack_command(self._command, self._payload)
         return encode_frame(bytes(ffi.buffer(self._payload, size)))
 
-    def _step(self, heartbeat: bool, host_time_ns: int) -> None:
+    def _step(self, heartbeat: bool, host_time_ns: int, answered: bool) -> None:
         if heartbeat:
             self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
         fresh = lib.sc_servo_step(
@@ -283,6 +302,8 @@ class Servo:
         )
         if fresh:
             self._servo.sample.host_time_ns = host_time_ns
+        if answered:
+            lib.sc_servo_answered(self._servo)
 
     def telemetry(self) -> NDArray[np.void]:
         """The last frame's sample, shape (1,), SAMPLE_DTYPE; a copy."""

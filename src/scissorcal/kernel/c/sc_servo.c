@@ -6,7 +6,7 @@
 static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors read more */
 static const float LONGEST_TICK_S = 0.01f;       /* a gap does not widen the slew without bound */
 
-enum { SILENCE_UNTIL_STOP = 5, FRAMES_TO_CLEAR = 100 };
+enum { SILENCE_UNTIL_STOP = 5, CLEARINGS_UNTIL_STOP = 100 };
 
 typedef struct {
     float torque;
@@ -87,6 +87,8 @@ static void obey(const sc_servo_config *config, const sc_orders *orders, sc_serv
 }
 
 /* A latched fault is cleared at the start and then a bounded number of times; else it stops us.
+ * What counts against one that stands are the clearings that were sent, not the frames that report
+ * it: after a stall of the host hundreds of those wait, all from before any clearing could leave.
  * Returns 1 while it stands. */
 static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
 {
@@ -100,14 +102,15 @@ static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc
     }
     if (!servo->fault_seen) {
         servo->fault_seen = 1;
-        servo->fault_frames = 0;
+        servo->clearings_sent = 0;
         servo->faults += servo->enabled_once;
         servo->engaged_s = 0.0f;
         servo->opening_integral = 0.0f;
         servo->advance_integral = 0.0f;
     }
-    servo->fault_frames++;
-    if (servo->faults > config->fault_clearings || servo->fault_frames > FRAMES_TO_CLEAR) {
+    servo->engaged_at = servo->sequence - servo->track_index; /* the reference waits, too */
+    if (servo->faults > config->fault_clearings ||
+        servo->clearings_sent >= CLEARINGS_UNTIL_STOP) {
         sc_servo_stop(servo, SC_STOP_DEVICE_FAULT);
     }
     return 1;
@@ -335,4 +338,11 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     }
     answer(config, servo, valid, faulty, wanted, dt, command);
     return 1;
+}
+
+void sc_servo_answered(sc_servo *servo)
+{
+    if (servo->command_flags & SC_COMMAND_CLEAR_FAULT) {
+        servo->clearings_sent++;
+    }
 }

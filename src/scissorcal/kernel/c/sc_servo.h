@@ -121,7 +121,7 @@ typedef struct {
     uint32_t fallback;
     uint32_t stop_reason;
     uint32_t sequence;
-    uint32_t engaged_at; /* sequence at which the mode engaged */
+    uint32_t engaged_at; /* sequence at which the mode engaged, less the time in faults */
     float engaged_s;     /* time since then */
     float opening_integral;
     float advance_integral;
@@ -129,7 +129,7 @@ typedef struct {
     float force;
     uint32_t track_index;
     uint32_t fault_seen;
-    uint32_t fault_frames;
+    uint32_t clearings_sent; /* since the fault that stands was first seen */
     uint32_t enabled_once;
     uint32_t command_flags;
     uint64_t frames;
@@ -154,6 +154,11 @@ typedef struct {
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command);
+
+/* Say that the last command was put on the line. A caller that takes several states at once and sends
+ * the newest command alone calls this once for them, and at most once a tick: the device must have
+ * had time to act before a fault counts as one that does not clear. Without these calls none does. */
+void sc_servo_answered(sc_servo *servo);
 
 /* Latch the stop; the first reason stands. */
 void sc_servo_stop(sc_servo *servo, uint32_t reason);
