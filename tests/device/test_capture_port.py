@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer, servo_config
+from scissorcal.device.coverage import friction_coverage
 from scissorcal.device.link import open_link
 from scissorcal.device.motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.port_motion import PortMotion
+from scissorcal.device.recorder import Recorder
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.errors import DeviceError
-from scissorcal.kernel import ConfigKey, Mode, StateFlag
+from scissorcal.kernel import ConfigKey, Mode, StateFlag, StopReason
 from scissorcal.recording import read_recording, recover
 from tests.device.recipes import changed
 
@@ -32,6 +34,7 @@ CAPTURE_UNTIL_KILLED = """
 import sys
 from pathlib import Path
 from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.coverage import friction_coverage
 from scissorcal.device.link import open_link
 from scissorcal.recipe.library import builtin_recipe
 
@@ -111,6 +114,36 @@ def test_a_killed_servo_is_noticed_and_the_motors_are_released() -> None:
         link.configure(ConfigKey.STREAM, 1.0)
         link.flush()
         assert not link.state().flags & StateFlag.MOTOR_ENABLED
+
+
+def test_a_capture_outlives_a_computer_that_stands_still(tmp_path: Path) -> None:
+    """Servo and supervisor stand still for 0.2 s in a stroke; the device latches, and goes on."""
+    path = tmp_path / "capture.mcap"
+    with (
+        SimProcess("office-paper", seed=1) as sim,
+        open_link(sim.port) as link,
+        open_writer(path, "friction", link, RECIPE, "") as writer,
+        open_motion(link, servo_config(RECIPE, link.identity)) as motion,
+    ):
+        assert isinstance(motion, PortMotion)
+        recorder = Recorder(writer, friction_coverage(RECIPE, link.identity))
+        way = PathBuilder(*motion.position, motion.tick_s)
+        way.open_to(0.8, 1.0, 20.0)
+        way.open_to(0.3, 1.0, 20.0)
+        stalled = False
+        for samples in motion.track(way.reference()):
+            recorder.take(samples, motion.garbled)
+            if motion.mode is Mode.TRACK and not stalled:
+                assert motion.pid is not None
+                os.kill(motion.pid, signal.SIGSTOP)
+                time.sleep(0.2)
+                os.kill(motion.pid, signal.SIGCONT)
+                stalled = True
+        assert stalled
+        assert motion.stop_reason is StopReason.NONE
+        assert motion.position[0] == pytest.approx(0.3, abs=0.05)
+    assert recorder.tally.faults >= 1
+    assert any("COMMANDS_LOST" in note for note in read_recording(path).notes)
 
 
 def test_a_silent_supervisor_leaves_damping_only() -> None:
