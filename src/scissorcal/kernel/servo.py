@@ -57,8 +57,9 @@ _STOP_SENTENCES = {
         "died, then start again."
     ),
     StopReason.DEVICE_FAULT: (
-        "The device latched a fault and it was not cleared; remove its cause, raise BRAKE_AFTER_MS "
-        "if the host answers late, and start again."
+        "The device latched a fault that did not clear, or latched faults too often. Remove the "
+        "cause; if the computer answers late, close what keeps it busy or raise BRAKE_AFTER_MS; "
+        "then start again."
     ),
     StopReason.ENCODER_FAULT: (
         "The device reports a fault of its encoder; check the encoder and its cable."
