@@ -3,11 +3,17 @@
 Every message is a whole sentence that names the file or device, the place in it, and the mend.
 """
 
+from pathlib import Path
+
 
 class ScissorcalError(Exception):
-    """Base of all errors that scissorcal raises on purpose (exit code 1)."""
+    """Base of all errors that scissorcal raises on purpose (exit code 1).
+
+    ``kept`` are the files that hold what was done before it.
+    """
 
     exit_code = 1
+    kept: tuple[Path, ...] = ()
 
 
 class InputError(ScissorcalError):

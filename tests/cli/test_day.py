@@ -135,3 +135,33 @@ def test_a_friction_recording_without_motion_is_refused_by_the_fit(
     said = cli("fit", "friction")
     assert said.code == 2
     assert "Traceback" not in said.err
+
+
+def test_a_capture_that_cannot_be_read_is_named_with_the_way_on(cli: Cli, workspace: Path) -> None:
+    foreign = Workspace(workspace).new_recording("friction")
+    foreign.write_bytes(b"")
+    said = cli("fit", "friction")
+    assert said.code == 2
+    assert f"move it out of {foreign.parent}" in said.err
+    plan = cli("plan", "--json").envelope["result"]
+    assert plan["next_command"].startswith(f"mv captures/{foreign.name} ")
+    assert foreign.is_file()
+
+
+def test_friction_alone_is_reported_before_anything_is_cut(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = quick_workspace(tmp_path / "friction-only")
+    record_friction(workspace)
+    monkeypatch.chdir(workspace.root)
+    assert cli("fit", "friction").code == 0
+    assert len(cli("report", "--json").envelope["result"]["fits"]) == 1
+    assert "not there yet" in workspace.report_json.read_text(encoding="utf-8")
+    assert cli("package", "build").code == 5
+
+
+def test_a_missing_package_is_not_said_to_have_fallen_behind(cli: Cli, workspace: Path) -> None:
+    said = cli("render", "--device", "sim")
+    assert said.code == 5
+    assert "package build" in said.err
+    assert "not of the fits" not in said.err

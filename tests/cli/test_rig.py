@@ -45,10 +45,11 @@ def test_captures_on_the_virtual_rig_fill_the_plan(quick: Path, cli: Cli) -> Non
 
 def test_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
     with SimProcess("office-paper", faults=["unplug=1.5"]) as sim:
-        said = cli("capture", "friction", "--device", sim.port)
+        said = cli("capture", "friction", "--device", sim.port, "--json")
     assert said.code == 4
     kept = re.search(r"kept in (captures/friction-\S+\.mcap)\.", said.err)
     assert kept, said.err
+    assert said.envelope["files"] == [str(quick / kept[1])]
     shown = cli("recording", "show", quick / kept[1], "--json").envelope["result"]["recording"]
     assert shown["samples"] > 500
 

@@ -9,6 +9,7 @@ from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
 from scissorcal.cli.output import Answer, command, note
+from scissorcal.errors import ScissorcalError
 
 if TYPE_CHECKING:
     from scissorcal.recipe.requirements import CaptureKind
@@ -23,7 +24,14 @@ _COMMANDS = {
 
 @click.group("capture", cls=LazyGroup, lazy=_COMMANDS)
 def capture() -> None:
-    """Record friction or cuts from a rig."""
+    """Record friction or cuts from a rig.
+
+    \b
+    Example:
+      $ scissorcal capture friction --device sim
+      captures/friction-20261121T131435Z.mcap: 109187 samples from scissorcal-sim office-paper
+      ...
+    """
 
 
 @click.command("friction")
@@ -88,15 +96,14 @@ def _capture(
                 progress=view.show,
                 confirm=view.confirm,
             )
-    except BaseException:
-        _say_what_is_kept(workspace, set(workspace.recordings(kind)) - before)
+    except BaseException as error:
+        kept = sorted(set(workspace.recordings(kind)) - before)
+        for path in kept:
+            note(f"What was recorded until then is kept in {workspace.relative(path)}.")
+        if isinstance(error, ScissorcalError):
+            error.kept = tuple(kept)
         raise
     return Answer(_facts(captured), _text(workspace, captured), files=[captured.path])
-
-
-def _say_what_is_kept(workspace: "Workspace", kept: set[Path]) -> None:
-    for path in sorted(kept):
-        note(f"What was recorded until then is kept in {workspace.relative(path)}.")
 
 
 def _text(workspace: "Workspace", captured: "Captured") -> str:

@@ -50,9 +50,11 @@ def demo(
       inertia            kg m^2      0.000189  0.0001879  0.0001843  0.0001912  yes
       ...
     """
+    from scissorcal.recipe.library import recipe_path
     from scissorcal.workday.demo import run_demo
     from scissorcal.workday.workspace import demo_folder
 
+    recipe_path(recipe)
     made = demo_folder(folder)
     with progress() as tell:
         found = run_demo(made, recipe_name=recipe, seed=seed, effort=effort, progress=tell)

@@ -14,7 +14,14 @@ _COMMANDS = {
 
 @click.group("device", cls=LazyGroup, lazy=_COMMANDS)
 def device() -> None:
-    """Find, check or simulate a rig."""
+    """Find, check or simulate a rig.
+
+    \b
+    Example:
+      $ scissorcal device list
+      /dev/ttyS0
+      sim (a virtual rig; every --device takes it)
+    """
 
 
 @click.command("list")

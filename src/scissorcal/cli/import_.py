@@ -85,10 +85,16 @@ def import_(
     assert target is not None
     path = write_recording(recording, target)
     shown = workspace.relative(path) if workspace else str(path)
+    notes = list(recording.notes)
+    if rig and rig.joint != recording.joint.kind:
+        notes.append(
+            f"The recipe says {rig.joint} joint: to be asked for what a {recording.joint.kind} one "
+            f'needs, set joint = "{recording.joint.kind}" in its [rig].'
+        )
     lines = [
         f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {recording.joint.kind} joint",
-        *(f"note: {sentence}" for sentence in recording.notes),
+        *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
         "recording": path,
@@ -99,7 +105,7 @@ def import_(
         "samples": len(recording.samples),
         "duration_s": recording.duration_s,
         "strokes": recording.strokes,
-        "notes": recording.notes,
+        "notes": notes,
     }
     return Answer(result, "\n".join(lines), files=[path])
 

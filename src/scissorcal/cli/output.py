@@ -145,7 +145,8 @@ def _refusal(error: ScissorcalError | str, code: int, show_traceback: bool) -> A
     if show_traceback:
         note(traceback.format_exc())
     click.echo(f"{click.style('Error:', fg='red')} {error}", err=True)
-    return Answer({"error": str(error), "exit_code": code})
+    kept = error.kept if isinstance(error, ScissorcalError) else ()
+    return Answer({"error": str(error), "exit_code": code}, files=kept)
 
 
 def _unexpected(error: Exception, show_traceback: bool) -> Answer:

@@ -21,7 +21,14 @@ _COMMANDS = {
 
 @click.group("package", cls=LazyGroup, lazy=_COMMANDS)
 def package() -> None:
-    """Build or check the model package, the one file that a rig renders."""
+    """Build or check the model package, the one file that a rig renders.
+
+    \b
+    Example:
+      $ scissorcal package build
+      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      ...
+    """
 
 
 @click.command("build")

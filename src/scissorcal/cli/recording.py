@@ -18,7 +18,14 @@ _COMMANDS = {
 
 @click.group("recording", cls=LazyGroup, lazy=_COMMANDS)
 def recording() -> None:
-    """Look into recordings."""
+    """Look into recordings.
+
+    \b
+    Example:
+      $ scissorcal recording show captures/friction-20261121T131435Z.mcap
+      friction, rotary joint: 109187 samples in 109.2 s at 1000 Hz, nothing missing
+      ...
+    """
 
 
 @click.command("show")

@@ -117,7 +117,8 @@ def _read_parquet(path: Path, wanted: Wanted) -> Table:
         data = file.read(columns=sorted({headings[number] for number in chosen.values()}))
     except (pa.ArrowException, OSError) as error:
         raise InputError(
-            f"{path} cannot be read as Parquet: {error}. Write it anew, or export it as CSV."
+            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it anew, or "
+            "export it as CSV."
         ) from error
     columns = {}
     for channel, number in chosen.items():

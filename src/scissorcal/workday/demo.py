@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.errors import InputError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.fits import fit_workspace
@@ -27,7 +28,9 @@ Progress = Callable[[float, str], None]
 
 RENDER_S = 30.0
 STROKE_RATES = 3
+PRESS_CONTACTS = 3
 OPENING_BINS = 25
+BIN_PLACES = 8
 
 
 @dataclass(frozen=True)
@@ -135,9 +138,12 @@ def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
 def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe") -> float:
     """Relative rms of rendered against true average torque over the scene.
 
-    The kernel closes the blades over the scene's openings at three of its rates, on a sheet whose
-    near edge stands at the scene's nearest contact, step by step as the loop does; rendered and
-    true average torque are both averaged over 25 ranges of opening, which takes the ripple out.
+    The kernel closes the blades over the scene's openings at three of its rates, step by step as
+    the loop does: on a sheet whose near edge stands at the scene's nearest contact, through which
+    a cut then runs; or, where nothing is cut and so the contact stays, at three contacts of the
+    scene. Rendered and true average torque are both averaged over 25 ranges of opening, which
+    takes the ripple out. Ranges where the true torque exceeds the recipe's limit do not count: no
+    model is rendered there, but the limit. Raises InputError where that leaves no place.
     """
     import numpy as np
 
@@ -145,24 +151,33 @@ def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe"
 
     low, high = recipe.scene.opening_rad
     slow, fast = recipe.scene.opening_rate_rad_per_s
-    nearest, _ = recipe.scene.contact_m
+    nearest, farthest = recipe.scene.contact_m
+    contacts = [nearest]
+    if not recipe.scene.cut:
+        contacts = np.linspace(nearest, farthest, PRESS_CONTACTS).tolist()
+    edges = np.linspace(high, low, OPENING_BINS * BIN_PLACES + 1)
+    places = (0.5 * (edges[1:] + edges[:-1])).reshape(OPENING_BINS, BIN_PLACES)
     rendered, true = [], []
     for rate in np.geomspace(2.0 * slow, 0.9 * fast, STROKE_RATES):
         count = int((high - low) / rate * recipe.scene.loop_rate_Hz)
-        opening = np.linspace(high, low, count)
-        kernel = package.kernel()
-        stepped = kernel.step_many(opening, np.full(count, -rate), np.full(count, -nearest))
-        places = np.linspace(high, low, 4 * OPENING_BINS + 1)[2::4]
+        opening, rates = np.linspace(high, low, count), np.full(count, -rate)
         whole = (np.arange(count) * OPENING_BINS) // count
-        means = np.bincount(whole, stepped["torque"]) / np.bincount(whole)
-        rendered.append(means)
-        true.append(
-            average_torque(
-                specimen, places[:OPENING_BINS], -rate, nearest, recipe.scene.render_friction
-            )
+        for contact in contacts:
+            stepped = package.kernel().step_many(opening, rates, np.full(count, -contact))
+            rendered.append(np.bincount(whole, stepped["torque"]) / np.bincount(whole))
+            friction = recipe.scene.render_friction
+            true.append(average_torque(specimen, places, -rate, contact, friction))
+    within = np.concatenate(true)
+    size = within.mean(axis=1)
+    counts = np.abs(within).max(axis=1) <= recipe.limits.torque_Nm
+    if not counts.any():
+        raise InputError(
+            f"{recipe.name}: the torque exceeds limits.torque_Nm = {recipe.limits.torque_Nm:g} all "
+            "over the scene, so there is nothing to compare: raise the limit, or render a scene "
+            "that stays within it."
         )
-    difference, size = np.concatenate(rendered) - np.concatenate(true), np.concatenate(true)
-    return float(np.sqrt(np.mean(difference**2) / np.mean(size**2)))
+    difference = (np.concatenate(rendered) - size)[counts]
+    return float(np.sqrt(np.mean(difference**2) / np.mean(size[counts] ** 2)))
 
 
 def _capture(

@@ -65,10 +65,13 @@ def fit_workspace(
     return tuple(outcomes)
 
 
-def current_fits(workspace: Workspace, recipe: Recipe) -> "dict[FitKind, FitResult]":
+def current_fits(
+    workspace: Workspace, recipe: Recipe, *, partial: bool = False
+) -> "dict[FitKind, FitResult]":
     """Load the fits that the scene requires, as far as they are of what is there now.
 
-    Raises MissingError naming the command where one is missing or its inputs changed since.
+    Raises MissingError naming the command where one is missing or its inputs changed since; with
+    ``partial`` it is enough that one is there.
     """
     from scissorcal.calibration import load_fit
 
@@ -77,6 +80,8 @@ def current_fits(workspace: Workspace, recipe: Recipe) -> "dict[FitKind, FitResu
     for what in (kind for kind in _ORDER if kind in needed):
         path = workspace.fit_path(what)
         if not path.is_file():
+            if partial and fits:
+                continue
             raise MissingError(f"There is no fit of {what} yet: run 'scissorcal fit' first.")
         fits[what] = load_fit(path)
         if not is_current(workspace, recipe, fits[what], fits.get("friction")):

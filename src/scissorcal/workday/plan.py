@@ -9,7 +9,7 @@ from scissorcal.recipe.requirements import CaptureKind, Requirement, requirement
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
 from scissorcal.workday.fits import is_current
-from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.recordings import UnreadableError, usable_recordings
 from scissorcal.workday.reports import reported_fits
 from scissorcal.workday.workspace import FitKind, Workspace
 
@@ -84,9 +84,13 @@ def _capture_step(
     name = f"capture {kind}"
     try:
         usable = usable_recordings(workspace, recipe, kind)
+    except UnreadableError as error:
+        notes.append(str(error))
+        file = workspace.relative(error.path)
+        return Step(name, "stale", f"{file} cannot be read", why, f"mv {file} {file}.unreadable")
     except InputError as error:
         notes.append(str(error))
-        return Step(name, "missing", "a recording cannot be read", why, command)
+        return Step(name, "stale", "the recordings do not go together", why, command)
     notes.extend(usable.left_out)
     if not usable.recordings:
         if usable.left_out:

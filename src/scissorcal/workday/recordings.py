@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from scissorcal.recording import Recording
 
 
+class UnreadableError(InputError):
+    """A file among the recordings, ``path``, that is none or holds nothing."""
+
+    def __init__(self, sentence: str, path: Path) -> None:
+        super().__init__(sentence)
+        self.path = path
+
+
 @dataclass(frozen=True)
 class Usable:
     """Recordings of one kind that belong to the recipe as it is now, and those that do not.
@@ -29,12 +37,12 @@ def usable_recordings(workspace: Workspace, recipe: Recipe, kind: CaptureKind) -
     """Read the recordings of one kind, and set aside those that are of something else.
 
     A recording is set aside where the recipe at its capture names another rig, material or scene
-    (`capture_facts`); an import carries no recipe and is always used. Raises InputError where a
-    file cannot be read as a recording, or where turning and sliding joints are mixed.
+    (`capture_facts`); an import carries no recipe and is always used. Raises UnreadableError where
+    a file cannot be read as a recording, InputError where turning and sliding joints are mixed.
     """
     used, left_out = [], []
     for path in workspace.recordings(kind):
-        recording = _read(path, path.stat().st_mtime_ns, path.stat().st_size)
+        recording = _read_or_refuse(path)
         changed = _changed(recording, recipe, kind)
         if changed:
             left_out.append(f"{workspace.relative(path)} is not used: {changed}.")
@@ -57,6 +65,15 @@ def recover_recordings(workspace: Workspace) -> tuple[str, ...]:
     from scissorcal.recording import recover
 
     return tuple(recovered.sentence for recovered in recover(workspace.captures_dir))
+
+
+def _read_or_refuse(path: Path) -> "Recording":
+    try:
+        return _read(path, path.stat().st_mtime_ns, path.stat().st_size)
+    except InputError as error:
+        raise UnreadableError(
+            f"{error} To go on without it, move it out of {path.parent}.", path
+        ) from error
 
 
 @lru_cache(maxsize=64)

@@ -69,13 +69,19 @@ def render_workspace(
 
 
 def package_has_fallen_behind(workspace: Workspace) -> bool:
-    """Whether the workspace's package is of other fits or another recipe than there are now."""
+    """Whether the workspace's package is of other fits or another recipe than there are now.
+
+    False where there is none that can be opened, which rendering it then says.
+    """
     from scissorcal.package import open_package, package_inputs_hash
 
     recipe = workspace.recipe()
     try:
-        fits = current_fits(workspace, recipe)
         manifest = open_package(workspace.package_path(recipe)).manifest
+    except ScissorcalError:
+        return False
+    try:
+        fits = current_fits(workspace, recipe)
     except ScissorcalError:
         return True
     expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.requirements import requirements
+from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.fits import current_fits
 from scissorcal.workday.recordings import usable_recordings
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.calibration import FitResult
     from scissorcal.report import FactSheet
 
 
@@ -30,19 +32,20 @@ class Reported:
 def write_workspace_report(workspace: Workspace, *, now: datetime | None = None) -> Reported:
     """Write report/report.html and report/report.json from the workspace's fits and package.
 
-    Raises MissingError where a fit that the scene requires is missing or has fallen behind.
+    A fit that is not there yet is named as such in the report. Raises MissingError where there is
+    none at all, or one has fallen behind.
     """
     from scissorcal.report import build_report
 
     recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe)
+    fits = current_fits(workspace, recipe, partial=True)
     kinds: list[FitKind] = list(fits)
     recordings = [
         recording
         for kind in kinds
         for recording in usable_recordings(workspace, recipe, kind).recordings
     ]
-    sheets = _package_sheets(workspace)
+    sheets = _package_sheets(workspace, recipe, fits)
     files = build_report(
         recipe,
         list(fits.values()),
@@ -66,12 +69,13 @@ def reported_fits(workspace: Workspace) -> set[str]:
     return set(_values(facts, "inputs_hash"))
 
 
-def _package_sheets(workspace: Workspace) -> "list[FactSheet]":
+def _package_sheets(
+    workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]"
+) -> "list[FactSheet]":
     """What the workspace's package promises, where there is one that can be opened."""
-    from scissorcal.package import check_package, open_package
+    from scissorcal.package import check_package, open_package, package_inputs_hash
     from scissorcal.report import sheet_from_mapping
 
-    recipe = workspace.recipe()
     path = workspace.package_path(recipe)
     if not requirements(recipe).tables or not path.is_file():
         return []
@@ -85,8 +89,15 @@ def _package_sheets(workspace: Workspace) -> "list[FactSheet]":
         "error bound": manifest.bound.model_dump(),
         "ranges": {key: list(value) for key, value in manifest.ranges.model_dump().items()},
     }
+    notes = []
+    expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
+    if manifest.provenance.inputs_hash != expected:
+        notes.append(
+            "It was built from other fits or another recipe than this report shows: run "
+            "`scissorcal package build`."
+        )
     verdicts = check_package(path)
-    return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts)]
+    return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts, notes=notes)]
 
 
 def _values(facts: Any, key: str) -> list[str]:
