@@ -11,6 +11,7 @@
 
 enum {
     POLL_MS = 5,
+    LONGEST_LISTENED_NS = 10000000,
     WRITE_PATIENCE_MS = 20,
     READ_BYTES = 4096,
     FAREWELLS = 3,
@@ -30,6 +31,7 @@ typedef struct {
     int64_t epoch_ns; /* CLOCK_REALTIME at the start, less CLOCK_MONOTONIC then */
     int64_t arrived_ns;
     int64_t last_state_ns;
+    int64_t silent_ns;  /* listened since then without a state */
     int64_t counted_ns; /* when an answer was last counted as one */
     int has_state; /* any since the start */
     int unanswered;
@@ -154,6 +156,7 @@ static void note_interval(loop *self)
     }
     self->has_state = 1;
     self->last_state_ns = self->arrived_ns;
+    self->silent_ns = 0;
 }
 
 /* Step the servo; the sample waits until its command is out or the next state comes. */
@@ -247,10 +250,17 @@ static void read_line(loop *self, short events)
     }
 }
 
+/* Time in which this computer stood still is its own silence, not the device's. */
+static void count_silence(loop *self, int64_t passed_ns)
+{
+    self->silent_ns += passed_ns < LONGEST_LISTENED_NS ? passed_ns : LONGEST_LISTENED_NS;
+}
+
 static void wait_and_serve(loop *self)
 {
     sc_orders orders;
     struct pollfd line = {self->fd, POLLIN, 0};
+    const int64_t begun_ns = clock_ns(CLOCK_MONOTONIC);
     const int ready = poll(&line, 1, POLL_MS);
     if (ready > 0) {
         read_line(self, line.revents);
@@ -261,8 +271,8 @@ static void wait_and_serve(loop *self)
     if (orders.stop) {
         sc_servo_stop(&self->block->servo, SC_STOP_ASKED);
     }
-    const int64_t silence = clock_ns(CLOCK_MONOTONIC) - self->last_state_ns;
-    if (silence > (int64_t)self->block->silence_limit_ms * 1000000) {
+    count_silence(self, clock_ns(CLOCK_MONOTONIC) - begun_ns);
+    if (self->silent_ns > (int64_t)self->block->silence_limit_ms * 1000000) {
         sc_servo_stop(&self->block->servo, SC_STOP_SILENCE);
     }
 }
