@@ -52,6 +52,18 @@ class Truth:
         g = self.response(self.upper_face - phi)
         return g * (x + phi * slope), 2 * g * slope
 
+    def opening_at_drive(self, start: float, end: float, x: float) -> float:
+        """Opening between ``start`` and ``end`` at which the crack starts from ``x``."""
+        share = _bisect(
+            lambda t: self.cut(start + t * (end - start), x)[1] > self.fracture_energy, 1.0
+        )
+        return start + share * (end - start)
+
+    def contact_at_arrest(self, theta: float, x: float) -> float:
+        """Contact at which a crack that runs from ``x`` stops."""
+        arrest = self.kappa * self.fracture_energy
+        return x + _bisect(lambda d: self.cut(theta, x + d)[1] < arrest, 0.08)
+
 
 def sweep(low: float, high: float, speed: float) -> np.ndarray:
     """Opening from ``low`` to ``high``: constant speed with rounded ends."""
@@ -134,14 +146,10 @@ def _cut_torque(theta, x_n, sheets, truth: Truth) -> np.ndarray:
         if sheets[i] != sheet:
             sheet, crack = sheets[i], 0.0
         while truth.cut(angle, crack - advance)[1] > truth.fracture_energy:
-            started = _bisect(
-                lambda t: truth.cut(before + t * (angle - before), crack - advance)[1]
-                > truth.fracture_energy,
-                1.0,
-            )
-            there = before + started * (angle - before) if truth.kappa < 1 else angle
-            arrest = truth.kappa * truth.fracture_energy
-            crack += _bisect(lambda d: truth.cut(there, crack - advance + d)[1] < arrest, 0.08)
+            there = angle
+            if truth.kappa < 1:
+                there = truth.opening_at_drive(before, angle, crack - advance)
+            crack = advance + truth.contact_at_arrest(there, crack - advance)
             before = there
             if truth.kappa >= 1:
                 break

@@ -59,14 +59,17 @@ class Bins:
         return Bins(**chosen, bin_s=self.bin_s, rate_floor=self.rate_floor)
 
 
-def condition(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Bins:
+def condition(
+    recordings: tuple[Recording, ...], cutoff_Hz: float, acceleration_cutoff_Hz: float | None = None
+) -> Bins:
     """Band-limit and bin recordings for a fit.
 
     Position is low-passed forwards and backwards (4th-order Butterworth at ``cutoff_Hz``), rate and
     acceleration are its central differences, the drive passes the same filter, and all are
     averaged over bins of 5 ms (Janot, Gautier and Brunot 2019, the recipe of the EMPS benchmark,
-    with bins for its decimation). A jump of the device clock splits a recording; nothing
-    is interpolated across. Raises InputError where no piece is long enough.
+    with bins for its decimation). The acceleration may be low-passed further, at
+    ``acceleration_cutoff_Hz``: an encoder's steps are loudest in it. A jump of the device clock
+    splits a recording; nothing is interpolated across. Raises InputError where no piece is long enough.
     """
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
@@ -75,7 +78,12 @@ def condition(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Bins:
     for index, recording in enumerate(recordings):
         for low, high in _pieces(recording):
             pieces.append(
-                _bin_piece(recording, low, high, cutoff_Hz, index, stroke_offset, len(pieces))
+                _bin_piece(
+                    recording,
+                    (low, high),
+                    (cutoff_Hz, acceleration_cutoff_Hz or cutoff_Hz),
+                    (index, stroke_offset, len(pieces)),
+                )
             )
         stroke_offset += len(recording.strokes)
     if not pieces:
@@ -114,24 +122,20 @@ def _pieces(recording: Recording) -> list[tuple[int, int]]:
 
 def _bin_piece(
     recording: Recording,
-    low: int,
-    high: int,
-    cutoff_Hz: float,
-    index: int,
-    stroke_offset: int,
-    number: int,
+    piece: tuple[int, int],
+    cutoffs_Hz: tuple[float, float],
+    numbers: tuple[int, int, int],
 ) -> Bins:
-    from scipy.signal import butter, filtfilt
-
+    (low, high), (cutoff_Hz, gentle_Hz), (index, stroke_offset, number) = piece, cutoffs_Hz, numbers
     samples = recording.samples[low:high]
     time = recording.device_time_s[low:high]
     rate_Hz = (len(time) - 1) / (time[-1] - time[0])
-    numerator, denominator = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2))
     position = np.asarray(samples["opening"], dtype=np.float64)
-    smooth = filtfilt(numerator, denominator, position)
-    drive = filtfilt(numerator, denominator, recording.drive_effort[low:high])
+    smooth = _low_pass(position, cutoff_Hz, rate_Hz)
+    drive = _low_pass(recording.drive_effort[low:high], cutoff_Hz, rate_Hz)
     rate = _central(smooth, rate_Hz)
-    acceleration = _central(rate, rate_Hz)
+    gentle = smooth if gentle_Hz == cutoff_Hz else _low_pass(position, gentle_Hz, rate_Hz)
+    acceleration = _central(_central(gentle, rate_Hz), rate_Hz)
     floor = _rate_floor(position, cutoff_Hz, rate_Hz)
     width = max(1, round(BIN_S * rate_Hz))
     count = (len(time) - 2 * EDGE_SAMPLES) // width
@@ -189,6 +193,13 @@ def _away_from_rests(certain: NDArray[np.bool_], rate: Array) -> NDArray[np.bool
         for low, high in rests:
             kept[max(low - REST_MARGIN, 0) : high + REST_MARGIN] = False
     return kept
+
+
+def _low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
+    from scipy.signal import butter, filtfilt
+
+    numerator, denominator = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2))
+    return np.asarray(filtfilt(numerator, denominator, values))
 
 
 def _central(values: Array, rate_Hz: float) -> Array:

@@ -20,8 +20,9 @@ from scissorcal.recording.recording import Recording
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
+ACCELERATION_CUTOFF_HZ = 150.0
 CUTOFF_HZ = 300.0
-"""High enough to leave the ripple to the averaging over bins, whose effect is known exactly."""
+"""The latter is high enough to leave the ripple to the averaging over bins, whose effect is known exactly."""
 
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
@@ -48,7 +49,7 @@ def fit_cut(
     Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
-    every = condition(recordings, CUTOFF_HZ)
+    every = condition(recordings, CUTOFF_HZ, ACCELERATION_CUTOFF_HZ)
     data = CutData(every, recipe, friction)
     _refuse_no_contact(data, recordings)
     climbed = climb_cut_ladder(

@@ -16,10 +16,6 @@ from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
-INERTIA_TOLERANCE = 0.1
-"""Relative freedom of the inertia in a cut: the noise of an acceleration that is band-limited less
-than in empty motion hides part of it."""
-
 
 @dataclass(frozen=True)
 class CrackHistory:
@@ -55,8 +51,14 @@ class CutData:
         self.friction_layout, self.friction_mean, self.friction_precision = _friction_prior(
             friction
         )
+        self.inertia = friction.parameter("inertia").mean
         self.empty_noise = float(friction.diagnostics["residual_rms"])
         self.sheets = _runs(self.whole.sheet)
+        node = self.whole.rate * self.whole.bin_s / np.sqrt(12.0)
+        self.fine_opening = np.stack(
+            [self.whole.opening - node, self.whole.opening + node], axis=1
+        ).ravel()
+        self.fine_advance = np.repeat(self.whole.advance, 2)
         self.begins = np.zeros(len(self.whole.sheet), dtype=bool)
         self.begins[[run.start for run in self.sheets if run.stop > run.start]] = True
 
@@ -67,17 +69,22 @@ class CutData:
         bins = self.bins
         empty = friction_torque(friction_law(values, self.center), bins.opening, bins.rate)
         offset = values.get("offset", np.asarray(0.0))
-        return np.asarray(values["inertia"] * bins.acceleration + empty + offset - bins.drive)
+        return np.asarray(self.inertia * bins.acceleration + empty + offset - bins.drive)
 
     def along(self, cutting: Cutting) -> tuple[Array, Array]:
-        """Model torque and crack tip at every used bin, sheet by sheet."""
-        torque = np.empty(len(self.whole.opening))
+        """Model torque, averaged over each bin of ``whole``, and the crack tip at its end.
+
+        The response bends within a bin where the blades close fast, so that the mean is taken over
+        the two Gauss-Legendre points of the bin, not its middle.
+        """
+        torque = np.empty(2 * len(self.whole.opening))
         tip = np.empty_like(torque)
         for run in self.sheets:
-            torque[run], tip[run] = cut_torque_along(
-                cutting, self.whole.opening[run], self.whole.advance[run], 0.0
+            fine = slice(2 * run.start, 2 * run.stop)
+            torque[fine], tip[fine] = cut_torque_along(
+                cutting, self.fine_opening[fine], self.fine_advance[fine], 0.0
             )
-        return torque, tip
+        return torque.reshape(-1, 2).mean(axis=1), tip[1::2]
 
     def history(self, cutting: Cutting) -> CrackHistory:
         """When the crack advances, by a model of it."""
@@ -138,10 +145,16 @@ def _runs(labels: NDArray[np.int64]) -> list[slice]:
 
 
 def _friction_prior(friction: FitResult) -> tuple[Layout, Array, Array]:
-    """Friction's posterior as a normal prior in unconstrained coordinates."""
+    """Friction's posterior as a normal prior in unconstrained coordinates.
+
+    Without the inertia, which is held at its mean: it is known to a percent, while the noise of
+    the acceleration in a cut would draw it towards zero.
+    """
     signed = ("offset", "angle_slope", "angle_curvature")
     columns, rows = [], []
     for parameter in friction.parameters:
+        if parameter.name == "inertia":
+            continue
         draws = friction.column(parameter.name)
         signed_one = parameter.name in signed
         u = draws if signed_one else np.log(draws)
@@ -152,14 +165,10 @@ def _friction_prior(friction: FitResult) -> tuple[Layout, Array, Array]:
                 parameter.unit,
                 "identity" if signed_one else "log",
                 float(u.mean()),
-                float(
-                    np.hypot(u.std(ddof=1), INERTIA_TOLERANCE if parameter.name == "inertia" else 0)
-                ),
+                float(u.std(ddof=1)),
                 parameter.meaning,
             )
         )
     cloud = np.stack(columns, axis=1)
     covariance = np.cov(cloud, rowvar=False)
-    inertia = [row.name for row in rows].index("inertia")
-    covariance[inertia, inertia] += INERTIA_TOLERANCE**2
     return Layout(tuple(rows)), cloud.mean(axis=0), np.linalg.inv(covariance)

@@ -17,8 +17,17 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 STARTS = 3
+RIPPLE_FREEDOM = 0.4
+"""Prior standard deviation of two logarithms: a rig that yields to the ripple shows less of it, and
+more slowly, than blades that close steadily."""
 
-NUISANCE = ("noise", "slow_noise", "variation", "variation_length", "ripple_visibility")
+NUISANCE = (
+    "noise",
+    "slow_noise",
+    "variation",
+    "ripple_visibility",
+    "ripple_period",
+)
 """Parameters that describe the noise of a cut, not the cut."""
 
 
@@ -146,23 +155,18 @@ def _material_layout(data: CutData, recipe: Recipe, fracture: str) -> Layout:
         )
     noise = float(np.std(data.bins.drive)) * 0.1
     if fracture == "rippled":
-        rows.append(
+        rows += [
             Parameter(
-                "ripple_visibility",
-                "1",
-                "log",
-                0.0,
-                0.4,
-                "how much of the ripple the band-limited data show",
-            )
-        )
+                "ripple_visibility", "1", "log", 0.0, RIPPLE_FREEDOM, "size of the ripple as seen"
+            ),
+            Parameter(
+                "ripple_period", "1", "log", 0.0, RIPPLE_FREEDOM, "periods of it in a bin as seen"
+            ),
+        ]
     rows += [
         Parameter("noise", "N m", "log", float(np.log(noise)), 2.8, "noise of single bins"),
         Parameter("slow_noise", "N m", "log", float(np.log(noise)), 2.8, "noise of blocks"),
         Parameter("variation", "1", "log", float(np.log(0.03)), 1.0, "unevenness of the material"),
-        Parameter(
-            "variation_length", "m", "log", float(np.log(2e-3)), 0.7, "length of its unevenness"
-        ),
     ]
     return Layout(tuple(rows))
 

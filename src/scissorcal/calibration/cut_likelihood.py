@@ -13,6 +13,8 @@ from scissorcal.model import Cutting, ripple_spread
 Array = NDArray[np.float64]
 
 BLOCK_BINS = 8
+UNEVEN_LENGTH_M = 2e-3
+"""Length over which a sheet's toughness is taken to vary: fibres of paper, threads of cloth."""
 
 
 @dataclass(frozen=True)
@@ -103,18 +105,21 @@ class MaterialModel:
         torque, tip = data.along(cutting)
         mean = torque[data.used]
         travel = np.where(data.begins, 0.0, np.diff(tip, prepend=tip[:1]))[data.used]
-        blocks_apart = BLOCK_BINS * travel / values["variation_length"]
+        blocks_apart = BLOCK_BINS * travel / UNEVEN_LENGTH_M
         within = blocks_apart / (3.0 + blocks_apart)
         uneven = (values["variation"] * mean) ** 2
         slow = values["slow_noise"] ** 2 + uneven * (1.0 - within)
         fast = values["noise"] ** 2 + uneven * within
         if self.history is not None:
-            advancing, resting = self._ripple(cutting, tip, self.history)
+            window = data.bins.bin_s * float(values["ripple_period"])
+            advancing, resting = self._ripple(cutting, tip, self.history, window)
             fast = fast + (values["ripple_visibility"] * advancing[data.used]) ** 2
             slow = slow + (values["ripple_visibility"] * resting[data.used]) ** 2
         return Expected(mean, slow, fast)
 
-    def _ripple(self, cutting: Cutting, tip: Array, history: CrackHistory) -> tuple[Array, Array]:
+    def _ripple(
+        self, cutting: Cutting, tip: Array, history: CrackHistory, window_s: float
+    ) -> tuple[Array, Array]:
         """Spread by the ripple at every bin: of the saw-tooth, and of where the crack rests.
 
         The place of a resting crack is common to all bins of a rest, which blocks respect only
@@ -122,7 +127,7 @@ class MaterialModel:
         """
         whole = self.data.whole
         contact = tip - whole.advance
-        spread = ripple_spread(cutting, whole.opening, whole.rate, contact, whole.bin_s)
+        spread = ripple_spread(cutting, whole.opening, whole.rate, contact, window_s)
         place_sd = np.where(history.begun, spread.cycle_m[history.last] / np.sqrt(12.0), 0.0)
         return (
             np.where(history.advancing, spread.advancing, 0.0),

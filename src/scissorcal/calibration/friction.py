@@ -41,7 +41,9 @@ def fit_friction(
 
     drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
     + viscous, + Stribeck, + angle, each symmetric or not. An asymmetric law has no offset of its
-    own: an offset and unequal Coulomb levels cannot be told apart. The rung that unseen strokes
+    own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
+    alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
+    the handles, and an offset of a sensor is not. The rung that unseen strokes
     cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
     for a rotary joint and for a linear one; units follow the recordings' joint.
 
@@ -124,7 +126,7 @@ def _refuse_poor_motion(
             f"{names}: the motion has one direction only; the {missing} one is missing. "
             "Friction cannot be told from an offset: capture sweeps in both directions."
         )
-    if float(np.std(bins.drive)) == 0.0:
+    if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
         raise InputError(
             f"{names}: the drive torque is constant although the joint moves; check the "
             "motor_torque column or the sensor's connection."
@@ -143,7 +145,8 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 
 def _ladder(bins: Bins, settings: FitFriction, joint: Joint) -> list[Rung]:
     laws = LAWS if settings.rung == "auto" else (settings.rung,)
-    both = {"auto": (True, False), "symmetric": (True,), "asymmetric": (False,)}
+    either = (True, False) if joint.kind == "linear" else (False, True)
+    both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
     return [
         _rung(bins, law, symmetric, joint) for law in laws for symmetric in both[settings.symmetry]
     ]

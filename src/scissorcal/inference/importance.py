@@ -35,7 +35,7 @@ def sample_by_importance(
     covariance: Array,
     count: int,
     rng: np.random.Generator,
-    rounds: int = 3,
+    rounds: int = 5,
     good_k: float = 0.5,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.

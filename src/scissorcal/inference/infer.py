@@ -138,15 +138,20 @@ def _inverse(precision: Array, scale: Array) -> Array:
 
 
 def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Array]:
-    """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p)."""
+    """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p).
+
+    Along directions where the scores vary less than their information says, which negative
+    autocorrelation can bring about, the information is kept: robustness only widens.
+    """
     unit = np.outer(scale, scale)
-    ridge = RIDGE * np.eye(len(scale))
-    H = information * unit + ridge
-    J = spread * unit + ridge
-    robust = H @ np.linalg.solve(J, H)
-    robust = 0.5 * (robust + robust.T)
-    inner = np.linalg.solve(_root(H), _root(robust))
-    return inner * scale[:, None] / scale[None, :], robust / unit
+    H = information * unit + RIDGE * np.eye(len(scale))
+    root = _root(H)
+    inverse = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(inverse @ (spread * unit) @ inverse)
+    widened = np.maximum(values, 1.0)
+    robust = root @ (vectors / widened) @ vectors.T @ root
+    inner = inverse @ (vectors / np.sqrt(widened)) @ vectors.T @ root
+    return inner * scale[:, None] / scale[None, :], 0.5 * (robust + robust.T) / unit
 
 
 def _root(matrix: Array) -> Array:

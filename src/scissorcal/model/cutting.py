@@ -11,7 +11,7 @@ from scissorcal.model.response import Response
 
 Array = NDArray[np.float64]
 
-SETTLING_STEPS = 40
+SETTLING_STEPS = 200
 STEEPEST_START = 1e-9
 FARTHEST = 100.0
 """Blade lengths beyond which no contact is looked for: a bent edge may have none at all."""
