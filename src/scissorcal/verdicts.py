@@ -14,7 +14,7 @@ class Verdict:
     (``"whiteness"``). ``value`` and ``threshold`` are numbers in the unit that ``why`` states;
     both are None where a check could not be evaluated. ``why`` is a sentence for people.
 
-    >>> Verdict("fit.cut", "k-hat", "pass", 0.31, 0.7, "Importance weights are well behaved.").status
+    >>> Verdict("fit.cut", "k-hat", "pass", 0.31, 0.7, "The weights are well behaved.").status
     'pass'
     """
 

@@ -22,7 +22,7 @@ Progress = Callable[[float, str], None]
 
 ACCELERATION_CUTOFF_HZ = 150.0
 CUTOFF_HZ = 300.0
-"""The latter is high enough to leave the ripple to the averaging over bins, whose effect is known exactly."""
+"""The latter leaves the ripple to the averaging over bins, whose effect is known exactly."""
 
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
