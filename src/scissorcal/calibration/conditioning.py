@@ -69,7 +69,8 @@ def condition(
     averaged over bins of 5 ms (Janot, Gautier and Brunot 2019, the recipe of the EMPS benchmark,
     with bins for its decimation). The acceleration may be low-passed further, at
     ``acceleration_cutoff_Hz``: an encoder's steps are loudest in it. A jump of the device clock
-    splits a recording; nothing is interpolated across. Raises InputError where no piece is long enough.
+    splits a recording; nothing is interpolated across. Raises InputError where no piece is long
+    enough.
     """
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
