@@ -146,6 +146,25 @@ def test_a_capture_outlives_a_computer_that_stands_still(tmp_path: Path) -> None
     assert any("COMMANDS_LOST" in note for note in read_recording(path).notes)
 
 
+def test_a_computer_that_stands_still_is_no_silent_device() -> None:
+    with (
+        SimProcess("office-paper", seed=1) as sim,
+        open_link(sim.port) as link,
+        open_motion(link, servo_config(RECIPE, link.identity)) as motion,
+    ):
+        assert isinstance(motion, PortMotion)
+        assert motion.pid is not None
+        next(motion.idle(0.1))
+        everybody = (motion.pid, sim.pid)
+        for pid in everybody:
+            os.kill(pid, signal.SIGSTOP)
+        time.sleep(1.3)  # longer than a device may be silent
+        for pid in everybody:
+            os.kill(pid, signal.SIGCONT)
+        assert sum(len(samples) for samples in motion.idle(0.3)) > 200
+        assert motion.stop_reason is StopReason.NONE
+
+
 def test_a_silent_supervisor_leaves_damping_only() -> None:
     with (
         SimProcess("office-paper", seed=1) as sim,
