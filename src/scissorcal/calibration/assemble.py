@@ -100,10 +100,10 @@ def _stroke_errors(
 ) -> tuple[StrokeError, ...]:
     planned = [stroke for recording in recordings for stroke in recording.strokes]
     errors = []
+    size = float(np.sqrt(np.mean(measured**2)))
     for label in np.unique(strokes):
         here = strokes == label
         rms = float(np.sqrt(np.mean(chosen.held_out_residuals[here] ** 2)))
-        size = float(np.sqrt(np.mean(measured[here] ** 2)))
         known = planned[label] if 0 <= label < len(planned) else None
         errors.append(
             StrokeError(

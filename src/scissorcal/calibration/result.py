@@ -49,8 +49,8 @@ class FittedParameter:
 class StrokeError:
     """Error on one stroke by a fit that had not seen it.
 
-    ``rms`` and ``relative_rms`` (rms over the rms of what was measured) are taken on the
-    band-limited samples that the likelihood uses.
+    ``rms`` and ``relative_rms`` (``rms`` over the rms of what all strokes measured) are taken on
+    the band-limited samples that the likelihood uses.
     """
 
     stroke: int

@@ -15,7 +15,8 @@ PRIOR_ONLY = 0.9
 """A posterior at least this share of its prior's width says that the data are silent."""
 FEWEST_INDEPENDENT = 10.0
 """Independent observations wanted per parameter."""
-HELD_OUT_LIMIT = 1.0
+HELD_OUT_LIMIT = 0.2
+"""Error on unseen strokes, as a share of what all strokes measured, that a law may have."""
 
 
 def trust_verdicts(

@@ -84,6 +84,10 @@ def current_fits(
                 continue
             raise MissingError(f"There is no fit of {what} yet: run 'scissorcal fit' first.")
         fits[what] = load_fit(path)
+        if fits[what].what != what:
+            raise InputError(
+                f"{path} holds a fit of {fits[what].what}: remove it and run 'scissorcal fit'."
+            )
         if not is_current(workspace, recipe, fits[what], fits.get("friction")):
             raise MissingError(
                 f"{path} was made from other recordings or settings than there are now: run "
