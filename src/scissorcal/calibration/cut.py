@@ -24,6 +24,7 @@ ACCELERATION_CUTOFF_HZ = 150.0
 CUTOFF_HZ = 300.0
 """The latter leaves the ripple to the averaging over bins, whose effect is known exactly."""
 
+DRAWS = 1000
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
 """Torque counts as contact from this many standard deviations of the empty sweeps' noise."""
@@ -61,6 +62,7 @@ def fit_cut(
         chosen.rung.problem(data.bins.series),
         "draft" if effort == "draft" else "standard",
         rng,
+        count=DRAWS,
         optimum=chosen.optimum,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )

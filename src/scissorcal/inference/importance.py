@@ -35,8 +35,8 @@ def sample_by_importance(
     covariance: Array,
     count: int,
     rng: np.random.Generator,
-    rounds: int = 5,
-    good_k: float = 0.5,
+    rounds: int = 4,
+    good_k: float = 0.6,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.
 

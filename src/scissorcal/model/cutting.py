@@ -86,7 +86,7 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     station = np.full(shape, 0.5 * edge.length_m)
     far = FARTHEST * edge.length_m
     cuts = np.ones(shape, dtype=bool)
-    for _ in range(SETTLING_STEPS):
+    for _ in range(SETTLING_STEPS if edge.curvature_per_m else 1):
         taper = edge.slope_at(station)
         slope = (sine + taper * cosine) / (cosine - taper * sine)
         cuts = slope > STEEPEST_START
