@@ -55,7 +55,7 @@ def assemble(
     diagnostics = {
         "k_hat": posterior.k_hat,
         "effective_samples": posterior.effective,
-        "evaluations": chosen.optimum.evaluations + posterior.evaluations,
+        "evaluations": chosen.optimum.evaluations,
         "observations": len(residuals),
         "independent_share": white.share,
         "whiteness_p": white.p_value,

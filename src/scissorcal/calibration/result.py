@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scissorcal.verdicts import Verdict
 
 Effort = Literal["draft", "standard", "thorough"]
-Identifiability = Literal["identified", "weak", "prior_only"]
 
 
 @dataclass(frozen=True)

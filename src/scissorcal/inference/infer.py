@@ -40,7 +40,6 @@ class Posterior:
     effective: float
     inflation: Array
     null: tuple[str, ...]
-    evaluations: int
 
 
 def infer(
@@ -92,7 +91,7 @@ def infer(
         draws = rng.multivariate_normal(centre, covariance, size=count, method="cholesky")
         draws = np.clip(draws, problem.lower, problem.upper)
         return Posterior(
-            problem.names, best, draws, covariance, np.nan, float(count), inflation, null, 0
+            problem.names, best, draws, covariance, np.nan, float(count), inflation, null
         )
     tell(0.5, "sampling")
     sampled = sample_by_importance(adjusted, centre, covariance, count, rng)
@@ -106,7 +105,6 @@ def infer(
         sampled.effective,
         inflation,
         null,
-        best.evaluations,
     )
 
 
