@@ -83,6 +83,69 @@ class FitSeries:
 
 
 @dataclass(frozen=True)
+class Proposal:
+    """A term that the critic found in what a law leaves unexplained. It proposes; people decide.
+
+    The law would gain ``coefficient`` (``unit``, standard deviation ``coefficient_sd``) times the
+    term ``name``, whose ``formula`` is in words. ``inclusion`` is the share of resamples of whole
+    strokes in which the search found it; ``held_out_gain`` the share by which it lowers the rms
+    error on unseen strokes, ``held_out_nats`` what that is in log density, independent bins only.
+    ``adopted_by`` is the recipe's line that takes it into the law; empty where there is none.
+    """
+
+    name: str
+    formula: str
+    coefficient: float
+    coefficient_sd: float
+    unit: str
+    inclusion: float
+    held_out_gain: float
+    held_out_nats: float
+    adopted_by: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class ReplayRow:
+    """One stroke that neither side had seen: what a replay and what the model make of it.
+
+    ``novelty`` says in what the stroke differs from the replayed one: "speed", "contact" (where
+    along the blades the material is met), "place" (where in the material), joined by " + ", or
+    "none". Errors are rms in the unit of the measured effort, over the share ``covered`` of the
+    stroke that lies within the replay's range of opening. ``model_rms`` is of a fit that had not
+    seen the stroke; ``one_stroke_rms`` of the same law fitted to the replayed stroke alone, NaN
+    where that was not done.
+    """
+
+    stroke: int
+    recording: str
+    novelty: str
+    speed: float
+    covered: float
+    measured_rms: float
+    replay_rms: float
+    model_rms: float
+    one_stroke_rms: float
+
+
+@dataclass(frozen=True)
+class ReplayComparison:
+    """The model against record-and-replay of the stroke ``stroke`` of ``recording``.
+
+    ``opening`` and ``torque`` (k,) are the replay's table; ``sentence`` sums it up.
+    """
+
+    stroke: int
+    recording: str
+    kind: str
+    speed: float
+    opening: NDArray[np.float64]
+    torque: NDArray[np.float64]
+    rows: tuple[ReplayRow, ...]
+    sentence: str
+
+
+@dataclass(frozen=True)
 class FitResult:
     """The result of one fit: the same type for friction and for a cut.
 
@@ -90,7 +153,12 @@ class FitResult:
     asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the law (read
     back by the package compiler). ``draws`` has shape (draws, parameters) in SI, columns in the
     order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the rungs that
-    were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms`` and ``chosen``.
+    were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
+    ``held_out_score``, ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and
+    ``equivalent`` (it cannot be told from the best); ``selection`` says so in words.
+    ``critic`` holds what the critic proposes, ``replay`` the comparison with record-and-replay.
+    ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and ``nuisance_draws``
+    (draws, nuisance) are the parameters that nobody asked for, row by row with ``draws``.
     ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
     ``inputs_hash`` identifies recordings, recipe and settings: equal hashes need no second fit.
     """
@@ -112,6 +180,12 @@ class FitResult:
     inputs_hash: str
     sources: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    selection: str = ""
+    critic: tuple[Proposal, ...] = ()
+    replay: ReplayComparison | None = None
+    prior_draws: NDArray[np.float64] | None = None
+    nuisance: tuple[FittedParameter, ...] = ()
+    nuisance_draws: NDArray[np.float64] | None = None
 
     def parameter(self, name: str) -> FittedParameter:
         """Return the parameter called ``name``; KeyError if this fit has none."""
