@@ -2,20 +2,25 @@
 
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut_data import cutting_from
-from scissorcal.calibration.friction import fit_friction, friction_law
+from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.friction import fit_friction, friction_experiment
+from scissorcal.calibration.friction_experiment import FrictionExperiment, friction_law
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
 from scissorcal.calibration.storage import load_fit, save_fit
 
 __all__ = [
+    "Experiment",
     "FitResult",
     "FitSeries",
     "FittedParameter",
+    "FrictionExperiment",
     "StrokeError",
     "cutting_from",
     "fit_cut",
     "fit_friction",
     "fit_inputs_hash",
+    "friction_experiment",
     "friction_law",
     "load_fit",
     "save_fit",

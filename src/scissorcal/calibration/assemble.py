@@ -12,6 +12,7 @@ from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeEr
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.recording.recording import Joint, Recording
+from scissorcal.verdicts import Verdict
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,11 +37,14 @@ def assemble(
     joint: Joint,
     inputs_hash: str,
     nuisance: tuple[str, ...],
+    extra_verdicts: tuple[Verdict, ...] = (),
+    extra_notes: tuple[str, ...] = (),
 ) -> FitResult:
     """Put a finished fit into the form that reports, packages and files read.
 
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
-    out of the parameter table. ``measured`` and ``contact`` are by bin (n,).
+    out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
+    ``extra_notes`` are what only the fit itself can say; they follow the common ones.
     """
     layout = chosen.rung.layout
     likelihood = chosen.rung.likelihood
@@ -82,12 +86,15 @@ def assemble(
         held_out=held_out,
         rungs=rung_table(climbed, chosen),
         diagnostics=diagnostics,
-        verdicts=trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance),
+        verdicts=(
+            *trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance),
+            *extra_verdicts,
+        ),
         effort_unit=joint.effort_unit,
         position_unit=joint.position_unit,
         inputs_hash=inputs_hash,
         sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
-        notes=tuple(note for recording in recordings for note in recording.notes),
+        notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
     )
 
 

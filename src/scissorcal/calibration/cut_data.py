@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.conditioning import Bins
-from scissorcal.calibration.friction import friction_law
+from scissorcal.calibration.friction_experiment import friction_law
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import Cutting, Edge, Response, cut_torque_along, friction_torque

@@ -1,5 +1,6 @@
 """Posteriors of any model: optimum, curvature, autocorrelation, importance sampling."""
 
+from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import Posterior, infer, likelihood_information
@@ -7,10 +8,12 @@ from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 
 __all__ = [
+    "ArNoise",
     "Optimum",
     "Posterior",
     "Problem",
     "find_optimum",
+    "fit_ar",
     "gradient",
     "hessian",
     "infer",
