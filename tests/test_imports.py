@@ -13,7 +13,7 @@ import scissorcal
 PACKAGE = Path(scissorcal.__file__).parent
 LEAVES = {"errors", "verdicts", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
-MIDDLE = {"device", "calibration", "package", "render", "report"}
+MIDDLE = {"device", "vision", "calibration", "package", "render", "report"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "verdicts": set(),
@@ -23,7 +23,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "recipe": set(),
     "recording": {"recipe"},
     "device": {"kernel", "recipe", "recording"},
-    "calibration": {"model", "inference", "recipe", "recording"},
+    "vision": {"recipe", "model"},
+    "calibration": {"model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},
     "report": {"model", "calibration", "package", "recipe", "recording"},

@@ -1,0 +1,1 @@
+"""From photographs to geometry: targets, detection, the camera, the blade, the plate."""

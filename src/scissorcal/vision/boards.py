@@ -1,0 +1,221 @@
+"""The printed targets: where their marks stand, and how a photograph tells which one it shows.
+
+Every target is printed in one dictionary of markers, each with numbers of its own, so that a single
+marker names its target. A board's frame has its origin at the pattern's upper left corner as
+printed, x to the right, y down, z into the sheet; all in metres.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DICTIONARY = "DICT_5X5_250"
+
+
+@dataclass(frozen=True)
+class CharucoBoard:
+    """A chessboard with a marker in each white square; ``columns`` and ``rows`` count squares.
+
+    Markers have the numbers ``first_id`` onward, row by row. ``legacy``: a board with an even
+    number of rows that starts with a white square, as OpenCV drew them before 4.6.
+    """
+
+    name: str
+    columns: int
+    rows: int
+    square_m: float
+    marker_m: float
+    first_id: int = 0
+    dictionary: str = DICTIONARY
+    legacy: bool = False
+
+    @property
+    def width_m(self) -> float:
+        return self.columns * self.square_m
+
+    @property
+    def height_m(self) -> float:
+        return self.rows * self.square_m
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Numbers of its markers."""
+        return tuple(range(self.first_id, self.first_id + self.columns * self.rows // 2))
+
+    @property
+    def points(self) -> Array:
+        """Inner corners (n, 3), row by row: corner i of a detection is row i here."""
+        offset = np.array([self.square_m, self.square_m, 0.0])
+        return np.asarray(_grid(self.columns - 1, self.rows - 1, self.square_m) + offset)
+
+    def marker_corners(self, marker: int) -> Array:
+        """Corners (4, 3) of one marker: upper left, upper right, lower right, lower left."""
+        return np.asarray(self.as_opencv().getObjPoints()[marker - self.first_id], dtype=np.float64)
+
+    def as_opencv(self) -> Any:
+        """Give the ``cv2.aruco.CharucoBoard`` of it."""
+        import cv2
+
+        made = cv2.aruco.CharucoBoard(
+            (self.columns, self.rows),
+            self.square_m,
+            self.marker_m,
+            dictionary(self.dictionary),
+            np.array(self.ids),
+        )
+        made.setLegacyPattern(self.legacy and self.rows % 2 == 0)
+        return made
+
+
+@dataclass(frozen=True)
+class MarkerBoard:
+    """Single markers of one size at known places.
+
+    ``centres_m`` are (x, y) of each marker's middle, in the order of its numbers from ``first_id``.
+    """
+
+    name: str
+    width_m: float
+    height_m: float
+    marker_m: float
+    centres_m: tuple[tuple[float, float], ...]
+    first_id: int
+    dictionary: str = DICTIONARY
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Numbers of its markers."""
+        return tuple(range(self.first_id, self.first_id + len(self.centres_m)))
+
+    @property
+    def points(self) -> Array:
+        """Corners (4 n, 3): rows 4 i to 4 i + 3 are those of the i-th marker."""
+        return np.concatenate([self.marker_corners(marker) for marker in self.ids])
+
+    def marker_corners(self, marker: int) -> Array:
+        """Corners (4, 3) of one marker: upper left, upper right, lower right, lower left."""
+        x, y = self.centres_m[marker - self.first_id]
+        half = 0.5 * self.marker_m
+        return np.array(
+            [
+                [x - half, y - half, 0.0],
+                [x + half, y - half, 0.0],
+                [x + half, y + half, 0.0],
+                [x - half, y + half, 0.0],
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class Chessboard:
+    """A plain chessboard: nothing in it says which one it is, or which way is up.
+
+    ``columns`` and ``rows`` count *inner corners*, as is the custom.
+    """
+
+    name: str
+    columns: int
+    rows: int
+    square_m: float
+
+    @property
+    def width_m(self) -> float:
+        return (self.columns + 1) * self.square_m
+
+    @property
+    def height_m(self) -> float:
+        return (self.rows + 1) * self.square_m
+
+    @property
+    def points(self) -> Array:
+        """Inner corners (n, 3), row by row, the first one at the origin."""
+        return _grid(self.columns, self.rows, self.square_m)
+
+
+Board = CharucoBoard | MarkerBoard | Chessboard
+MarkedBoard = CharucoBoard | MarkerBoard
+
+
+def _grid(columns: int, rows: int, pitch: float) -> Array:
+    y, x = np.mgrid[0:rows, 0:columns]
+    return np.column_stack([x.ravel() * pitch, y.ravel() * pitch, np.zeros(x.size)])
+
+
+def _ring(columns: int, rows: int, width: float, height: float, marker: float) -> list[Any]:
+    """Centres of markers around a rectangle: the upper row, the two sides, the lower row."""
+    across = np.linspace(0.5 * marker, width - 0.5 * marker, columns)
+    down = np.linspace(0.5 * marker, height - 0.5 * marker, rows)
+    upper = [(float(x), float(down[0])) for x in across]
+    sides = [(float(x), float(y)) for y in down[1:-1] for x in (across[0], across[-1])]
+    lower = [(float(x), float(down[-1])) for x in across]
+    return upper + sides + lower
+
+
+CAMERA_BOARD = CharucoBoard("camera board", 9, 7, 26e-3, 19e-3, first_id=0)
+"""Fits A4 and Letter. Its squares are 50 px wide where it fills 70 % of a 640-pixel picture."""
+
+_MAT_WIDTH, _MAT_HEIGHT, _MAT_MARKER = 252e-3, 180e-3, 20e-3
+
+BLADE_MAT = MarkerBoard(
+    "blade mat",
+    _MAT_WIDTH,
+    _MAT_HEIGHT,
+    _MAT_MARKER,
+    tuple(_ring(10, 7, _MAT_WIDTH, _MAT_HEIGHT, _MAT_MARKER)),
+    first_id=40,
+)
+"""Thirty markers around an empty field on which a blade lies."""
+
+MAT_FIELD_M = (0.024, 0.024, 0.228, 0.156)
+"""The mat's empty field in its frame: left, top, right, bottom. White but for the pivot mark."""
+
+MAT_PIVOT_M = (0.062, 0.090)
+"""Where the mat's pivot mark stands in its frame: a small cross to lay the blade's pivot on."""
+
+PLATE_STRIP = MarkerBoard(
+    "plate strip",
+    230e-3,
+    30e-3,
+    30e-3,
+    tuple((0.015 + 0.040 * index, 0.015) for index in range(6)),
+    first_id=80,
+)
+"""Six markers in a row, to be stuck along the plate's edge."""
+
+PLATE_BOARD = CharucoBoard("plate board", 7, 5, 20e-3, 14.5e-3, first_id=100)
+"""A small ChArUco board for plates that have room for one: the most exact."""
+
+RIG_MARKERS = MarkerBoard(
+    "rig markers",
+    80e-3,
+    80e-3,
+    30e-3,
+    ((0.015, 0.015), (0.065, 0.015), (0.015, 0.065), (0.065, 0.065)),
+    first_id=130,
+)
+"""Four markers on one card, to be stuck on the rig's moving frame."""
+
+TARGETS: tuple[MarkedBoard, ...] = (CAMERA_BOARD, BLADE_MAT, PLATE_STRIP, PLATE_BOARD, RIG_MARKERS)
+
+
+def targets_of(ids: Iterable[int]) -> dict[str, int]:
+    """Count the markers of each target among numbers of `DICTIONARY`, most first.
+
+    >>> targets_of([41, 42, 3, 249])
+    {'blade mat': 2, 'camera board': 1}
+    """
+    found = [int(marker) for marker in ids]
+    counts = {board.name: sum(marker in board.ids for marker in found) for board in TARGETS}
+    return {name: counts[name] for name in sorted(counts, key=lambda n: -counts[n]) if counts[name]}
+
+
+def dictionary(name: str) -> Any:
+    """Give the ``cv2.aruco.Dictionary`` of a name such as "DICT_5X5_250"."""
+    import cv2
+
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))

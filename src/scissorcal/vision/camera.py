@@ -1,0 +1,105 @@
+"""A camera: pinhole with radial and tangential distortion, and how well it is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+"""What ``Camera.covariance`` has rows and columns of, in this order."""
+
+_ROUND_TRIP_PX = 1e-3
+_UNDISTORT_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Intrinsics of one camera at one focus and picture size.
+
+    ``x' = x/z, y' = y/z, r^2 = x'^2 + y'^2`` of a point in the camera's frame (x right, y down,
+    z forward) are bent to ``x'(1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x'y' + p2 (r^2 + 2x'^2)`` (y'
+    alike; divided by ``1 + k4 r^2 + k5 r^4 + k6 r^6`` where ``distortion`` has eight numbers) and
+    stand at pixel ``(fx x'' + cx, fy y'' + cy)`` (Brown 1971, as OpenCV writes it). The centre of
+    the first pixel is (0, 0). ``distortion`` is (k1, k2, p1, p2, k3[, k4, k5, k6]).
+
+    ``covariance`` is (9, 9) over `PARAMETERS` (zero rows for what was held), or None where nobody
+    said: then the camera counts as exactly known.
+
+    >>> Camera(500.0, 500.0, 320.0, 240.0, (0.0,) * 5, 640, 480).project([[0.1, 0.0, 1.0]])
+    array([[370., 240.]])
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...]
+    width: int
+    height: int
+    covariance: Array | None = None
+
+    @property
+    def matrix(self) -> Array:
+        """The 3x3 camera matrix K."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def coefficients(self) -> Array:
+        """``distortion`` as the array that OpenCV takes."""
+        return np.array(self.distortion, dtype=np.float64)
+
+    def project(self, points: ArrayLike) -> Array:
+        """Pixels (n, 2) of points (n, 3) in the camera's frame, metres; NaN behind the camera."""
+        import cv2
+
+        given = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        pixels = np.full((len(given), 2), np.nan)
+        ahead = given[:, 2] > 0.0
+        if ahead.any():
+            still = np.zeros(3)
+            found, _ = cv2.projectPoints(given[ahead], still, still, self.matrix, self.coefficients)
+            pixels[ahead] = found.reshape(-1, 2)
+        return pixels
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Undistorted directions (n, 2), x/z and y/z, of pixels (n, 2).
+
+        NaN where no direction leads to the pixel, as beyond where the distortion folds back.
+        """
+        import cv2
+
+        given = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        if not len(given):
+            return np.empty((0, 2))
+        criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNDISTORT_STEPS, 1e-12)
+        found = cv2.undistortPoints(
+            given[:, None, :], self.matrix, self.coefficients, criteria=criteria
+        ).reshape(-1, 2)
+        back = self.project(np.column_stack([found, np.ones(len(found))]))
+        missed = ~(np.abs(back - given).max(axis=1) < _ROUND_TRIP_PX)
+        found[missed] = np.nan
+        return np.asarray(found, dtype=np.float64)
+
+    def undistort(self, pixels: ArrayLike) -> Array:
+        """Pixels (n, 2) that the same camera without distortion would see; NaN as in `rays`."""
+        return np.asarray(self.rays(pixels) * [self.fx, self.fy] + [self.cx, self.cy])
+
+    def scaled(self, width: int, height: int) -> "Camera":
+        """Give the camera of the same photographs read at another size (same shape of picture)."""
+        across, down = width / self.width, height / self.height
+        covariance = self.covariance
+        if covariance is not None:
+            factors = np.array([across, down, across, down, 1.0, 1.0, 1.0, 1.0, 1.0])
+            covariance = covariance * np.outer(factors, factors)
+        return Camera(
+            self.fx * across,
+            self.fy * down,
+            (self.cx + 0.5) * across - 0.5,
+            (self.cy + 0.5) * down - 0.5,
+            self.distortion,
+            width,
+            height,
+            covariance,
+        )
