@@ -82,11 +82,11 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     sine, cosine = np.sin(beta), np.cos(beta)
     edge = cutting.edge
     energy = np.asarray(cutting.fracture_energy)
-    shape = np.broadcast_shapes(theta.shape, energy.shape, np.shape(cutting.kappa))
+    shape = np.broadcast_shapes(theta.shape, energy.shape, np.shape(cutting.kappa), edge.shape)
     station = np.full(shape, 0.5 * edge.length_m)
     far = FARTHEST * edge.length_m
     cuts = np.ones(shape, dtype=bool)
-    for _ in range(SETTLING_STEPS if edge.curvature_per_m else 1):
+    for _ in range(1 if edge.straight else SETTLING_STEPS):
         taper = edge.slope_at(station)
         slope = (sine + taper * cosine) / (cosine - taper * sine)
         cuts = slope > STEEPEST_START

@@ -1,12 +1,16 @@
 """The cutting edge: its shape on the blade, and its height over the cut when the blade turns."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.model.bspline import spline_slope, spline_value
+
 Array = NDArray[np.float64]
+Family = Literal["line", "arc", "cubic", "spline"]
 
 NEWTON_STEPS = 30
 
@@ -15,31 +19,139 @@ NEWTON_STEPS = 30
 class Edge:
     """One blade's edge e(s), offset from its centreline against station s from the pivot.
 
-    ``line``: e = offset + s tan(taper). ``arc``: e = offset + s tan(taper) + curvature s^2 / 2,
-    a parabola in the place of a circular arc of that curvature: without taper they are 4 um apart
-    at 75 mm for a curvature of 1 /m.
+    Every family is offset + s tan(taper) and what its rung adds:
+
+    * ``line``: nothing.
+    * ``arc``: curvature s^2 / 2, a parabola in the place of a circular arc of that curvature:
+      without taper they are 4 um apart at 75 mm for a curvature of 1 /m.
+    * ``cubic``: curvature s^2 / 2 + bend s^3 / 6.
+    * ``spline``: a cubic B-spline with the weights ``spline_m`` on evenly spaced knots from
+      ``spline_start_m`` to ``length_m``, straight on beyond both.
+
+    Parameters may be arrays of one shape that broadcasts with the stations, such as (draws, 1);
+    the weights then have one axis more.
 
     >>> float(Edge("line", offset_m=-0.008, taper_rad=0.0, length_m=0.07).offset_at(0.03))
     -0.008
     """
 
-    family: Literal["line", "arc"]
-    offset_m: float
-    taper_rad: float
+    family: Family
+    offset_m: float | Array
+    taper_rad: float | Array
     length_m: float
-    curvature_per_m: float = 0.0
+    curvature_per_m: float | Array = 0.0
+    bend_per_m2: float | Array = 0.0
+    spline_m: tuple[float, ...] | Array = ()
+    spline_start_m: float = 0.0
 
-    def offset_at(self, station: ArrayLike) -> Array:
-        """Offset e(s) in metres, same shape as ``station``."""
-        s = np.asarray(station, dtype=np.float64)
-        return np.asarray(
-            self.offset_m + s * (np.tan(self.taper_rad) + 0.5 * self.curvature_per_m * s)
+    @property
+    def straight(self) -> bool:
+        """Whether the edge is a straight line, which needs no search along it."""
+        return (
+            self.family != "spline"
+            and not np.any(self.curvature_per_m)
+            and not np.any(self.bend_per_m2)
         )
 
-    def slope_at(self, station: ArrayLike) -> Array:
-        """Slope e'(s) = tan(alpha(s)), same shape as ``station``."""
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of its parameters: () for one edge, (draws, 1) for draws of it."""
+        scalars = (self.offset_m, self.taper_rad, self.curvature_per_m, self.bend_per_m2)
+        shapes = [np.shape(value) for value in scalars]
+        return np.broadcast_shapes(*shapes, np.shape(self.spline_m)[:-1])
+
+    def offset_at(self, station: ArrayLike) -> Array:
+        """Offset e(s) in metres; ``station`` broadcasts with the parameters."""
         s = np.asarray(station, dtype=np.float64)
-        return np.asarray(np.tan(self.taper_rad) + self.curvature_per_m * s)
+        bent = 0.5 * self.curvature_per_m + s * (self.bend_per_m2 / 6.0)
+        offset = self.offset_m + s * (np.tan(self.taper_rad) + s * bent)
+        if self.family == "spline":
+            offset = offset + spline_value(self.spline_m, self.spline_start_m, self.length_m, s)
+        return np.asarray(offset)
+
+    def slope_at(self, station: ArrayLike) -> Array:
+        """Slope e'(s) = tan(alpha(s)); ``station`` broadcasts with the parameters."""
+        s = np.asarray(station, dtype=np.float64)
+        slope = np.tan(self.taper_rad) + s * (self.curvature_per_m + 0.5 * s * self.bend_per_m2)
+        if self.family == "spline":
+            slope = slope + spline_slope(self.spline_m, self.spline_start_m, self.length_m, s)
+        return np.asarray(slope)
+
+
+@dataclass(frozen=True)
+class EdgeBelief:
+    """An edge with what is known of its parameters: normal, mean ``edge``, with ``covariance``.
+
+    ``names`` (k,) are fields of the edge, or ``spline_m_<i>`` for a weight of its spline, in the
+    order of ``covariance`` (k, k), in units of the fields. What is not named is held.
+
+    >>> line = Edge("line", offset_m=-0.008, taper_rad=0.03, length_m=0.07)
+    >>> belief = EdgeBelief(line, ("offset_m", "taper_rad"), np.diag([1e-10, 1e-8]))
+    >>> belief.mean.tolist()
+    [-0.008, 0.03]
+    >>> float(belief.with_values([-0.007, 0.02]).offset_m)
+    -0.007
+    """
+
+    edge: Edge
+    names: tuple[str, ...]
+    covariance: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if self.covariance.shape != (count, count):
+            raise ValueError(f"{count} names of edge parameters need a covariance of their size")
+
+    @property
+    def mean(self) -> Array:
+        """The edge's own values of the named parameters, shape (k,)."""
+        weights = np.asarray(self.edge.spline_m, dtype=np.float64)
+        return np.array(
+            [
+                weights[_weight(name)] if _is_weight(name) else getattr(self.edge, name)
+                for name in self.names
+            ],
+            dtype=np.float64,
+        )
+
+    def with_values(self, values: ArrayLike | Mapping[str, ArrayLike]) -> Edge:
+        """The edge with other values of the named parameters.
+
+        ``values`` (k,) gives one edge. (draws, k) gives draws of it, with parameters of shape
+        (draws, 1) that broadcast with stations (points,). A mapping gives them by name, each a
+        scalar or (draws, 1); others of its keys are left alone.
+        """
+        if isinstance(values, Mapping):
+            named = {n: np.asarray(values[n], dtype=np.float64) for n in self.names if n in values}
+        else:
+            rows = np.asarray(values, dtype=np.float64)
+            if rows.shape[-1:] != (len(self.names),):
+                raise ValueError(f"an edge belief over {self.names} needs {len(self.names)} values")
+            columns = rows if rows.ndim == 1 else np.moveaxis(rows, -1, 0)[..., None]
+            named = dict(zip(self.names, columns, strict=True))
+        fields: dict[str, Any] = {n: _plain(v) for n, v in named.items() if not _is_weight(n)}
+        weights = {_weight(n): v for n, v in named.items() if _is_weight(n)}
+        if weights:
+            shape = np.broadcast_shapes(*(np.shape(value) for value in weights.values()))
+            own = np.asarray(self.edge.spline_m, dtype=np.float64)
+            spline = np.broadcast_to(own, (*shape, own.shape[-1])).copy()
+            for index, value in weights.items():
+                spline[..., index] = value
+            fields["spline_m"] = spline if shape else tuple(spline.tolist())
+        return replace(self.edge, **fields)
+
+    def draws(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw values of the named parameters, shape (count, k)."""
+        if not self.names:
+            return np.zeros((count, 0))
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(self.mean + rng.standard_normal((count, len(self.names))) @ root.T)
+
+
+def draw_edges(belief: EdgeBelief, rng: np.random.Generator, count: int) -> Edge:
+    """Draw ``count`` edges of a belief as one whose parameters have shape (count, 1)."""
+    return belief.with_values(belief.draws(rng, count))
 
 
 @dataclass(frozen=True)
@@ -76,10 +188,13 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
 
 
 def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
-    tangent = np.tan(edge.taper_rad)
-    station: Array = (x + edge.offset_m * sine) / (cosine - tangent * sine)
-    if edge.curvature_per_m == 0.0:
-        return station
+    if edge.straight:
+        tangent = np.tan(edge.taper_rad)
+        straight: Array = (x + edge.offset_m * sine) / (cosine - tangent * sine)
+        return straight
+    near = edge.offset_at(0.0)
+    chord = (edge.offset_at(edge.length_m) - near) / edge.length_m
+    station: Array = (x + near * sine) / (cosine - chord * sine)
     for _ in range(NEWTON_STEPS):
         residual = station * cosine - edge.offset_at(station) * sine - x
         step = residual / (cosine - edge.slope_at(station) * sine)
@@ -87,3 +202,15 @@ def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
         if np.all(np.abs(step) <= 1e-15 + 1e-14 * np.abs(station)):
             break
     return station
+
+
+def _plain(value: Array) -> float | Array:
+    return float(value) if value.ndim == 0 else value
+
+
+def _is_weight(name: str) -> bool:
+    return name.startswith("spline_m_")
+
+
+def _weight(name: str) -> int:
+    return int(name.removeprefix("spline_m_"))
