@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.calibration.friction import friction_law
+from scissorcal.calibration import friction_law
 from scissorcal.calibration.result import FitResult
 from scissorcal.model.friction import friction_torque
 from scissorcal.report.numbers import Number, finite, finite_each, unit_text, with_unit
