@@ -1,13 +1,14 @@
 """Climbing a ladder of laws: each rung judged by strokes that it has not seen."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
     Optimum,
     Problem,
@@ -28,6 +29,9 @@ just notice in a force (Jones 2000, Kinesthetic sensing)."""
 FALSE_ALARM = 0.05
 FEWEST_FOR_RANKS = 6
 """With fewer strokes no ranking can reach 5 %, and the evidence alone decides."""
+
+RELIABLE_STROKES = 0.8
+"""Share of strokes that must have good k-hats for PSIS-LOO to have a say."""
 
 POSITIVE_EVIDENCE = 3.0
 """Held-out log density, counting independent observations only, that a better rung must gain: a
@@ -104,17 +108,26 @@ class Climbed:
     """A rung after its fit.
 
     ``scores`` holds the log density of each stroke by a fit that had not seen it,
-    ``held_out_residuals`` (n,) that fit's error at each bin; ``share`` is the share of bins that
-    are independent.
+    ``held_out_residuals`` (n,) that fit's error at each bin, ``left_out`` the same densities by
+    the posterior instead of by one point; ``share`` is the share of bins that are independent.
+    ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them, that cannot
+    be told from the best one; :func:`choose` fills it in for the rung that it takes.
     """
 
     rung: Rung
     optimum: Optimum
     scores: Array
     held_out_residuals: Array
+    left_out: LeftOut
     log_likelihood: float
     share: float
-    observations: int
+    strokes: Integers
+    alike: tuple[str, ...] = ()
+
+    @property
+    def observations(self) -> int:
+        """Bins that were fitted."""
+        return len(self.strokes)
 
     @property
     def held_out_rms(self) -> float:
@@ -132,42 +145,56 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
     """
     problem = rung.problem(series)
     optimum = find_optimum(problem)
-    white = ljung_box(rung.likelihood.standardised(optimum.point), series)
+    point = optimum.point
+    white = ljung_box(rung.likelihood.standardised(point), series)
+    step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
+    information = likelihood_information(problem, point, step)
     labels = np.unique(strokes)
-    folds = [labels[k :: min(FOLDS, len(labels))] for k in range(min(FOLDS, len(labels)))]
-    points = _without(rung, problem, optimum.point, [np.isin(strokes, fold) for fold in folds])
+    labelled = tuple(strokes == label for label in labels)
+    folds = [np.isin(strokes, fold) for fold in split_strokes(labels)]
+    points = _without(rung, problem, point, folds, information, step)
     residuals = np.full(len(series), np.nan)
     densities = np.full(len(series), np.nan)
-    for fold, point in zip(folds, points, strict=True):
-        unseen = np.isin(strokes, fold)
-        residuals[unseen] = rung.likelihood.residuals(point)[unseen]
-        densities[unseen] = rung.likelihood.terms(point)[unseen]
-    labelled = tuple(strokes == label for label in labels)
+    for unseen, reached in zip(folds, points, strict=True):
+        residuals[unseen] = rung.likelihood.residuals(reached)[unseen]
+        densities[unseen] = rung.likelihood.terms(reached)[unseen]
     return Climbed(
         rung=rung,
         optimum=optimum,
         scores=np.array([densities[here].sum() for here in labelled]),
         held_out_residuals=residuals,
-        log_likelihood=problem.log_likelihood(optimum.point),
+        left_out=leave_strokes_out(
+            problem, point, information, rung.prior_precision, labelled, white.share
+        ),
+        log_likelihood=problem.log_likelihood(point),
         share=white.share,
-        observations=len(series),
+        strokes=strokes,
     )
 
 
+def split_strokes(labels: Integers) -> list[Integers]:
+    """The folds in which strokes (k,) are held out: every fourth stroke together."""
+    count = min(FOLDS, len(labels))
+    return [labels[k::count] for k in range(count)]
+
+
 def _without(
-    rung: Rung, problem: Problem, point: Array, folds: list[NDArray[np.bool_]]
+    rung: Rung,
+    problem: Problem,
+    point: Array,
+    folds: list[NDArray[np.bool_]],
+    information: Array,
+    step: Array,
 ) -> list[Array]:
     """Optima without each fold's bins, one Newton step away from the full optimum."""
     if len(folds) < 2:
         return [point for _ in folds]
-    step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
     scores = gradient(problem.log_likelihood_terms, point, step)
-    curvature = likelihood_information(problem, point, step)
     slope_prior = -rung.prior_precision @ (point - rung.prior_mean)
     reached = []
     for unseen in folds:
         share = float(np.mean(~unseen))
-        precision = share * curvature + rung.prior_precision
+        precision = share * information + rung.prior_precision
         slope = scores[~unseen].sum(axis=0) + slope_prior
         values, vectors = np.linalg.eigh(precision)
         move = vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max()))
@@ -186,28 +213,56 @@ def _step_uphill(problem: Problem, point: Array, move: Array) -> Array:
 
 
 def choose(climbed: list[Climbed], signal_rms: float = 0.0) -> Climbed:
-    """Take the cheapest rung that is as good as the best on unseen strokes, for all that matters.
+    """Take the cheapest rung that cannot be told from the best, and say which those are.
 
-    A cheaper rung is kept if the best one does not beat it on unseen strokes consistently (paired
-    Wilcoxon signed-rank test over strokes at 5 %, doi:10.2307/3001968), or if the error that it
-    adds is below ``NEGLIGIBLE`` of ``signal_rms``: far less than a person can feel. The latter
-    needs a ``signal_rms``, and suits rungs that differ in their mean only.
+    ``climbed`` stands cheapest first. A rung is told apart where the best one beats it on unseen
+    strokes by both accounts: predicted by fits without them, and by the posterior without them
+    (PSIS-LOO over whole strokes, as far as its k-hats are good). Rungs whose error is larger by
+    less than ``NEGLIGIBLE`` of ``signal_rms`` count as alike too: far less than a person can feel.
+    The latter needs a ``signal_rms``, and suits rungs that differ in their mean only. The result
+    is the rung that is used, with ``alike`` filled in, not a winner.
     """
-    best = max(climbed, key=lambda candidate: float(candidate.scores.sum()))
-    share = common_share(climbed)
-    for candidate in climbed:
-        added = candidate.held_out_rms**2 - best.held_out_rms**2
-        if added <= (NEGLIGIBLE * signal_rms) ** 2 and signal_rms > 0:
-            return candidate
-        if not _beaten(candidate.scores * share, best.scores * share):
-            return candidate
-    return best
+    best = best_of(climbed)
+    share = best.share
+    alike = [
+        candidate
+        for candidate in climbed
+        if _negligible(candidate, best, signal_rms) or not _told_apart(candidate, best, share)
+    ]
+    return replace(alike[0], alike=tuple(candidate.rung.name for candidate in alike))
 
 
-def _beaten(scores: Array, best: Array) -> bool:
+def best_of(climbed: list[Climbed]) -> Climbed:
+    """The rung with the highest log density of unseen strokes, which others are held against.
+
+    Its share of independent bins is the one by which all rungs are compared.
+    """
+    return max(climbed, key=lambda candidate: float(candidate.scores.sum()))
+
+
+def _negligible(candidate: Climbed, best: Climbed, signal_rms: float) -> bool:
+    added = candidate.held_out_rms**2 - best.held_out_rms**2
+    return signal_rms > 0 and added <= (NEGLIGIBLE * signal_rms) ** 2
+
+
+def _told_apart(candidate: Climbed, best: Climbed, share: float) -> bool:
+    if not beaten((best.scores - candidate.scores) * share):
+        return False
+    both = candidate.left_out.reliable & best.left_out.reliable
+    if np.mean(both) < RELIABLE_STROKES:
+        return True
+    gained = best.left_out.scores - candidate.left_out.scores
+    return beaten(gained[both] * share)
+
+
+def beaten(gained: Array) -> bool:
+    """Whether log density gained by stroke (strokes,) is positive evidence, and consistently so.
+
+    Paired over strokes, as their errors are independent: Wilcoxon's signed-rank test
+    (doi:10.2307/3001968) where there are strokes enough, the sum of the gains in any case.
+    """
     from scipy.stats import wilcoxon
 
-    gained = best - scores
     if float(gained.sum()) < POSITIVE_EVIDENCE:
         return False
     if len(gained) < FEWEST_FOR_RANKS:
@@ -215,18 +270,16 @@ def _beaten(scores: Array, best: Array) -> bool:
     return float(wilcoxon(gained, alternative="greater").pvalue) < FALSE_ALARM
 
 
-def common_share(climbed: list[Climbed]) -> float:
-    """Share of independent observations by which rungs are compared: the best rung's own."""
-    return max(climbed, key=lambda candidate: float(candidate.scores.sum())).share
-
-
 def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any], ...]:
-    """Rows for the report: name, parameters, bic, held_out_rms, held_out_score, chosen.
+    """Rows for the report, cheapest first.
 
-    ``bic`` and ``held_out_score`` count only as many observations as are independent, the same
-    share for every rung.
+    name, parameters, bic, held_out_rms, held_out_score, loo, loo_se, loo_k_hat, equivalent,
+    chosen. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
+    independent, the same share for every rung. ``loo`` is the log density of all strokes, each by
+    the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
+    stroke's tail index. ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
     """
-    share = common_share(climbed)
+    share = best_of(climbed).share
     return tuple(
         {
             "name": candidate.rung.name,
@@ -235,7 +288,18 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
             + len(candidate.optimum.point) * float(np.log(candidate.observations * share)),
             "held_out_rms": candidate.held_out_rms,
             "held_out_score": float(candidate.scores.sum()) * share,
-            "chosen": candidate is chosen,
+            "loo": float(candidate.left_out.scores.sum()) * share,
+            "loo_se": _standard_error(candidate.left_out.scores * share),
+            "loo_k_hat": float(candidate.left_out.k_hats.max()),
+            "equivalent": candidate.rung.name in chosen.alike,
+            "chosen": candidate.rung is chosen.rung,
         }
         for candidate in climbed
     )
+
+
+def _standard_error(scores: Array) -> float:
+    """Of a sum over independent strokes; NaN for a single one."""
+    if len(scores) < 2:
+        return float("nan")
+    return float(np.sqrt(len(scores) * np.var(scores, ddof=1)))
