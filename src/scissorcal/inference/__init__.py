@@ -3,7 +3,8 @@
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
 from scissorcal.inference.curvature import gradient, hessian, natural_step
-from scissorcal.inference.infer import Posterior, infer, likelihood_information
+from scissorcal.inference.infer import Posterior, infer
+from scissorcal.inference.information import likelihood_information
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 

@@ -42,7 +42,7 @@ class ArNoise:
         a = np.concatenate([[1.0], -np.asarray(self.coefficients)])
         root = _root(self._stationary())
         drawn = np.empty(len(series))
-        for low, high in _runs(series):
+        for low, high in runs(series):
             past = root @ rng.standard_normal(self.order)
             state = lfiltic([1.0], a, past)
             drawn[low:high] = lfilter([1.0], a, innovations[low:high], zi=state)[0]
@@ -52,6 +52,26 @@ class ArNoise:
     def marginal_sd(self) -> float:
         """Standard deviation of the noise itself."""
         return float(np.sqrt(self._stationary()[0, 0])) if self.order else self.sd
+
+    def autocovariance(self, lags: int) -> Array:
+        """Autocovariances at lags 0 to ``lags`` - 1, shape (lags,).
+
+        >>> ArNoise(1, (0.5,), 1.0).autocovariance(3).round(3)
+        array([1.333, 0.667, 0.333])
+        """
+        values = np.zeros(max(lags, 1))
+        values[0] = self.marginal_sd**2
+        if self.order:
+            from scipy.signal import lfilter, lfiltic
+
+            begun = self._stationary()[0, : min(self.order, len(values))]
+            values[: len(begun)] = begun
+            if len(values) > self.order:
+                a = np.concatenate([[1.0], -np.asarray(self.coefficients)])
+                state = lfiltic([1.0], a, begun[::-1])
+                rest = np.zeros(len(values) - self.order)
+                values[self.order :] = lfilter([1.0], a, rest, zi=state)[0]
+        return values[:lags]
 
     def _stationary(self) -> Array:
         """Covariance of ``order`` neighbours, the solution of P = A P A' + Q."""
@@ -73,12 +93,12 @@ def fit_ar(residuals: Array, series: Labels, most: int = MOST_ORDER) -> ArNoise:
     ``most`` is the highest order tried. The residuals' mean is not taken out.
     """
     n = len(residuals)
-    lengths = [high - low for low, high in _runs(series)]
-    runs = [residuals[low:high] for low, high in _runs(series)]
+    lengths = [high - low for low, high in runs(series)]
+    pieces = [residuals[low:high] for low, high in runs(series)]
     power = float(residuals @ residuals) / n if n else 0.0
     if power <= 0.0:
         return ArNoise(0, (), 0.0)
-    forward, backward = runs, runs
+    forward, backward = pieces, pieces
     coefficients = np.zeros(0)
     best = ArNoise(0, (), float(np.sqrt(power)))
     lowest = n * np.log(power)
@@ -106,6 +126,7 @@ def _root(covariance: Array) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _runs(series: Labels) -> list[tuple[int, int]]:
+def runs(series: Labels) -> list[tuple[int, int]]:
+    """Bounds of the stretches of equal labels in ``series`` (n,), in order."""
     ends = [0, *(np.flatnonzero(np.diff(series)) + 1).tolist(), len(series)]
     return [(low, high) for low, high in pairwise(ends) if high > low]

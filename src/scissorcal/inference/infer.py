@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.autocorrelation import robust_covariance_of_scores
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.importance import sample_by_importance
+from scissorcal.inference.information import likelihood_information, slopes_at
+from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 
@@ -29,7 +30,9 @@ class Posterior:
 
     ``k_hat`` is NaN at draft effort, where nothing is sampled against the posterior. ``null``
     names, for each direction the data leave to the prior, its parameters with their weights.
-    ``inflation`` (p,) is the factor by which autocorrelation widens each standard deviation.
+    ``inflation`` (p,) is the factor by which autocorrelation widens each standard deviation;
+    ``noise_orders`` are those of the autoregressions that the data chose, ``dispersion`` what
+    strokes vary beyond them.
     """
 
     names: tuple[str, ...]
@@ -40,6 +43,8 @@ class Posterior:
     effective: float
     inflation: Array
     null: tuple[str, ...]
+    noise_orders: tuple[int, ...] = ()
+    dispersion: float = 1.0
 
 
 def infer(
@@ -64,12 +69,13 @@ def infer(
     tell(0.0, "searching the optimum")
     best = optimum or find_optimum(problem)
     tell(0.4, "measuring the curvature")
-    scale = problem.prior_sd
+    scale, terms = problem.prior_sd, problem.log_likelihood_terms
     step = natural_step(problem.log_likelihood, best.point, 0.1 * scale)
-    information = likelihood_information(problem, best.point, step)
-    scores = gradient(problem.log_likelihood_terms, best.point, step)
-    spread = robust_covariance_of_scores(scores, problem.series)
-    stretch, robust = _stretch(information, spread, scale)
+    slopes = slopes_at(problem, best.point, step)
+    information = likelihood_information(problem, best.point, step, slopes)
+    scores = slopes.scores if slopes else gradient(terms, best.point, step)
+    spread = long_run_covariance(problem, scores, slopes)
+    stretch, robust = _stretch(information, spread.covariance, scale)
     slope_prior, curvature_prior = _prior_shape(problem, best.point, step)
     precision = robust + curvature_prior
     covariance = _inverse(precision, scale)
@@ -91,7 +97,16 @@ def infer(
         draws = rng.multivariate_normal(centre, covariance, size=count, method="cholesky")
         draws = np.clip(draws, problem.lower, problem.upper)
         return Posterior(
-            problem.names, best, draws, covariance, np.nan, float(count), inflation, null
+            problem.names,
+            best,
+            draws,
+            covariance,
+            np.nan,
+            float(count),
+            inflation,
+            null,
+            spread.orders,
+            spread.dispersion,
         )
     tell(0.5, "sampling")
     sampled = sample_by_importance(adjusted, centre, covariance, count, rng)
@@ -105,26 +120,9 @@ def infer(
         sampled.effective,
         inflation,
         null,
+        spread.orders,
+        spread.dispersion,
     )
-
-
-def likelihood_information(problem: Problem, point: Array, step: Array) -> Array:
-    """Information of the likelihood at a point, shape (p, p), positive semi-definite.
-
-    For normal terms with residuals z and standard deviations s it is the sum of
-    dz dz' + dlog(s) dlog(s)', whose mean is Fisher's information; otherwise minus the Hessian.
-    """
-    if problem.standardised is None:
-        return _positive(-hessian(problem.log_likelihood, point, step), problem.prior_sd)
-    normal = problem.standardised
-    slopes = gradient(lambda u: np.concatenate(normal(u)), point, step)
-    return np.asarray(slopes.T @ slopes)
-
-
-def _positive(matrix: Array, scale: Array) -> Array:
-    """Nearest positive semi-definite matrix, judged in units of the prior."""
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T / np.outer(scale, scale))
 
 
 def _inverse(precision: Array, scale: Array) -> Array:

@@ -21,7 +21,15 @@ class Problem:
 
     Where the terms are normal, ``standardised`` gives the residuals over their standard deviations
     and the logarithms of the latter, both (n,). The information then comes from first derivatives,
-    which a likelihood that is rough on a small scale still has.
+    which a likelihood that is rough on a small scale still has. ``tails`` are the degrees of
+    freedom of a Student-t in the place of the normal; infinity is the normal. ``populations`` (n,)
+    tells terms apart whose noise has a memory of its own, ``blocks`` (n,) names the stretches
+    (strokes) whose scores are compared as wholes; where missing, all terms are one population and
+    the series are the blocks.
+
+    ``independent`` says that the terms are independent given the parameters and that the model is
+    taken as true: the posterior is then used exactly as written, and its likelihood is not
+    stretched for autocorrelation.
     """
 
     names: tuple[str, ...]
@@ -33,6 +41,10 @@ class Problem:
     lower: Array
     upper: Array
     standardised: Callable[[Array], tuple[Array, Array]] | None = None
+    tails: float = np.inf
+    populations: NDArray[np.int64] | None = None
+    blocks: NDArray[np.int64] | None = None
+    independent: bool = False
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""
