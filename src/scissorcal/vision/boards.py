@@ -146,56 +146,52 @@ def _grid(columns: int, rows: int, pitch: float) -> Array:
     return np.column_stack([x.ravel() * pitch, y.ravel() * pitch, np.zeros(x.size)])
 
 
-def _ring(columns: int, rows: int, width: float, height: float, marker: float) -> list[Any]:
+def _ring(columns: int, rows: int, pitch: float, marker: float) -> list[tuple[float, float]]:
     """Centres of markers around a rectangle: the upper row, the two sides, the lower row."""
-    across = np.linspace(0.5 * marker, width - 0.5 * marker, columns)
-    down = np.linspace(0.5 * marker, height - 0.5 * marker, rows)
-    upper = [(float(x), float(down[0])) for x in across]
-    sides = [(float(x), float(y)) for y in down[1:-1] for x in (across[0], across[-1])]
-    lower = [(float(x), float(down[-1])) for x in across]
+    across = [0.5 * marker + pitch * index for index in range(columns)]
+    down = [0.5 * marker + pitch * index for index in range(rows)]
+    upper = [(x, down[0]) for x in across]
+    sides = [(x, y) for y in down[1:-1] for x in (across[0], across[-1])]
+    lower = [(x, down[-1]) for x in across]
     return upper + sides + lower
 
 
-CAMERA_BOARD = CharucoBoard("camera board", 9, 7, 26e-3, 19e-3, first_id=0)
+# Every length is a whole number of twentieths of a millimetre, and so is every cell of a marker
+# (seven to its side): a picture of 20 pixels per millimetre holds them exactly.
+
+CAMERA_BOARD = CharucoBoard("camera board", 9, 7, 26e-3, 18.9e-3, first_id=0)
 """Fits A4 and Letter. Its squares are 50 px wide where it fills 70 % of a 640-pixel picture."""
 
-_MAT_WIDTH, _MAT_HEIGHT, _MAT_MARKER = 252e-3, 180e-3, 20e-3
-
 BLADE_MAT = MarkerBoard(
-    "blade mat",
-    _MAT_WIDTH,
-    _MAT_HEIGHT,
-    _MAT_MARKER,
-    tuple(_ring(10, 7, _MAT_WIDTH, _MAT_HEIGHT, _MAT_MARKER)),
-    first_id=40,
+    "blade mat", 255e-3, 177e-3, 21e-3, tuple(_ring(10, 7, 26e-3, 21e-3)), first_id=40
 )
 """Thirty markers around an empty field on which a blade lies."""
 
-MAT_FIELD_M = (0.024, 0.024, 0.228, 0.156)
+MAT_FIELD_M = (0.024, 0.024, 0.231, 0.153)
 """The mat's empty field in its frame: left, top, right, bottom. White but for the pivot mark."""
 
-MAT_PIVOT_M = (0.062, 0.090)
+MAT_PIVOT_M = (0.062, 0.0885)
 """Where the mat's pivot mark stands in its frame: a small cross to lay the blade's pivot on."""
 
 PLATE_STRIP = MarkerBoard(
     "plate strip",
-    230e-3,
-    30e-3,
-    30e-3,
-    tuple((0.015 + 0.040 * index, 0.015) for index in range(6)),
+    228e-3,
+    28e-3,
+    28e-3,
+    tuple((0.014 + 0.040 * index, 0.014) for index in range(6)),
     first_id=80,
 )
 """Six markers in a row, to be stuck along the plate's edge."""
 
-PLATE_BOARD = CharucoBoard("plate board", 7, 5, 20e-3, 14.5e-3, first_id=100)
+PLATE_BOARD = CharucoBoard("plate board", 7, 5, 20e-3, 14e-3, first_id=100)
 """A small ChArUco board for plates that have room for one: the most exact."""
 
 RIG_MARKERS = MarkerBoard(
     "rig markers",
-    80e-3,
-    80e-3,
-    30e-3,
-    ((0.015, 0.015), (0.065, 0.015), (0.015, 0.065), (0.065, 0.065)),
+    78e-3,
+    78e-3,
+    28e-3,
+    ((0.014, 0.014), (0.064, 0.014), (0.014, 0.064), (0.064, 0.064)),
     first_id=130,
 )
 """Four markers on one card, to be stuck on the rig's moving frame."""
