@@ -12,6 +12,10 @@ from scissorcal.cli.output import Answer, print_envelope
 _COMMANDS = {
     "init": ("scissorcal.cli.init:init", "Start a workspace from a recipe."),
     "plan": ("scissorcal.cli.plan:plan", "What the scene needs; done, missing, stale; what next."),
+    "target": (
+        "scissorcal.cli.target:target",
+        "Sheets to print: camera board, blade mat, markers.",
+    ),
     "capture": ("scissorcal.cli.capture:capture", "Record friction or cuts from a rig."),
     "import": ("scissorcal.cli.import_:import_", "Bring in a log from CSV, Parquet or .mat."),
     "export": ("scissorcal.cli.export:export", "Write a recording as Parquet or CSV."),
