@@ -1,6 +1,7 @@
 """Fit friction, inertia and offset to empty motion."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,16 @@ from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
-from scissorcal.inference import infer
+from scissorcal.inference import infer, tails_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 
 Progress = Callable[[float, str], None]
 
 LAWS = ("coulomb", "coulomb+viscous", "stribeck", "stribeck+angle")
+OUTLIERS = 4.0
+"""Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
+place of normal noise; milder tails are left to the widening by the scores."""
 FEWEST_BINS = 200
 LEAST_TRAVEL_SHARE = 20
 """Motion must span at least this many times the position that its slowest bin covers."""
@@ -56,6 +60,7 @@ def fit_friction(
         tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
         climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes))
     chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
+    chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
     problem = chosen.rung.problem(bins.series)
     tell(0.6, f"friction: inferring {chosen.rung.name}")
     posterior = infer(
@@ -71,7 +76,7 @@ def fit_friction(
         posterior=posterior,
         climbed=climbed,
         chosen=chosen,
-        structure={**chosen.rung.key, "joint": joint.kind},
+        structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
         bins=bins,
         strokes=strokes,
         measured=bins.drive,
@@ -95,7 +100,34 @@ def friction_experiment(
     every = condition(recordings, settings.cutoff_Hz)
     bins = every.where(every.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
-    return design(bins, _strokes(bins), law, symmetric, joint)
+    found = design(bins, _strokes(bins), law, symmetric, joint)
+    return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+
+
+def _with_tails(
+    chosen: Climbed,
+    climbed: list[Climbed],
+    ladder: list[FrictionExperiment],
+    bins: Bins,
+    strokes: NDArray[np.int64],
+) -> Climbed:
+    """Fit the chosen law again with a Student-t noise where its residuals have outliers.
+
+    The fit takes the place of the chosen one in ``climbed``.
+    """
+    tails = tails_of(chosen.rung.likelihood.standardised(chosen.optimum.point), chosen.share)
+    if tails > OUTLIERS:
+        return chosen
+    place = climbed.index(chosen)
+    robust = replace(ladder[place], tails=tails).rung(bins.drive)
+    again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
+    climbed[place] = replace(again, alike=chosen.alike)
+    return climbed[place]
+
+
+def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:
+    tails = chosen.rung.likelihood.tails
+    return {"tails": tails} if np.isfinite(tails) else {}
 
 
 def _refuse_poor_motion(

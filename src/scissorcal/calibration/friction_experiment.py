@@ -26,7 +26,8 @@ class FrictionExperiment:
     """One friction law over one set of motions (see :class:`~.experiment.Experiment`).
 
     ``bins`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's discrete
-    choices: ``law``, ``symmetric`` and ``angle_center``.
+    choices: ``law``, ``symmetric`` and ``angle_center``. ``tails`` are the degrees of freedom of
+    the noise.
     """
 
     bins: Bins
@@ -34,6 +35,7 @@ class FrictionExperiment:
     key: Mapping[str, Any]
     layout: Layout
     joint: Joint
+    tails: float = np.inf
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
 
@@ -79,10 +81,11 @@ class FrictionExperiment:
             name=self.name,
             key=self.key,
             layout=layout,
-            likelihood=Likelihood(residuals, normal),
+            likelihood=Likelihood(residuals, normal, self.tails),
             starts=self._starts(measured),
             prior_mean=layout.mean,
             prior_precision=np.diag(1 / layout.sd**2),
+            blocks=self.strokes,
         )
 
     def _starts(self, measured: Array) -> Array:

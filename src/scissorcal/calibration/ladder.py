@@ -16,6 +16,7 @@ from scissorcal.inference import (
     gradient,
     likelihood_information,
     ljung_box,
+    log_density,
     natural_step,
 )
 
@@ -46,11 +47,13 @@ class Likelihood:
     """A law's likelihood before its prior.
 
     ``residuals`` (u) are measured minus predicted (n,). ``normal`` (u) gives them over each bin's
-    standard deviation, with the logarithm of the latter, both (n,).
+    standard deviation, with the logarithm of the latter, both (n,). ``tails`` are the degrees of
+    freedom of a Student-t in the place of the normal, where data have outliers.
     """
 
     residuals: Callable[[Array], Array]
     normal: Callable[[Array], tuple[Array, Array]]
+    tails: float = np.inf
 
     def standardised(self, u: Array) -> Array:
         """Residuals over their standard deviations (n,)."""
@@ -59,12 +62,15 @@ class Likelihood:
     def terms(self, u: Array) -> Array:
         """Log-likelihood by bin (n,), up to a constant."""
         z, log_sd = self.normal(u)
-        return np.asarray(-0.5 * z**2 - log_sd)
+        return np.asarray(log_density(z, self.tails) - log_sd)
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One law of a ladder, ready to be fitted. ``key`` holds its discrete choices."""
+    """One law of a ladder, ready to be fitted. ``key`` holds its discrete choices.
+
+    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.Problem`.
+    """
 
     name: str
     key: Mapping[str, Any]
@@ -73,6 +79,8 @@ class Rung:
     starts: Array
     prior_mean: Array
     prior_precision: Array
+    blocks: Integers | None = None
+    populations: Integers | None = None
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
         """The posterior of this rung, over the bins that ``keep`` selects."""
@@ -89,6 +97,9 @@ class Rung:
             z, log_sd = self.likelihood.normal(u)
             return (z, log_sd) if keep is None else (z[keep], log_sd[keep])
 
+        def kept(labels: Integers | None) -> Integers | None:
+            return labels if labels is None or keep is None else labels[keep]
+
         sd = self.layout.sd
         return Problem(
             names=self.layout.names,
@@ -100,6 +111,9 @@ class Rung:
             lower=self.layout.mean - SEARCH_REACH * sd,
             upper=self.layout.mean + SEARCH_REACH * sd,
             standardised=normal,
+            tails=self.likelihood.tails,
+            populations=kept(self.populations),
+            blocks=kept(self.blocks),
         )
 
 
@@ -110,7 +124,7 @@ class Climbed:
     ``scores`` holds the log density of each stroke by a fit that had not seen it,
     ``held_out_residuals`` (n,) that fit's error at each bin, ``left_out`` the same densities by
     the posterior instead of by one point; ``share`` is the share of bins that are independent.
-    ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them, that cannot
+    ``series`` and ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them, that cannot
     be told from the best one; :func:`choose` fills it in for the rung that it takes.
     """
 
@@ -121,6 +135,7 @@ class Climbed:
     left_out: LeftOut
     log_likelihood: float
     share: float
+    series: Integers
     strokes: Integers
     alike: tuple[str, ...] = ()
 
@@ -168,6 +183,7 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
         ),
         log_likelihood=problem.log_likelihood(point),
         share=white.share,
+        series=series,
         strokes=strokes,
     )
 

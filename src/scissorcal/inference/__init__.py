@@ -7,6 +7,7 @@ from scissorcal.inference.infer import Posterior, infer
 from scissorcal.inference.information import likelihood_information
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.tails import log_density, tails_of
 
 __all__ = [
     "ArNoise",
@@ -20,6 +21,8 @@ __all__ = [
     "infer",
     "likelihood_information",
     "ljung_box",
+    "log_density",
     "natural_step",
     "robust_covariance_of_scores",
+    "tails_of",
 ]
