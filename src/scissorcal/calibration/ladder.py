@@ -124,8 +124,8 @@ class Climbed:
     ``scores`` holds the log density of each stroke by a fit that had not seen it,
     ``held_out_residuals`` (n,) that fit's error at each bin, ``left_out`` the same densities by
     the posterior instead of by one point; ``share`` is the share of bins that are independent.
-    ``series`` and ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them, that cannot
-    be told from the best one; :func:`choose` fills it in for the rung that it takes.
+    ``series`` and ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them,
+    that cannot be told from the best one; :func:`choose` fills it in for the rung that it takes.
     """
 
     rung: Rung
