@@ -42,7 +42,7 @@ def target(
     from scissorcal.vision.target_files import write_target
 
     names: tuple[SheetName, ...] = ("camera", "blade", "plate") if what == "all" else (what,)
-    written = []
+    written: list[Path] = []
     lines = []
     for name in names:
         sheet = target_sheet(name, paper)
