@@ -133,8 +133,9 @@ class Chessboard:
 
     @property
     def points(self) -> Array:
-        """Inner corners (n, 3), row by row, the first one at the origin."""
-        return _grid(self.columns, self.rows, self.square_m)
+        """Inner corners (n, 3), row by row."""
+        offset = np.array([self.square_m, self.square_m, 0.0])
+        return np.asarray(_grid(self.columns, self.rows, self.square_m) + offset)
 
 
 Board = CharucoBoard | MarkerBoard | Chessboard
