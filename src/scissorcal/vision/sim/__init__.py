@@ -1,0 +1,26 @@
+"""Rendered photographs: exact geometry seen through a lens, with what spoils real pictures.
+
+Nothing here is used by a fit, and nothing of a fit is used here but the printed targets' layout.
+"""
+
+from scissorcal.vision.sim.blades import BladeShape, Nick, blade_layer, scissors_layers
+from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.looks import Looks, as_jpeg, random_looks
+from scissorcal.vision.sim.photograph import Glare, Layer, render
+from scissorcal.vision.sim.targets import target_layers
+
+__all__ = [
+    "BladeShape",
+    "Glare",
+    "Layer",
+    "Lens",
+    "Looks",
+    "Nick",
+    "Pose",
+    "as_jpeg",
+    "blade_layer",
+    "random_looks",
+    "render",
+    "scissors_layers",
+    "target_layers",
+]
