@@ -14,6 +14,7 @@ from scissorcal.inference import (
     robust_covariance_of_scores,
 )
 from scissorcal.inference.importance import sample_by_importance
+from scissorcal.inference.mixture import Mixture
 
 
 def problem_of(terms, starts, names=("a", "b"), sd=10.0, normal=None, count=1):
@@ -111,9 +112,8 @@ def test_importance_sampling_of_a_correlated_normal_keeps_its_dependence():
     covariance = np.array([[1.0, 0.9], [0.9, 1.0]])
     precision = np.linalg.inv(covariance)
     rng = np.random.default_rng(5)
-    sampled = sample_by_importance(
-        lambda u: -0.5 * float(u @ precision @ u), np.array([0.5, 0.0]), 2 * np.eye(2), 4000, rng
-    )
+    proposal = Mixture.of(np.ones(1), np.array([[0.5, 0.0]]), 2 * np.eye(2)[None])
+    sampled = sample_by_importance(lambda u: -0.5 * float(u @ precision @ u), proposal, 4000, rng)
     draws = sampled.resample(4000, rng)
     assert sampled.k_hat < 0.7
     assert np.cov(draws, rowvar=False) == pytest.approx(covariance, abs=0.12)
@@ -123,8 +123,7 @@ def test_a_hopeless_proposal_is_said_to_be_one():
     rng = np.random.default_rng(6)
     sampled = sample_by_importance(
         lambda u: -0.5 * float(np.sum((u - 60.0) ** 2)),
-        np.zeros(2),
-        1e-2 * np.eye(2),
+        Mixture.of(np.ones(1), np.zeros((1, 2)), 1e-2 * np.eye(2)[None]),
         500,
         rng,
         rounds=1,

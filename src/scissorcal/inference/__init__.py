@@ -1,19 +1,26 @@
-"""Posteriors of any model: optimum, curvature, autocorrelation, importance sampling."""
+"""Posteriors of any model: optima, curvature, autocorrelation, sampling by effort."""
 
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
 from scissorcal.inference.curvature import gradient, hessian, natural_step
-from scissorcal.inference.infer import Posterior, infer
+from scissorcal.inference.infer import infer
 from scissorcal.inference.information import likelihood_information
-from scissorcal.inference.optimise import Optimum, find_optimum
+from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
+from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
 from scissorcal.inference.tails import log_density, tails_of
 
 __all__ = [
     "ArNoise",
+    "Cluster",
+    "Effort",
+    "NotFiniteError",
     "Optimum",
     "Posterior",
     "Problem",
+    "SamplingStatus",
+    "SearchStatus",
     "find_optimum",
     "fit_ar",
     "gradient",

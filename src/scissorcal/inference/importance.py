@@ -1,4 +1,4 @@
-"""Importance sampling from a Student-t around an optimum, Pareto-smoothed, with its own check."""
+"""Importance sampling around optima, Pareto-smoothed, with its own check."""
 
 import warnings
 from collections.abc import Callable
@@ -8,9 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.mixture import Mixture, fit_mixture, wide_mixture
+
 Array = NDArray[np.float64]
 
-DEGREES_OF_FREEDOM = 7.0
+GOOD_K = 0.6
+"""k-hat at which the proposal is not improved further; 0.7 is where weights cannot be trusted."""
+
+K_HAT_LIMIT = 0.7
+COMPONENTS = 8
+DEFENSIVE = 0.1
 
 
 @dataclass(frozen=True)
@@ -21,6 +28,7 @@ class Sampled:
     weights: Array
     k_hat: float
     effective: float
+    evaluations: int = 0
 
     def resample(self, count: int, rng: np.random.Generator) -> Array:
         """Equally weighted draws (count, p), by systematic resampling."""
@@ -31,34 +39,81 @@ class Sampled:
 
 def sample_by_importance(
     log_posterior: Callable[[Array], float],
-    centre: Array,
-    covariance: Array,
+    proposal: Mixture,
     count: int,
     rng: np.random.Generator,
     rounds: int = 4,
-    good_k: float = 0.6,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.
 
-    Draws come from a multivariate Student-t (7 degrees of freedom), weights are Pareto-smoothed
-    (Vehtari et al. 2024, JMLR 25:72); where k-hat exceeds ``good_k`` the proposal's mean and
-    covariance are moved to those of the weighted draws, ``rounds`` times at most. k-hat below 0.7
-    says that the weights can be trusted.
+    Draws come from a mixture of multivariate Student-t (7 degrees of freedom), one for each known
+    optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat exceeds 0.6
+    the proposal's mean and covariance are moved to those of the weighted draws, ``rounds`` times
+    at most. k-hat below 0.7 says that the weights can be trusted.
     """
+    return _rounds(log_posterior, proposal, count, rng, rounds, len(proposal.weights), None)
+
+
+def sample_by_mixture(
+    log_posterior: Callable[[Array], float],
+    first: Sampled,
+    proposal: Mixture,
+    count: int,
+    rng: np.random.Generator,
+    rounds: int,
+) -> Sampled:
+    """Sample a posterior that one Student-t does not fit, from a mixture of several.
+
+    Begins from weighted draws that failed their check. In each round a mixture is fitted to the
+    weighted draws (population Monte Carlo, Cappé et al. 2008, doi:10.1007/s11222-008-9059-x); a
+    tenth of the draws keeps coming from ``proposal``, made wider, so that no region is lost for
+    good.
+    """
+    guard = wide_mixture(proposal, 2.0)
+    begin = _refit(first, COMPONENTS, guard, rng)
+    best = _rounds(log_posterior, begin, count, rng, rounds, COMPONENTS, guard)
+    return best if best.k_hat < first.k_hat else _plus(first, best.evaluations)
+
+
+def _rounds(
+    log_posterior: Callable[[Array], float],
+    proposal: Mixture,
+    count: int,
+    rng: np.random.Generator,
+    rounds: int,
+    components: int,
+    guard: Mixture | None,
+) -> Sampled:
     best: Sampled | None = None
-    for _ in range(rounds):
-        draws, log_density = _student_t(centre, covariance, count, rng)
+    for round_ in range(rounds):
+        draws = proposal.draw(count, rng)
         log_target = np.array([log_posterior(draw) for draw in draws])
-        sampled = _weigh(draws, log_target - log_density)
+        sampled = _weigh(draws, log_target - proposal.log_density(draws))
         if best is None or sampled.k_hat < best.k_hat:
             best = sampled
-        if sampled.k_hat <= good_k:
+        best = _plus(best, count * (round_ + 1) - best.evaluations)
+        if sampled.k_hat <= GOOD_K or round_ == rounds - 1:
             break
-        centre = sampled.weights @ sampled.draws
-        away = sampled.draws - centre
-        covariance = (sampled.weights * away.T) @ away + 1e-12 * np.diag(np.diag(covariance))
+        proposal = _refit(sampled, components, guard, rng)
     assert best is not None
     return best
+
+
+def _refit(
+    sampled: Sampled, components: int, guard: Mixture | None, rng: np.random.Generator
+) -> Mixture:
+    fitted = fit_mixture(sampled.draws, sampled.weights, components, rng)
+    return fitted if guard is None else fitted.joined(guard, DEFENSIVE)
+
+
+def _plus(sampled: Sampled, evaluations: int) -> Sampled:
+    return Sampled(
+        sampled.draws,
+        sampled.weights,
+        sampled.k_hat,
+        sampled.effective,
+        sampled.evaluations + evaluations,
+    )
 
 
 def _weigh(draws: Array, log_ratio: Array) -> Sampled:
@@ -76,15 +131,3 @@ def _weigh(draws: Array, log_ratio: Array) -> Sampled:
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()
     return Sampled(draws, weights, float(k_hat), float(1.0 / np.sum(weights**2)))
-
-
-def _student_t(
-    centre: Array, covariance: Array, count: int, rng: np.random.Generator
-) -> tuple[Array, Array]:
-    p, nu = len(centre), DEGREES_OF_FREEDOM
-    root = np.linalg.cholesky(covariance)
-    normal = rng.standard_normal((count, p))
-    stretch = np.sqrt(nu / rng.chisquare(nu, count))
-    draws = centre + (normal * stretch[:, None]) @ root.T
-    distance = np.sum(normal**2, axis=1) * stretch**2
-    return draws, -0.5 * (nu + p) * np.log1p(distance / nu)

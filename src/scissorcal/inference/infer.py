@@ -1,60 +1,49 @@
-"""One posterior, inferred at a chosen effort: draft (Laplace) or standard (PSIS)."""
+"""One posterior at a chosen effort: draft (Laplace), standard (PSIS), thorough (ensembles)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.curvature import gradient, hessian, natural_step
-from scissorcal.inference.importance import sample_by_importance
-from scissorcal.inference.information import likelihood_information, slopes_at
+from scissorcal.inference.importance import (
+    K_HAT_LIMIT,
+    Sampled,
+    sample_by_importance,
+    sample_by_mixture,
+)
+from scissorcal.inference.laplace import Laplace, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
+from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
+from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.status import SamplingStatus, named
+from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-RIDGE = 1e-3
-"""Information, in units of the prior's, that keeps directions without data well defined."""
+BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
+"""Evaluations that sampling may take where the caller says nothing."""
 
-LEAST_INFORMATION = 0.1
-"""Information along any direction, in units of the prior's, that a covariance is built from."""
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """What inference returns: equally weighted draws (n, p) and how they came about.
-
-    ``k_hat`` is NaN at draft effort, where nothing is sampled against the posterior. ``null``
-    names, for each direction the data leave to the prior, its parameters with their weights.
-    ``inflation`` (p,) is the factor by which autocorrelation widens each standard deviation;
-    ``noise_orders`` are those of the autoregressions that the data chose, ``dispersion`` what
-    strokes vary beyond them.
-    """
-
-    names: tuple[str, ...]
-    optimum: Optimum
-    draws: Array
-    covariance: Array
-    k_hat: float
-    effective: float
-    inflation: Array
-    null: tuple[str, ...]
-    noise_orders: tuple[int, ...] = ()
-    dispersion: float = 1.0
+MIXTURE_ROUNDS = 6
+RIVAL = 12.0
+"""Optima this far below the highest one still get a share of the draws."""
 
 
 def infer(
     problem: Problem,
-    effort: Literal["draft", "standard"],
+    effort: Effort,
     rng: np.random.Generator,
     *,
     count: int = 2000,
     optimum: Optimum | None = None,
     progress: Progress | None = None,
+    escalate: bool = True,
+    checkpoint: Path | None = None,
+    budget: int | None = None,
 ) -> Posterior:
     """Infer a posterior whose likelihood terms may be autocorrelated.
 
@@ -62,112 +51,227 @@ def infer(
     independent; the scores' long-run covariance J tells what they are really worth. The
     likelihood is therefore stretched about its optimum so that its curvature becomes
     H J^-1 H, which gives intervals their stated coverage although the noise is coloured or the
-    model not quite true (Chandler and Bate 2007, doi:10.1093/biomet/asm015). ``optimum`` may be
-    passed if it is known already.
+    model not quite true (Chandler and Bate 2007, doi:10.1093/biomet/asm015). Where the problem
+    says that its terms are independent, it is taken as written.
+
+    ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
+    importance sampling around every optimum; thorough runs independent ensembles. Where standard
+    fails its own check (k-hat above 0.7) it goes on by itself, unless ``escalate`` is false: first
+    with a mixture that adapts to the posterior, then, if ``budget`` allows, with ensembles. What
+    it became is said in the result. ``optimum`` may be passed if it is known already,
+    ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
+    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`).
+
+    Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
+    beside the optimum.
     """
     tell = progress or (lambda done, sentence: None)
+    counter = _Counter()
+    counted = counter.over(problem)
     tell(0.0, "searching the optimum")
     best = optimum or find_optimum(problem)
-    tell(0.4, "measuring the curvature")
-    scale, terms = problem.prior_sd, problem.log_likelihood_terms
-    step = natural_step(problem.log_likelihood, best.point, 0.1 * scale)
-    slopes = slopes_at(problem, best.point, step)
-    information = likelihood_information(problem, best.point, step, slopes)
-    scores = slopes.scores if slopes else gradient(terms, best.point, step)
-    spread = long_run_covariance(problem, scores, slopes)
-    stretch, robust = _stretch(information, spread.covariance, scale)
-    slope_prior, curvature_prior = _prior_shape(problem, best.point, step)
-    precision = robust + curvature_prior
-    covariance = _inverse(precision, scale)
-    reach = 3 * np.sqrt(np.diag(covariance))
-    slope = slope_prior + stretch.T @ scores.sum(axis=0)
-    centre = best.point + np.clip(covariance @ slope, -reach, reach)
-    naive = _inverse(information + curvature_prior, scale)
-    inflation = np.sqrt(np.diag(covariance) / np.diag(naive))
-    null = _null_directions(robust, scale, problem.names)
-
-    def adjusted(point: Array) -> float:
-        if np.any(point < problem.lower) or np.any(point > problem.upper):
-            return -np.inf
-        return float(problem.log_prior(point)) + problem.log_likelihood(
-            best.point + stretch @ (point - best.point)
-        )
-
+    tell(0.3, "measuring the curvature")
+    best, shape = polish(counted, best)
+    worth = (
+        None if problem.independent else long_run_covariance(problem, shape.scores, shape.slopes)
+    )
+    local = laplace(counted, shape, worth.covariance if worth else None)
+    proposal = _proposal(counted, best, local)
+    run = _Run(problem.names, local, proposal, counter, rng, count, tell)
     if effort == "draft":
-        draws = rng.multivariate_normal(centre, covariance, size=count, method="cholesky")
-        draws = np.clip(draws, problem.lower, problem.upper)
-        return Posterior(
-            problem.names,
-            best,
-            draws,
-            covariance,
-            np.nan,
-            float(count),
-            inflation,
-            null,
-            spread.orders,
-            spread.dispersion,
-        )
-    tell(0.5, "sampling")
-    sampled = sample_by_importance(adjusted, centre, covariance, count, rng)
-    tell(1.0, f"k-hat {sampled.k_hat:.2f}")
+        found = run.draft(problem)
+    elif effort == "standard":
+        found = run.standard(budget or BUDGET[effort], escalate, checkpoint)
+    else:
+        found = run.thorough(budget or BUDGET[effort], checkpoint)
+    tell(1.0, found.sentence)
     return Posterior(
-        problem.names,
-        best,
-        sampled.resample(count, rng),
-        covariance,
-        sampled.k_hat,
-        sampled.effective,
-        inflation,
-        null,
-        spread.orders,
-        spread.dispersion,
+        names=problem.names,
+        optimum=best,
+        draws=found.draws,
+        covariance=local.covariance,
+        k_hat=found.k_hat,
+        effective=found.effective,
+        inflation=local.inflation,
+        null=local.null,
+        effort=effort,
+        effort_reached=found.reached,
+        status=found.status,
+        sentence=found.sentence,
+        evaluations=best.evaluations + counter.calls,
+        r_hat=found.r_hat,
+        tau=found.tau,
+        ensembles=found.ensembles,
+        acceptance=found.acceptance,
+        noise_orders=worth.orders if worth else (),
+        dispersion=worth.dispersion if worth else 1.0,
     )
 
 
-def _inverse(precision: Array, scale: Array) -> Array:
-    """Covariance from a precision, taken in units of the prior and positive definite for sure."""
-    unit = np.outer(scale, scale)
-    scaled = precision * unit
-    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return np.asarray((vectors / np.maximum(values, LEAST_INFORMATION)) @ vectors.T * unit)
+def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
+    """A component for each optimum that may hold mass, in the posterior that is sampled."""
+    centres, covariances, logs = [local.centre], [local.covariance], [0.0]
+    own = np.linalg.slogdet(local.covariance)[1]
+    for rival in best.optima[1:]:
+        if not rival.settled or rival.value < best.value - RIVAL:
+            continue
+        covariance = local_covariance(problem, rival.point, local)
+        if covariance is None:
+            continue
+        centres.append(local.stretched(rival.point))
+        covariances.append(covariance)
+        logs.append(rival.value - best.value + 0.5 * (np.linalg.slogdet(covariance)[1] - own))
+    shares = np.exp(np.array(logs) - max(logs))
+    weights = np.maximum(shares / shares.sum(), 0.05)
+    return Mixture.of(weights, np.stack(centres), np.stack(covariances))
 
 
-def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Array]:
-    """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p).
+class _Counter:
+    """Counts evaluations of a problem's likelihood."""
 
-    Along directions where the scores vary less than their information says, which negative
-    autocorrelation can bring about, the information is kept: robustness only widens.
-    """
-    unit = np.outer(scale, scale)
-    H = information * unit + RIDGE * np.eye(len(scale))
-    root = _root(H)
-    inverse = np.linalg.inv(root)
-    values, vectors = np.linalg.eigh(inverse @ (spread * unit) @ inverse)
-    widened = np.maximum(values, 1.0)
-    robust = root @ (vectors / widened) @ vectors.T @ root
-    inner = inverse @ (vectors / np.sqrt(widened)) @ vectors.T @ root
-    return inner * scale[:, None] / scale[None, :], 0.5 * (robust + robust.T) / unit
+    def __init__(self) -> None:
+        self.calls = 0
 
+    def over(self, problem: Problem) -> Problem:
+        def terms(u: Array) -> Array:
+            self.calls += 1
+            return problem.log_likelihood_terms(u)
 
-def _root(matrix: Array) -> Array:
-    values, vectors = np.linalg.eigh(matrix)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+        normal = problem.standardised
 
+        def standardised(u: Array) -> tuple[Array, Array]:
+            self.calls += 1
+            assert normal is not None
+            return normal(u)
 
-def _prior_shape(problem: Problem, point: Array, step: Array) -> tuple[Array, Array]:
-    reach = np.maximum(step, 1e-3 * problem.prior_sd)
-    slope = gradient(lambda u: np.array([problem.log_prior(u)]), point, reach)[0]
-    curvature = -hessian(lambda u: float(problem.log_prior(u)), point, reach)
-    return slope, 0.5 * (curvature + curvature.T)
+        return replace(
+            problem,
+            log_likelihood_terms=terms,
+            standardised=None if normal is None else standardised,
+        )
 
 
-def _null_directions(information: Array, scale: Array, names: tuple[str, ...]) -> tuple[str, ...]:
-    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
-    found = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value < 1.0:
-            share = vector**2
-            largest = [i for i in np.argsort(-share) if share[i] > 0.1]
-            found.append(" + ".join(f"{names[i]} ({share[i]:.0%})" for i in largest))
-    return tuple(found)
+@dataclass(frozen=True)
+class _Found:
+    """What one rung of effort ended with."""
+
+    draws: Array
+    reached: Effort
+    status: SamplingStatus
+    sentence: str
+    effective: float
+    k_hat: float
+    r_hat: Array
+    tau: Array
+    ensembles: int = 0
+    acceptance: float = float("nan")
+
+
+@dataclass(frozen=True)
+class _Run:
+    names: tuple[str, ...]
+    local: Laplace
+    proposal: Mixture
+    counter: _Counter
+    rng: np.random.Generator
+    count: int
+    tell: Progress
+
+    def draft(self, problem: Problem) -> _Found:
+        draws = self.rng.multivariate_normal(
+            self.local.centre, self.local.covariance, size=self.count, method="cholesky"
+        )
+        draws = np.clip(draws, problem.lower, problem.upper)
+        status = SamplingStatus.FLAT if self.local.null else SamplingStatus.APPROXIMATED
+        sentence = status.value
+        if self.local.null:
+            sentence += f" It concerns {'; '.join(self.local.null)}."
+        nothing = np.full(len(self.names), np.nan)
+        return _Found(draws, "draft", status, sentence, float(self.count), np.nan, nothing, nothing)
+
+    def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
+        self.tell(0.4, "sampling")
+        target = self.local.log_posterior
+        first = self.counter.calls
+        sampled = sample_by_importance(target, self.proposal, self.count, self.rng)
+        said = f"k-hat {sampled.k_hat:.2f}"
+        if sampled.k_hat > K_HAT_LIMIT and escalate:
+            self.tell(0.5, f"{said}: one Student-t does not fit, adapting a mixture")
+            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count))
+            if rounds > 0:
+                sampled = sample_by_mixture(
+                    target, sampled, self.proposal, 2 * self.count, self.rng, rounds
+                )
+                said += f", {sampled.k_hat:.2f} with an adapted mixture"
+        if sampled.k_hat <= K_HAT_LIMIT or not escalate:
+            return self._weighed(sampled, said)
+        left = budget - (self.counter.calls - first)
+        wanted = fewest_evaluations(len(self.names))
+        if left < wanted:
+            said += f"; ensembles need at least {wanted} evaluations and {left} are left"
+            return self._weighed(sampled, said)
+        self.tell(0.6, f"{said}: running ensembles")
+        return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
+
+    def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
+        self.tell(0.4, "checking the approximation")
+        sampled = sample_by_importance(
+            self.local.log_posterior, self.proposal, self.count, self.rng, rounds=1
+        )
+        return self._walked(budget, checkpoint, sampled, "")
+
+    def _weighed(self, sampled: Sampled, said: str) -> _Found:
+        good = sampled.k_hat <= K_HAT_LIMIT
+        status = SamplingStatus.WEIGHED if good else SamplingStatus.HEAVY_WEIGHTS
+        nothing = np.full(len(self.names), np.nan)
+        return _Found(
+            draws=sampled.resample(self.count, self.rng),
+            reached="standard",
+            status=status,
+            sentence=f"{status.value} ({said}.)",
+            effective=sampled.effective,
+            k_hat=sampled.k_hat,
+            r_hat=nothing,
+            tau=nothing,
+        )
+
+    def _walked(
+        self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
+    ) -> _Found:
+        chains = run_ensembles(
+            self.local.log_posterior,
+            self.proposal,
+            self.rng,
+            budget=budget,
+            checkpoint=checkpoint,
+            progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
+        )
+        return _Found(
+            draws=_thinned(chains, self.count, self.rng),
+            reached="thorough",
+            status=chains.status,
+            sentence=before + _said(chains, self.names),
+            effective=chains.effective,
+            k_hat=sampled.k_hat,
+            r_hat=chains.r_hat,
+            tau=chains.tau,
+            ensembles=ENSEMBLES,
+            acceptance=chains.acceptance,
+        )
+
+
+def _thinned(chains: Chains, count: int, rng: np.random.Generator) -> Array:
+    """Draws (count, p) from all ensembles alike, evenly spread over their steps."""
+    every = np.moveaxis(chains.draws, 1, 0).reshape(-1, chains.draws.shape[-1])
+    positions = ((rng.random() + np.arange(count)) / count * len(every)).astype(np.int64)
+    return np.asarray(every[rng.permutation(positions)])
+
+
+def _said(chains: Chains, names: tuple[str, ...]) -> str:
+    never = ~np.isfinite(chains.tau)
+    if np.any(never):
+        return f"{chains.status.value} It concerns {named(names, never)}."
+    return (
+        f"{chains.status.value} ({ENSEMBLES} ensembles of {chains.steps} steps, autocorrelation "
+        f"time {chains.tau.max():.0f}, R-hat {chains.r_hat.max():.3f}.)"
+    )

@@ -1,19 +1,20 @@
-"""Multistart search for the posterior's optimum, with an honest word on how it ended."""
+"""Multistart search for the posterior's optima, with an honest word on how it ended."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.status import NotFiniteError, SearchStatus, named
 
 Array = NDArray[np.float64]
 
 WORST = 1e300
 """Stands for a log-posterior of -inf: finite, because BOBYQA calls a NaN or an infinity solved."""
 
-SAME_OPTIMUM = 0.5
-"""Two optima whose log-posteriors differ by less than this count as one."""
+SAME_HEIGHT = 0.5
+"""Two points whose log-posteriors differ by less than this count as equally high."""
 
 SETTLED = 1e-3
 """A round of search that gains less log-posterior than this has arrived."""
@@ -23,14 +24,32 @@ ROUNDS_BEFORE_CHOICE = 2
 HOPELESS = 20.0
 """A start this much log-posterior below the best one after its first rounds is given up."""
 
+AT_BOUND = 1e-6
+"""Distance from a bound, in units of the prior's, that counts as lying on it."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A distinct optimum: where it is (p,), how high, and how many starts ended there.
+
+    ``settled`` is false where the search was given up far below another optimum, or ran out of
+    rounds.
+    """
+
+    point: Array
+    value: float
+    starts: int
+    settled: bool
+
 
 @dataclass(frozen=True)
 class Optimum:
     """The best point that any start led to.
 
-    ``success`` is true where the last round of search gained nothing that matters.
-    ``sentence`` says how it ended and what to do. ``agreeing`` counts the starts that ended at
-    the same height, ``starts`` all of them; ``evaluations`` counts calls of the objective.
+    ``status`` says how the search ended and what to do, ``sentence`` the same with the names of
+    the parameters it concerns; ``success`` is true where the point may be used. ``optima`` are the
+    distinct optima, highest first. ``agreeing`` counts the starts that ended at the same height,
+    ``starts`` all of them; ``evaluations`` counts calls of the objective.
     """
 
     point: Array
@@ -40,6 +59,8 @@ class Optimum:
     agreeing: int
     starts: int
     evaluations: int
+    status: SearchStatus = SearchStatus.SETTLED
+    optima: tuple[Cluster, ...] = ()
 
 
 def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
@@ -50,33 +71,57 @@ def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
     parameters then cost no more than independent ones. A start whose first rounds end far below
     another's is given up. The best point ever seen is kept, whatever code the library returns,
     since it reports rounding trouble at points that are solved and success at points it never
-    could evaluate. Raises ValueError if no start is finite.
+    could evaluate. Ends between which the log-posterior does not dip are one optimum.
+
+    Raises NotFiniteError (a ValueError) if the log-posterior is finite at no start.
     """
     chosen = np.atleast_2d(problem.starts if starts is None else starts)
     begun = [_climb(problem, _begin(problem, start), ROUNDS_BEFORE_CHOICE) for start in chosen]
     top = max(climb.value for climb in begun)
     if not np.isfinite(top):
-        raise ValueError("The log-posterior is finite at no start; check the data for NaN.")
+        raise NotFiniteError(
+            "The log-posterior is finite at no start; check the data for NaN and the starts for "
+            "values that the priors rule out."
+        )
     ended = [
         _climb(problem, climb, ROUNDS) if climb.value > top - HOPELESS else climb for climb in begun
     ]
     best = max(ended, key=lambda climb: climb.value)
-    agreeing = sum(climb.value > best.value - SAME_OPTIMUM for climb in ended)
-    success = best.gained < SETTLED
-    sentence = (
-        "The search settled."
-        if success
-        else "The search was still climbing when its rounds were used up: record more varied "
-        "motion, or choose a simpler rung."
-    )
+    agreeing = sum(climb.value > best.value - SAME_HEIGHT for climb in ended)
+    optima = _clusters(problem, ended)
+    status, concerned = _status(problem, best)
+    sentence = status.value + (f" It concerns {concerned}." if concerned else "")
     if agreeing < len(ended):
         sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
-    evaluations = sum(climb.evaluations for climb in ended)
-    return Optimum(best.point, best.value, success, sentence, agreeing, len(ended), evaluations)
+    if rivals := [c for c in optima[1:] if c.settled and c.value > best.value - SAME_HEIGHT * 6]:
+        sentence += f" {len(rivals)} other optima are about as high."
+    return Optimum(
+        point=best.point,
+        value=best.value,
+        success=status.found,
+        sentence=sentence,
+        agreeing=agreeing,
+        starts=len(ended),
+        evaluations=sum(climb.evaluations for climb in ended),
+        status=status,
+        optima=optima,
+    )
+
+
+def move_optimum(optimum: Optimum, point: Array, value: float) -> Optimum:
+    """The same optimum after polishing: its best cluster moves along."""
+    first = replace(optimum.optima[0], point=point, value=value) if optimum.optima else None
+    return replace(
+        optimum,
+        point=point,
+        value=value,
+        optima=(first, *optimum.optima[1:]) if first else (),
+    )
 
 
 @dataclass(frozen=True)
 class _Climb:
+    start: Array
     point: Array
     value: float
     gained: float
@@ -86,7 +131,9 @@ class _Climb:
 
 def _begin(problem: Problem, start: Array) -> _Climb:
     point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
-    return _Climb(point, problem.log_posterior(point), np.inf, _rounding(problem, point), 1)
+    value = problem.log_posterior(point)
+    root = _rounding(problem, point) if np.isfinite(value) else np.diag(problem.prior_sd)
+    return _Climb(point, point, value, np.inf, root, 1 + 2 * len(point))
 
 
 def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
@@ -101,7 +148,7 @@ def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
         if gained >= SETTLED:
             root = _rounding(problem, point)
             evaluations += 2 * len(point)
-    return _Climb(point, value, gained, root, evaluations)
+    return _Climb(climb.start, point, value, gained, root, evaluations)
 
 
 def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[Array, float, int]:
@@ -139,10 +186,76 @@ def _rounding(problem: Problem, point: Array) -> Array:
     """Root of the covariance that the scores suggest, for rounder coordinates."""
     terms = problem.log_likelihood_terms
     step = 1e-4 * problem.prior_sd
-    reaches = np.diag(step)
-    scaled = np.stack(
-        [0.5 * (terms(point + reach) - terms(point - reach)) / 1e-4 for reach in reaches], axis=-1
-    )
+    columns = [
+        0.5 * (terms(point + reach) - terms(point - reach)) / 1e-4 for reach in np.diag(step)
+    ]
+    scaled = np.nan_to_num(np.stack(columns, axis=-1), nan=0.0, posinf=0.0, neginf=0.0)
     information = scaled.T @ scaled + np.eye(len(point))
     values, vectors = np.linalg.eigh(information)
     return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))
+
+
+def _clusters(problem: Problem, ended: list[_Climb]) -> tuple[Cluster, ...]:
+    """Distinct optima, highest first."""
+    found: list[Cluster] = []
+    for climb in sorted(ended, key=lambda climb: -climb.value):
+        if not np.isfinite(climb.value):
+            continue
+        for index, known in enumerate(found):
+            if _same(problem, climb, known):
+                settled = known.settled or climb.gained < SETTLED
+                found[index] = replace(known, starts=known.starts + 1, settled=settled)
+                break
+        else:
+            found.append(Cluster(climb.point, climb.value, 1, climb.gained < SETTLED))
+    return tuple(found)
+
+
+def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
+    """Whether two ends are near one another, or joined by a straight ridge without a dip."""
+    away = climb.point - known.point
+    if float(np.linalg.norm(np.linalg.solve(climb.root, away))) < 0.1:
+        return True
+    floor = min(climb.value, known.value) - SAME_HEIGHT
+    return all(
+        problem.log_posterior(known.point + share * away) > floor for share in (0.25, 0.5, 0.75)
+    )
+
+
+def _status(problem: Problem, best: _Climb) -> tuple[SearchStatus, str]:
+    """How the best climb ended, and the names of the parameters that it concerns."""
+    scale = problem.prior_sd
+    at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
+    if np.any(at_bound):
+        return SearchStatus.AT_BOUNDS, named(problem.names, at_bound)
+    if best.gained >= SETTLED:
+        return SearchStatus.ROUNDS_USED_UP, ""
+    likelihood = problem.log_likelihood(best.point)
+    reaches = np.diag(0.1 * scale)
+    beside = np.array(
+        [
+            [
+                problem.log_likelihood(_inside(problem, best.point + sign * reach))
+                for sign in (-1, 1)
+            ]
+            for reach in reaches
+        ]
+    )
+    unmoved = np.abs(best.point - best.start) <= 1e-9 * scale
+    silent = np.all(np.abs(beside - likelihood) <= 1e-9 * (1 + abs(likelihood)), axis=1)
+    if np.any(unmoved & silent):
+        return SearchStatus.AT_START, named(problem.names, unmoved & silent)
+    near = np.diag(best.root @ best.root.T) ** 0.5 * 1e-3
+    broken = np.array(
+        [
+            not all(np.isfinite(problem.log_posterior(best.point + s * reach)) for s in (-1, 1))
+            for reach in np.diag(near)
+        ]
+    )
+    if np.any(broken):
+        return SearchStatus.NOT_FINITE, named(problem.names, broken)
+    return SearchStatus.SETTLED, ""
+
+
+def _inside(problem: Problem, point: Array) -> Array:
+    return np.asarray(np.clip(point, problem.lower, problem.upper))

@@ -1,0 +1,56 @@
+"""What inference returns, whatever the effort."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.status import SamplingStatus
+
+Array = NDArray[np.float64]
+Effort = Literal["draft", "standard", "thorough"]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Equally weighted draws (n, p) and how they came about.
+
+    ``effort`` is what was asked for, ``effort_reached`` what it became; ``status`` says how far
+    the draws may be trusted and ``sentence`` the same in full: what was tried, and where it
+    stopped. ``null`` names, for each direction the data leave to the prior, its parameters with
+    their weights. ``inflation`` (p,) is the factor by which autocorrelation widens each standard
+    deviation; ``noise_orders`` are those of the autoregressions that the data chose,
+    ``dispersion`` what strokes vary beyond them. ``effective`` counts independent draws,
+    ``evaluations`` calls of the log-likelihood, those of the search included.
+
+    ``k_hat`` is NaN at draft effort, where nothing is sampled against the posterior. ``r_hat``
+    (p,), ``tau`` (p,) in steps and ``acceptance`` are NaN, and ``ensembles`` is zero, unless
+    ensembles were run.
+    """
+
+    names: tuple[str, ...]
+    optimum: Optimum
+    draws: Array
+    covariance: Array
+    k_hat: float
+    effective: float
+    inflation: Array
+    null: tuple[str, ...]
+    effort: Effort
+    effort_reached: Effort
+    status: SamplingStatus
+    sentence: str
+    evaluations: int
+    r_hat: Array
+    tau: Array
+    ensembles: int
+    acceptance: float
+    noise_orders: tuple[int, ...] = ()
+    dispersion: float = 1.0
+
+    @property
+    def optima(self) -> tuple[Cluster, ...]:
+        """Distinct optima that the search found, highest first."""
+        return self.optimum.optima

@@ -1,0 +1,255 @@
+"""Independent ensembles of walkers, run until they are long, stable and agree."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
+from scissorcal.inference.mixture import Mixture
+from scissorcal.inference.status import NotFiniteError, SamplingStatus
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+ENSEMBLES = 4
+LONG = 100.0
+"""Steps wanted, in autocorrelation times."""
+
+STABLE = 0.05
+"""Largest relative change of an autocorrelation time between two looks."""
+
+AGREEING = 1.01
+"""Largest R-hat between ensembles (Vehtari et al. 2021, doi:10.1214/20-BA1221)."""
+
+BURN_IN = 0.1
+"""Share of the steps that is left out at the beginning."""
+
+BLOCK = 256
+"""Steps between two checkpoints."""
+
+GROWTH = 1.25
+"""How much longer a chain gets between two looks at its convergence."""
+
+MOST_STORED = 4096
+"""Stored steps beyond which every other one is dropped: those are a few per autocorrelation."""
+
+LEAST_BLOCKS = 2
+DISAGREEING_AFTER = 5.0
+"""Ensembles that disagree although they are this many times longer than needed never agree."""
+
+STUCK_STEPS = 4 * BLOCK
+"""A parameter that has not moved after so many steps never will."""
+
+JUMPS = 0.2
+"""Share of moves by a whole difference between two walkers, which lead from mode to mode."""
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Stored walks after burn-in (ensembles, steps, walkers, p) and what they say of themselves.
+
+    ``tau`` (p,) is the integrated autocorrelation time in steps, NaN for a parameter that never
+    moved; ``r_hat`` (p,) compares ensembles, each split in half; ``effective`` counts independent
+    draws of the worst parameter. ``acceptance`` is the share of moves that were accepted.
+    """
+
+    draws: Array
+    tau: Array
+    r_hat: Array
+    effective: float
+    acceptance: float
+    steps: int
+    status: SamplingStatus
+
+
+def walkers_for(size: int) -> int:
+    """Walkers of one ensemble over ``size`` parameters; even, and more than twice as many."""
+    return max(12, 2 * size + 4)
+
+
+def fewest_evaluations(size: int) -> int:
+    """Evaluations below which ensembles over ``size`` parameters come to no end that counts."""
+    return ENSEMBLES * walkers_for(size) * 6 * BLOCK
+
+
+def run_ensembles(
+    log_posterior: Callable[[Array], float],
+    proposal: Mixture,
+    rng: np.random.Generator,
+    *,
+    budget: int,
+    checkpoint: Path | None = None,
+    progress: Progress | None = None,
+) -> Chains:
+    """Sample a posterior with four independent ensembles of walkers (emcee).
+
+    Moves are differences between two other walkers (ter Braak 2006,
+    doi:10.1007/s11222-006-8769-1), a fifth of them in full length. Walkers begin as draws of
+    ``proposal``. The run ends when what follows the burn-in is longer than 100 autocorrelation
+    times of every parameter, those times have settled, and the ensembles agree; or when
+    ``budget`` evaluations are used up. ``checkpoint`` is written after every 256 steps; where it
+    exists, the run goes on from there exactly as if it had never stopped. Randomness comes from
+    ``rng`` alone.
+
+    Raises NotFiniteError where too few finite starts are found, ValueError where the checkpoint
+    belongs to another posterior or cannot be read, or where the budget is less than one block.
+    """
+    tell = progress or (lambda done, sentence: None)
+    walks = [_begin(log_posterior, proposal, rng) for _ in range(ENSEMBLES)]
+    if checkpoint is not None and checkpoint.exists():
+        walks = load_walks(checkpoint, log_posterior, walks[0].coords.shape)
+    per_step = sum(len(walk.coords) for walk in walks)
+    if walks[0].steps == 0 and budget < BLOCK * per_step:
+        raise ValueError(
+            f"A budget of {budget} evaluations is less than the first {BLOCK} steps take, which "
+            f"is {BLOCK * per_step}: give more, or use standard effort."
+        )
+    chains = _look(walks) if walks[0].steps else None
+    while chains is None or chains.status is SamplingStatus.BUDGET_USED_UP:
+        if (walks[0].steps + BLOCK) * per_step > budget:
+            return chains or _judged(walks)
+        walks = [_advance(walk, log_posterior) for walk in walks]
+        if checkpoint is not None:
+            save_walks(checkpoint, walks)
+        chains = _look(walks)
+        if chains is not None:
+            tell(*_words(chains))
+    return chains
+
+
+def _look(walks: list[Walk]) -> Chains | None:
+    """Judge walks at steps that depend on nothing but their number; None at others."""
+    blocks, due = walks[0].steps // BLOCK, LEAST_BLOCKS
+    while due < blocks:
+        due = max(due + 1, int(GROWTH * due))
+    return _judged(walks) if due == blocks else None
+
+
+def _judged(walks: list[Walk]) -> Chains:
+    chain = np.stack([walk.chain for walk in walks])
+    thin, steps = walks[0].thin, walks[0].steps
+    kept = chain[:, int(np.ceil(BURN_IN * chain.shape[1])) :]
+    ensembles, stored, walkers, size = kept.shape
+    tau = thin * _autocorrelation_time(kept)
+    before = thin * _autocorrelation_time(kept[:, : int(0.8 * stored)])
+    r_hat = np.array([_r_hat(kept[..., index].reshape(ensembles, -1)) for index in range(size)])
+    moved = np.isfinite(tau)
+    longest = float(np.max(tau)) if np.all(moved) else np.inf
+    still = np.ptp(kept, axis=1).max(axis=-1) == 0
+    long = thin * stored > LONG * longest and not np.any(still)
+    stable = bool(np.all(np.abs(tau - before) < STABLE * tau)) if np.all(moved) else False
+    if not np.all(moved):
+        late = steps >= STUCK_STEPS
+        status = SamplingStatus.STUCK if late else SamplingStatus.BUDGET_USED_UP
+    elif not (long and stable):
+        status = SamplingStatus.BUDGET_USED_UP
+    elif np.all(r_hat < AGREEING):
+        status = SamplingStatus.CONVERGED
+    else:
+        far = thin * stored > DISAGREEING_AFTER * LONG * longest
+        status = SamplingStatus.DISAGREEING if far else SamplingStatus.BUDGET_USED_UP
+    accepted = sum(walk.accepted for walk in walks) / (steps * walkers * ensembles)
+    effective = ensembles * walkers * thin * stored / max(longest, 1.0)
+    return Chains(kept, tau, r_hat, effective, float(accepted), steps, status)
+
+
+def _autocorrelation_time(chain: Array) -> Array:
+    """Integrated autocorrelation time of each parameter in stored steps; NaN where none moves."""
+    from emcee.autocorr import integrated_time
+
+    ensembles, stored, walkers, size = chain.shape
+    every = np.moveaxis(chain, 0, 1).reshape(stored, ensembles * walkers, size)
+    moves = np.ptp(every, axis=0) > 0
+    tau = np.full(size, np.nan)
+    for index in np.flatnonzero(moves.any(axis=0)):
+        moving = every[:, moves[:, index], index]
+        tau[index] = max(float(integrated_time(moving[..., None], tol=0)[0]), 1.0)
+    return tau
+
+
+def _r_hat(draws: Array) -> float:
+    """Rank-normalised split R-hat of one parameter between ensembles (ensembles, draws)."""
+    with warnings.catch_warnings():
+        # Once a day ArviZ announces its next major version, which this project does not use.
+        warnings.simplefilter("ignore", FutureWarning)
+        import arviz
+
+    rhat: Any = arviz.rhat
+    return float(rhat(draws, method="rank"))
+
+
+def _words(chains: Chains) -> tuple[float, str]:
+    if not np.all(np.isfinite(chains.tau)):
+        return 0.0, f"{chains.steps} steps, and a parameter has not moved yet"
+    share = (1 - BURN_IN) * chains.steps / float(chains.tau.max())
+    return min(share / LONG, 1.0), (
+        f"{chains.steps} steps, {share:.0f} of {LONG:.0f} autocorrelation times, "
+        f"R-hat {chains.r_hat.max():.3f}"
+    )
+
+
+def _begin(
+    log_posterior: Callable[[Array], float], proposal: Mixture, rng: np.random.Generator
+) -> Walk:
+    """Walkers spread as the proposal says, each where the posterior is finite."""
+    wanted = walkers_for(proposal.centres.shape[1])
+    coords: list[Array] = []
+    heights: list[float] = []
+    for _ in range(50 * wanted):
+        draw = proposal.draw(1, rng)[0]
+        height = log_posterior(draw)
+        if np.isfinite(height):
+            coords.append(draw)
+            heights.append(height)
+        if len(coords) == wanted:
+            break
+    else:
+        raise NotFiniteError(
+            f"Of {50 * wanted} draws around the optimum only {len(coords)} have a finite "
+            "log-posterior, too few to begin from: check the bounds, and the data for NaN."
+        )
+    # emcee knows only numpy's older generator; its state comes from ours.
+    legacy = np.random.RandomState(rng.integers(2**32, size=8, dtype=np.uint32))
+    return Walk(
+        chain=np.empty((0, wanted, len(coords[0]))),
+        accepted=0.0,
+        steps=0,
+        thin=1,
+        coords=np.stack(coords),
+        heights=np.array(heights),
+        random_state=cast(RandomState, legacy.get_state()),
+    )
+
+
+def _advance(walk: Walk, log_posterior: Callable[[Array], float]) -> Walk:
+    """One block of steps; all that the next one depends on is in what is returned."""
+    import emcee
+
+    walkers, size = walk.coords.shape
+    moves = [(emcee.moves.DEMove(), 1 - JUMPS), (emcee.moves.DEMove(gamma0=1.0), JUMPS)]
+    sampler = emcee.EnsembleSampler(walkers, size, log_posterior, moves=moves)
+    state = emcee.State(walk.coords, log_prob=walk.heights, random_state=walk.random_state)
+    for last in sampler.sample(
+        state,
+        iterations=BLOCK // walk.thin,
+        thin_by=walk.thin,
+        skip_initial_state_check=True,
+    ):
+        state = last
+    chain, thin = np.concatenate([walk.chain, sampler.get_chain()]), walk.thin
+    if len(chain) >= MOST_STORED and thin < BLOCK:
+        chain, thin = chain[1::2], 2 * thin
+    return Walk(
+        chain=chain,
+        accepted=walk.accepted + walk.thin * float(sampler.backend.accepted.sum()),
+        steps=walk.steps + BLOCK,
+        thin=thin,
+        coords=np.array(state.coords),
+        heights=np.array(state.log_prob),
+        random_state=state.random_state,
+    )
