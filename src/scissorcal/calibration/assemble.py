@@ -7,10 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.critic import Critique, criticise
 from scissorcal.calibration.ladder import Climbed, rung_table
+from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
+from scissorcal.calibration.selection import selection_sentence
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.inference import Posterior, ljung_box
+from scissorcal.model.terms import Motion
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict
 
@@ -19,6 +23,7 @@ Integers = NDArray[np.int64]
 
 MOST_POINTS = 20000
 BAND_DRAWS = 100
+PRIOR_DRAWS = 1000
 
 
 def assemble(
@@ -37,6 +42,8 @@ def assemble(
     joint: Joint,
     inputs_hash: str,
     nuisance: tuple[str, ...],
+    rng: np.random.Generator,
+    critic: bool,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
 ) -> FitResult:
@@ -44,19 +51,63 @@ def assemble(
 
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
-    ``extra_notes`` are what only the fit itself can say; they follow the common ones.
+    ``extra_notes`` are what only the fit itself can say; they follow the common ones. ``critic``
+    has the residuals searched for what the law lacks, unless the effort is draft.
     """
     layout = chosen.rung.layout
-    likelihood = chosen.rung.likelihood
+    fitted = layout.fitted(posterior.draws)
     wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
+    others = [i for i, name in enumerate(layout.names) if name in nuisance]
     natural = layout.columns(posterior.draws)
-    point = chosen.optimum.point
-    white = ljung_box(likelihood.standardised(point), bins.series)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     series = _series(chosen, posterior, bins, strokes, measured, contact)
-    parameters = tuple(layout.fitted(posterior.draws)[i] for i in wanted)
+    diagnostics = _diagnostics(chosen, posterior, bins, measured)
+    critique = Critique((), "The critic was not asked.")
+    if critic and effort != "draft":
+        critique = _criticise(what, chosen, bins, measured, joint, rng)
+    diagnostics["critic"] = critique.sentence
+    trust = trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance)
+    return FitResult(
+        what=what,
+        effort=effort,
+        rung=chosen.rung.name,
+        structure=structure,
+        parameters=tuple(fitted[i] for i in wanted),
+        draws=natural[:, wanted],
+        map_point=layout.columns(chosen.optimum.point)[wanted],
+        series=series,
+        held_out=held_out,
+        rungs=rung_table(climbed, chosen),
+        diagnostics=diagnostics,
+        verdicts=(*trust, *extra_verdicts),
+        effort_unit=joint.effort_unit,
+        position_unit=joint.position_unit,
+        inputs_hash=inputs_hash,
+        sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
+        notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
+        selection=selection_sentence(climbed, chosen, bins, contact, joint),
+        critic=critique.proposals,
+        replay=compare_with_replay(
+            chosen,
+            bins,
+            measured,
+            contact,
+            tuple(recording.source for recording in recordings),
+            refit=what == "cut" and effort != "draft",
+        ),
+        prior_draws=_prior_draws(chosen, rng)[:, wanted],
+        nuisance=tuple(fitted[i] for i in others),
+        nuisance_draws=natural[:, others],
+    )
+
+
+def _diagnostics(
+    chosen: Climbed, posterior: Posterior, bins: Bins, measured: Array
+) -> dict[str, Any]:
+    likelihood, point = chosen.rung.likelihood, chosen.optimum.point
+    white = ljung_box(likelihood.standardised(point), bins.series)
     residuals = likelihood.residuals(point)
-    diagnostics = {
+    return {
         "k_hat": posterior.k_hat,
         "effective_samples": posterior.effective,
         "evaluations": chosen.optimum.evaluations,
@@ -74,28 +125,30 @@ def assemble(
         "bin_s": bins.bin_s,
         "noise": float(np.std(residuals)),
     }
-    return FitResult(
-        what=what,
-        effort=effort,
-        rung=chosen.rung.name,
-        structure=structure,
-        parameters=parameters,
-        draws=natural[:, wanted],
-        map_point=layout.columns(point)[wanted],
-        series=series,
-        held_out=held_out,
-        rungs=rung_table(climbed, chosen),
-        diagnostics=diagnostics,
-        verdicts=(
-            *trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance),
-            *extra_verdicts,
-        ),
-        effort_unit=joint.effort_unit,
-        position_unit=joint.position_unit,
-        inputs_hash=inputs_hash,
-        sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
-        notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
-    )
+
+
+def _criticise(
+    what: Literal["friction", "cut"],
+    chosen: Climbed,
+    bins: Bins,
+    measured: Array,
+    joint: Joint,
+    rng: np.random.Generator,
+) -> Critique:
+    """A cut's load is the torque that the law expects of the material; empty motion has none."""
+    load = None
+    if what == "cut":
+        load = measured - chosen.rung.likelihood.residuals(chosen.optimum.point)
+    motion = Motion(bins.opening, bins.rate, bins.acceleration, load)
+    return criticise(what, chosen, motion, joint, rng)
+
+
+def _prior_draws(chosen: Climbed, rng: np.random.Generator) -> Array:
+    """Draws of the prior (PRIOR_DRAWS, parameters) in natural units."""
+    rung = chosen.rung
+    covariance = np.linalg.inv(rung.prior_precision)
+    draws = rng.multivariate_normal(rung.prior_mean, covariance, PRIOR_DRAWS, method="eigh")
+    return rung.layout.columns(draws)
 
 
 def _stroke_errors(

@@ -86,6 +86,8 @@ def fit_cut(
             "cut", recordings, settings_of(recipe), effort, friction.inputs_hash
         ),
         nuisance=(*NUISANCE, *friction_names),
+        rng=rng,
+        critic=recipe.fit.cut.critic,
     )
 
 

@@ -85,6 +85,8 @@ def fit_friction(
         joint=joint,
         inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
         nuisance=NUISANCE,
+        rng=rng,
+        critic=settings.critic,
     )
 
 
@@ -118,7 +120,7 @@ def _with_tails(
     tails = tails_of(chosen.rung.likelihood.standardised(chosen.optimum.point), chosen.share)
     if tails > OUTLIERS:
         return chosen
-    place = climbed.index(chosen)
+    place = next(i for i, candidate in enumerate(climbed) if candidate.rung is chosen.rung)
     robust = replace(ladder[place], tails=tails).rung(bins.drive)
     again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
     climbed[place] = replace(again, alike=chosen.alike)

@@ -307,7 +307,7 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
             "loo": float(candidate.left_out.scores.sum()) * share,
             "loo_se": _standard_error(candidate.left_out.scores * share),
             "loo_k_hat": float(candidate.left_out.k_hats.max()),
-            "equivalent": candidate.rung.name in chosen.alike,
+            "equivalent": candidate.rung is chosen.rung or candidate.rung.name in chosen.alike,
             "chosen": candidate.rung is chosen.rung,
         }
         for candidate in climbed

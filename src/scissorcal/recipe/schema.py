@@ -162,11 +162,15 @@ class Capture(Section):
 
 
 class FitFriction(Section):
-    """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both."""
+    """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both.
+
+    ``critic`` searches what the law leaves for terms that it lacks (not at draft effort).
+    """
 
     rung: Literal["auto", "coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"] = "auto"
     symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
     cutoff_Hz: Positive = 100.0
+    critic: bool = True
 
 
 class FitCut(Section):
@@ -178,6 +182,7 @@ class FitCut(Section):
     response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
     response_exponent: LogNormalPrior = LogNormalPrior(median=1.5, factor_90=3.0)
     toughness_J_per_m2: LogNormalPrior | None = None
+    critic: bool = True
 
 
 class Fit(Section):
