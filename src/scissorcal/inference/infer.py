@@ -103,6 +103,7 @@ def infer(
         tau=found.tau,
         ensembles=found.ensembles,
         acceptance=found.acceptance,
+        log_posterior=local.log_posterior,
         noise_orders=worth.orders if worth else (),
         dispersion=worth.dispersion if worth else 1.0,
     )

@@ -1,5 +1,6 @@
 """What inference returns, whatever the effort."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,6 +25,7 @@ class Posterior:
     deviation; ``noise_orders`` are those of the autoregressions that the data chose,
     ``dispersion`` what strokes vary beyond them. ``effective`` counts independent draws,
     ``evaluations`` calls of the log-likelihood, those of the search included.
+    ``log_posterior`` gives the logarithm of what was sampled, up to a constant, at any point (p,).
 
     ``k_hat`` is NaN at draft effort, where nothing is sampled against the posterior. ``r_hat``
     (p,), ``tau`` (p,) in steps and ``acceptance`` are NaN, and ``ensembles`` is zero, unless
@@ -47,6 +49,7 @@ class Posterior:
     tau: Array
     ensembles: int
     acceptance: float
+    log_posterior: Callable[[Array], float]
     noise_orders: tuple[int, ...] = ()
     dispersion: float = 1.0
 
