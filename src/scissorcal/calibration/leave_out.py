@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 
 DRAWS = 256
 DEGREES_OF_FREEDOM = 7.0
+ROUNDS = 4
+GOOD = 0.5
+"""Tail index of the weights of all strokes together, above which draws are taken once more."""
 RELIABLE = 0.7
 """Above this tail index a stroke's importance weights, and with them its density, mean nothing."""
 
@@ -49,46 +52,72 @@ def leave_strokes_out(
     ``share`` is the share of bins that are independent, and the likelihood is taken to that power,
     so that the posterior is as wide as correlated bins make it. Draws are a Sobol' sequence through
     a Student-t about ``point`` with the curvature of the tempered posterior; weights correct for
-    both the approximation and the stroke that is missing, and their k-hat judges both.
+    both the approximation and the stroke that is missing, and their k-hat judges both. Where the
+    curvature describes the posterior badly, draws are taken again from the moments that they find.
     ``information`` and ``prior_precision`` have shape (p, p); ``labelled`` masks the bins (n,) of
     each stroke.
     """
     from scipy.special import logsumexp
 
-    precision = share * information + prior_precision
-    draws, log_density = _around(point, precision)
-    by_stroke = np.stack([_densities(problem, draw, labelled) for draw in draws])
-    log_prior = np.array([float(problem.log_prior(draw)) for draw in draws])
-    inside = np.all((draws >= problem.lower) & (draws <= problem.upper), axis=1)
-    usable = inside & np.isfinite(log_prior) & np.all(np.isfinite(by_stroke), axis=1)
-    count = len(labelled)
-    if usable.sum() < DRAWS // 4:
-        return LeftOut(np.full(count, np.nan), np.full(count, np.inf))
-    tempered = share * by_stroke[usable]
-    every = log_prior[usable] + tempered.sum(axis=1) - log_density[usable]
+    tried: list[tuple[float, Array, Array]] = []
+    centre, covariance = point, _inverse(share * information + prior_precision)
+    for _ in range(ROUNDS):
+        draws, log_density = _around(centre, covariance)
+        by_stroke, log_prior = _densities(problem, draws, labelled)
+        usable = np.isfinite(log_prior) & np.all(np.isfinite(by_stroke), axis=1)
+        if usable.sum() < DRAWS // 4:
+            break
+        tempered = share * by_stroke[usable]
+        every = log_prior[usable] + tempered.sum(axis=1) - log_density[usable]
+        weights, k_hat = _smoothed(every[None, :])
+        tried.append((float(k_hat[0]), every, tempered))
+        if k_hat[0] < GOOD:
+            break
+        shares = np.exp(weights[0])
+        centre = shares @ draws[usable]
+        away = draws[usable] - centre
+        covariance = (shares * away.T) @ away + 1e-3 * covariance
+    if not tried:
+        return LeftOut(np.full(len(labelled), np.nan), np.full(len(labelled), np.inf))
+    _, every, tempered = min(tried, key=lambda one: one[0])
     weights, k_hats = _smoothed((every[:, None] - tempered).T)
     return LeftOut(np.asarray(logsumexp(weights + tempered.T, axis=1)) / share, k_hats)
 
 
-def _densities(problem: Problem, draw: Array, labelled: tuple[NDArray[np.bool_], ...]) -> Array:
-    terms = problem.log_likelihood_terms(draw)
-    return np.array([float(terms[here].sum()) for here in labelled])
+def _inverse(precision: Array) -> Array:
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray((vectors / np.maximum(values, 1e-12 * values.max())) @ vectors.T)
 
 
-def _around(point: Array, precision: Array) -> tuple[Array, Array]:
-    """Draws (DRAWS, p) of a Student-t with this precision, and their log density (DRAWS,)."""
+def _densities(
+    problem: Problem, draws: Array, labelled: tuple[NDArray[np.bool_], ...]
+) -> tuple[Array, Array]:
+    """Log density by stroke (draws, strokes) and of the prior (draws,), -inf out of bounds."""
+    rows = np.full((len(draws), len(labelled)), -np.inf)
+    log_prior = np.full(len(draws), -np.inf)
+    for index, draw in enumerate(draws):
+        if np.any(draw < problem.lower) or np.any(draw > problem.upper):
+            continue
+        terms = problem.log_likelihood_terms(draw)
+        rows[index] = [float(terms[here].sum()) for here in labelled]
+        log_prior[index] = float(problem.log_prior(draw))
+    return rows, log_prior
+
+
+def _around(centre: Array, covariance: Array) -> tuple[Array, Array]:
+    """Draws (DRAWS, p) of a Student-t, and their log density (DRAWS,) up to a constant."""
     from scipy.special import ndtri
     from scipy.stats import chi2, qmc
 
-    p, nu = len(point), DEGREES_OF_FREEDOM
+    p, nu = len(centre), DEGREES_OF_FREEDOM
     uniform = qmc.Sobol(p + 1, scramble=False).random(DRAWS) + 0.5 / DRAWS
     normal = ndtri(uniform[:, :p])
     stretch = np.sqrt(nu / chi2.ppf(uniform[:, p], nu))
-    values, vectors = np.linalg.eigh(precision)
-    root = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))
     distance = np.sum(normal**2, axis=1) * stretch**2
     log_density = -0.5 * (nu + p) * np.log1p(distance / nu)
-    return point + (normal * stretch[:, None]) @ root.T, log_density
+    return centre + (normal * stretch[:, None]) @ root.T, log_density
 
 
 def _smoothed(log_ratio: Array) -> tuple[Array, Array]:
