@@ -66,7 +66,9 @@ def assemble(
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, joint, rng)
     diagnostics["critic"] = critique.sentence
-    trust = trust_verdicts(what, effort, chosen, posterior, diagnostics, held_out, nuisance)
+    trust = trust_verdicts(
+        what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
+    )
     return FitResult(
         what=what,
         effort=effort,

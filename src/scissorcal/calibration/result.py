@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Verdict, failed
 
 Effort = Literal["draft", "standard", "thorough"]
 
@@ -186,6 +186,11 @@ class FitResult:
     prior_draws: NDArray[np.float64] | None = None
     nuisance: tuple[FittedParameter, ...] = ()
     nuisance_draws: NDArray[np.float64] | None = None
+
+    @property
+    def rejected(self) -> tuple[Verdict, ...]:
+        """The verdicts that forbid to use this fit as a calibration: all that failed."""
+        return failed(self.verdicts)
 
     def parameter(self, name: str) -> FittedParameter:
         """Return the parameter called ``name``; KeyError if this fit has none."""

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
 from scissorcal.inference import Posterior
@@ -17,6 +19,11 @@ FEWEST_INDEPENDENT = 10.0
 """Independent observations wanted per parameter."""
 HELD_OUT_LIMIT = 0.2
 """Error on unseen strokes, as a share of what all strokes measured, that a law may have."""
+OTHER_SPEED = 1.5
+"""Ratio between the fastest and the slowest motion from which speeds count as varied."""
+OTHER_CONTACT_M = 2e-3
+
+Array = NDArray[np.float64]
 
 
 def trust_verdicts(
@@ -27,39 +34,54 @@ def trust_verdicts(
     diagnostics: Mapping[str, Any],
     held_out: tuple[StrokeError, ...],
     nuisance: tuple[str, ...],
+    bins: Bins,
+    contact: Array,
 ) -> tuple[Verdict, ...]:
-    """Judge a fit: search, importance weights, bounds, data, unseen strokes."""
+    """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
     scope = f"fit.{what}"
     return (
-        _search(scope, chosen),
+        _finite(scope, chosen, posterior, diagnostics),
+        _search(scope, posterior),
         _importance(scope, effort, posterior),
         _bounds(scope, chosen),
         _identified(scope, chosen, posterior, nuisance),
+        _null(scope, posterior, nuisance),
         _independent(scope, chosen, diagnostics),
         _explained(scope, diagnostics),
+        _varied(scope, what, chosen, bins, contact),
         _unseen(scope, held_out),
     )
 
 
-def _search(scope: str, chosen: Climbed) -> Verdict:
-    ended = chosen.optimum
+def _finite(
+    scope: str, chosen: Climbed, posterior: Posterior, diagnostics: Mapping[str, Any]
+) -> Verdict:
+    wanted = ("residual_rms", "relative_error", "r_squared", "independent_share")
+    broken = [name for name in wanted if not np.isfinite(diagnostics[name])]
+    bad = ~np.all(np.isfinite(posterior.draws), axis=0) | ~np.isfinite(posterior.optimum.point)
+    broken += [name for name, no in zip(chosen.rung.layout.names, bad, strict=True) if no]
+    if broken:
+        why = (
+            f"{', '.join(broken)} did not come out as a number: check the recording for gaps, "
+            "constant channels and absurd values."
+        )
+        return Verdict(scope, "finite", "fail", float(len(broken)), 0.0, why)
+    return Verdict(scope, "finite", "pass", 0.0, 0.0, "Every number of the fit is finite.")
+
+
+def _search(scope: str, posterior: Posterior) -> Verdict:
+    ended = posterior.optimum
     status: Status = "pass" if ended.success else "fail"
     return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
 
 
 def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
-    k = posterior.k_hat
+    k = posterior.k_hat if np.isfinite(posterior.k_hat) else None
     if effort == "draft":
         why = "Draft effort does not check the posterior's shape; use --effort standard."
         return Verdict(scope, "k-hat", "not_evaluated", None, K_HAT_LIMIT, why)
-    if k < K_HAT_LIMIT:
-        why = f"The importance weights are well behaved (k-hat {k:.2f})."
-        return Verdict(scope, "k-hat", "pass", k, K_HAT_LIMIT, why)
-    why = (
-        f"The posterior is far from its approximation (k-hat {k:.2f}), so its intervals cannot be "
-        "trusted: record more varied strokes, or choose a simpler rung in the recipe."
-    )
-    return Verdict(scope, "k-hat", "fail", k if np.isfinite(k) else None, K_HAT_LIMIT, why)
+    status: Status = "pass" if posterior.status.trusted else "fail"
+    return Verdict(scope, "k-hat", status, k, K_HAT_LIMIT, posterior.sentence)
 
 
 def _bounds(scope: str, chosen: Climbed) -> Verdict:
@@ -95,6 +117,52 @@ def _identified(
         return Verdict(scope, "identifiability", "fail", ratios[worst], PRIOR_ONLY, why)
     why = f"Every parameter is narrower than its prior; {worst} is the least certain one."
     return Verdict(scope, "identifiability", "pass", ratios[worst], PRIOR_ONLY, why)
+
+
+def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+    """Directions that data leave to the prior, unless a nuisance parameter leads them."""
+    silent = [
+        direction for direction in posterior.null if direction.partition(" (")[0] not in nuisance
+    ]
+    if silent:
+        why = (
+            f"The data leave {'; '.join(silent)} to the prior: parameters named together cannot be "
+            "told apart. Record motion in which they act differently, or choose a simpler rung."
+        )
+        return Verdict(scope, "null-directions", "fail", float(len(silent)), 0.0, why)
+    why = "The data speak in every direction of the law's parameters."
+    return Verdict(scope, "null-directions", "pass", 0.0, 0.0, why)
+
+
+def _varied(scope: str, what: str, chosen: Climbed, bins: Bins, contact: Array) -> Verdict:
+    """Whether strokes differ in what the law is to be used over: speed, and where it is met."""
+    labels = np.unique(chosen.strokes)
+    if len(labels) < 2:
+        why = (
+            "There is one stroke only, so nothing says that another would agree: record several, "
+            "in both directions and at several speeds."
+        )
+        return Verdict(scope, "strokes", "fail", float(len(labels)), 2.0, why)
+    slow, fast = np.quantile(np.abs(bins.rate), [0.05, 0.95])
+    if what == "cut":
+        strokes = [np.median(bins.rate[chosen.strokes == label]) for label in labels]
+        closing = [-float(rate) for rate in strokes if rate < 0]
+        slow, fast = (min(closing), max(closing)) if closing else (slow, fast)
+    ratio = float(fast / slow) if slow > 0 else float("inf")
+    met = contact[np.isfinite(contact)]
+    reach = float(np.ptp(np.quantile(met, [0.05, 0.95]))) if len(met) else float("nan")
+    same = [] if ratio >= OTHER_SPEED else [f"speed (all near {fast:.2g})"]
+    if what == "cut" and not reach >= OTHER_CONTACT_M:
+        same.append("where the material is met along the blades")
+    if not same:
+        why = f"Strokes differ in what matters: speeds by a factor of {min(ratio, 1e6):.3g}."
+        return Verdict(scope, "strokes", "pass", min(ratio, 1e6), OTHER_SPEED, why)
+    status: Status = "fail" if what == "friction" or len(same) == 2 else "not_evaluated"
+    why = (
+        f"Strokes are alike in {' and '.join(same)}, so the fit says nothing of others: record "
+        "some that differ in it."
+    )
+    return Verdict(scope, "strokes", status, ratio, OTHER_SPEED, why)
 
 
 def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) -> Verdict:

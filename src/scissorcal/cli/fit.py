@@ -64,7 +64,11 @@ def fit(
             "rung": outcome.result.rung,
             "parameters": [parameter.name for parameter in outcome.result.parameters],
             "effort": outcome.result.effort,
+            "calibration": not outcome.result.rejected,
             "rungs": outcome.result.rungs,
+            "selection": outcome.result.selection,
+            "critic": outcome.result.critic,
+            "replay": outcome.result.replay,
             "diagnostics": outcome.result.diagnostics,
             "held_out": outcome.result.held_out,
             "inputs_hash": outcome.result.inputs_hash,
@@ -74,8 +78,16 @@ def fit(
     ]
     result = {
         "parameters": [
-            parameter.as_dict() for outcome in outcomes for parameter in outcome.result.parameters
+            parameter.as_dict()
+            for outcome in outcomes
+            for parameter in outcome.result.parameters
+            if not outcome.result.rejected
         ],
+        "not_a_calibration": {
+            outcome.what: [parameter.as_dict() for parameter in outcome.result.parameters]
+            for outcome in outcomes
+            if outcome.result.rejected
+        },
         "fits": fits,
     }
     return Answer(
@@ -91,7 +103,17 @@ def _text(outcome: "FitOutcome") -> str:
     head = f"{outcome.what}: {fitted.rung} ({fitted.effort})"
     if outcome.cached:
         head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
-    return f"{head}\n{parameter_table(fitted.parameters)}"
+    if fitted.rejected:
+        reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
+        shown = parameter_table(fitted.parameters).replace("\n", "\n  ")
+        return (
+            f"{outcome.what}: not a calibration:\n{reasons}\n"
+            f"{head}; the search ended with these numbers, which are not to be used:\n  {shown}"
+        )
+    said = [head, parameter_table(fitted.parameters), fitted.selection]
+    said += [proposal.sentence for proposal in fitted.critic]
+    said += [fitted.replay.sentence] if fitted.replay else []
+    return "\n".join(line for line in said if line)
 
 
 def parameter_table(parameters: "tuple[FittedParameter, ...]") -> str:
