@@ -294,6 +294,7 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
     independent, the same share for every rung. ``loo`` is the log density of all strokes, each by
     the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
     stroke's tail index. ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
+    ``key`` and ``values`` (by name, at the best point) are what a rung's law is drawn from.
     """
     share = best_of(climbed).share
     return tuple(
@@ -309,6 +310,11 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
             "loo_k_hat": float(candidate.left_out.k_hats.max()),
             "equivalent": candidate.rung is chosen.rung or candidate.rung.name in chosen.alike,
             "chosen": candidate.rung is chosen.rung,
+            "key": dict(candidate.rung.key),
+            "values": {
+                name: float(value)
+                for name, value in candidate.rung.layout.natural(candidate.optimum.point).items()
+            },
         }
         for candidate in climbed
     )
