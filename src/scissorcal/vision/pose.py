@@ -1,0 +1,127 @@
+"""Poses: rotation as a unit quaternion, translation in metres, and how well both are known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """T_a_b: maps points of frame b into frame a.
+
+    ``quaternion`` is (w, x, y, z), of length one, w >= 0; ``translation_m`` is b's origin in a.
+    ``covariance`` (6, 6) is that of a rotation vector in a's axes (rad), applied after the
+    rotation, and of the translation (m): R = exp(d_phi) R_mean, t = t_mean + d_t. None where nobody
+    said.
+
+    >>> turned = Pose.from_rotation_vector([0.0, 0.0, np.pi / 2], [0.1, 0.0, 0.0])
+    >>> turned.apply([[1.0, 0.0, 0.0]]).round(6)
+    array([[0.1, 1. , 0. ]])
+    """
+
+    quaternion: tuple[float, float, float, float]
+    translation_m: tuple[float, float, float]
+    covariance: Array | None = None
+
+    @staticmethod
+    def from_rotation_vector(
+        vector: ArrayLike, translation_m: ArrayLike, covariance: Array | None = None
+    ) -> "Pose":
+        """Pose of a rotation vector (rad) and a translation (m), three numbers each."""
+        from scipy.spatial.transform import Rotation
+
+        return Pose.from_matrix(
+            Rotation.from_rotvec(np.asarray(vector, dtype=np.float64)).as_matrix(),
+            translation_m,
+            covariance,
+        )
+
+    @staticmethod
+    def from_matrix(
+        matrix: ArrayLike, translation_m: ArrayLike, covariance: Array | None = None
+    ) -> "Pose":
+        """Pose of a rotation matrix (3, 3) and a translation (m)."""
+        from scipy.spatial.transform import Rotation
+
+        x, y, z, w = Rotation.from_matrix(np.asarray(matrix, dtype=np.float64)).as_quat(
+            canonical=True
+        )
+        t = np.asarray(translation_m, dtype=np.float64)
+        return Pose(
+            (float(w), float(x), float(y), float(z)),
+            (float(t[0]), float(t[1]), float(t[2])),
+            covariance,
+        )
+
+    @property
+    def matrix(self) -> Array:
+        """The rotation matrix (3, 3)."""
+        from scipy.spatial.transform import Rotation
+
+        w, x, y, z = self.quaternion
+        return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix(), dtype=np.float64)
+
+    @property
+    def rotation_vector(self) -> Array:
+        """The rotation vector (3,) in rad, of length pi at most."""
+        from scipy.spatial.transform import Rotation
+
+        w, x, y, z = self.quaternion
+        return np.asarray(Rotation.from_quat([x, y, z, w]).as_rotvec(), dtype=np.float64)
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Points (n, 3) of frame b, in frame a."""
+        given = np.asarray(points, dtype=np.float64)
+        return np.asarray(given @ self.matrix.T + np.asarray(self.translation_m))
+
+    def inverse(self) -> "Pose":
+        """T_b_a, with the covariance that goes with it."""
+        turned = self.matrix.T
+        t = np.asarray(self.translation_m)
+        covariance = None
+        if self.covariance is not None:
+            slope = np.zeros((6, 6))
+            slope[:3, :3] = -turned
+            slope[3:, :3] = -turned @ _cross(t)
+            slope[3:, 3:] = -turned
+            covariance = slope @ self.covariance @ slope.T
+        return Pose.from_matrix(turned, -turned @ t, covariance)
+
+    def after(self, other: "Pose") -> "Pose":
+        """T_a_c = T_a_b T_b_c, with ``other`` = T_b_c; what is unknown of either adds up."""
+        matrix, moved = self.matrix, self.apply([other.translation_m])[0]
+        covariance = None
+        if self.covariance is not None or other.covariance is not None:
+            own = np.zeros((6, 6)) if self.covariance is None else self.covariance
+            its = np.zeros((6, 6)) if other.covariance is None else other.covariance
+            by_own, by_its = np.eye(6), np.kron(np.eye(2), matrix)
+            by_own[3:, :3] = -_cross(moved - np.asarray(self.translation_m))
+            covariance = by_own @ own @ by_own.T + by_its @ its @ by_its.T
+        return Pose.from_matrix(matrix @ other.matrix, moved, covariance)
+
+
+def difference(a: Pose, b: Pose) -> Array:
+    """What takes ``b`` to ``a``: rotation vector (rad) in the outer frame, then translation (m)."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_matrix(a.matrix @ b.matrix.T).as_rotvec()
+    return np.concatenate([turn, np.subtract(a.translation_m, b.translation_m)])
+
+
+def left_jacobian(vector: Array) -> Array:
+    """How the rotation turns, in the outer frame, with a small change of its vector (3,)."""
+    angle = float(np.linalg.norm(vector))
+    cross = _cross(vector)
+    if angle < 1e-6:
+        return np.asarray(np.eye(3) + 0.5 * cross)
+    first = (1.0 - np.cos(angle)) / angle**2
+    second = (angle - np.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
+
+
+def _cross(vector: Array) -> Array:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
