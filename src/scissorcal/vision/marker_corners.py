@@ -96,13 +96,13 @@ def _half_way(linear: NDArray[np.float32], places: Array, outward: Array, reach:
 
 def _fitted_lines(edge: Array, outward: Array) -> tuple[Array, Array]:
     """Fit lines to points (n, 4, places, 2) by least squares with Tukey's weights."""
-    known = np.isfinite(edge).all(axis=-1)
+    known: Flags = np.asarray(np.isfinite(edge).all(axis=-1))
     points = np.where(known[..., None], edge, 0.0)
     weight = known.astype(np.float64)
-    enough = known.mean(axis=-1) > 0.6
+    enough: Flags = np.asarray(known.mean(axis=-1) > 0.6)
     usable = known | ~enough[..., None]
     for _ in range(5):
-        total = np.maximum(weight.sum(axis=-1), 1e-9)
+        total: Array = np.asarray(np.maximum(weight.sum(axis=-1), 1e-9))
         middle = (weight[..., None] * points).sum(axis=2) / total[..., None]
         off = points - middle[:, :, None]
         scatter = np.einsum("...p,...pi,...pj->...ij", weight, off, off)
@@ -111,7 +111,7 @@ def _fitted_lines(edge: Array, outward: Array) -> tuple[Array, Array]:
         normal = normal * np.sign((normal * outward).sum(axis=-1))[..., None]
         residual = np.einsum("...pi,...i->...p", off, normal)
         spread = 1.4826 * np.nanmedian(np.where(usable, np.abs(residual), np.nan), axis=-1)
-        scale = 4.0 * np.maximum(spread, 0.05)
+        scale: Array = np.asarray(4.0 * np.maximum(spread, 0.05))
         ratio = np.clip(residual / scale[..., None], -1.0, 1.0)
         weight = known * (1.0 - ratio**2) ** 2
     level = (normal * middle).sum(axis=-1)
