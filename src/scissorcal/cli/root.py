@@ -21,6 +21,7 @@ _COMMANDS = {
     "export": ("scissorcal.cli.export:export", "Write a recording as Parquet or CSV."),
     "recording": ("scissorcal.cli.recording:recording", "Look into recordings."),
     "fit": ("scissorcal.cli.fit:fit", "Fit what the scene requires; cached."),
+    "verify": ("scissorcal.cli.verify:verify", "Check whether a fit's intervals can be trusted."),
     "report": ("scissorcal.cli.report:report", "One HTML file to review, and its JSON twin."),
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
+FIT_ORDER: tuple[FitKind, ...] = ("friction", "cut")
+"""Fits in the order in which they build on one another."""
+
 
 @dataclass(frozen=True)
 class FitOutcome:
@@ -49,13 +52,8 @@ def fit_workspace(
     """
     recipe = workspace.recipe()
     needed = [item.name for item in requirements(recipe).fits]
-    order: list[FitKind] = [kind for kind in _ORDER if kind in (wanted or needed)]
-    for kind in order:
-        if kind not in needed:
-            raise InputError(
-                f"{workspace.recipe_path}: this scene requires no fit of {kind}; it requires "
-                f"{' and '.join(needed)}."
-            )
+    order: list[FitKind] = [kind for kind in FIT_ORDER if kind in (wanted or needed)]
+    _refuse_unneeded(workspace, order, needed)
     if "cut" in order and "friction" not in order and not _friction_is_current(workspace, recipe):
         order.insert(0, "friction")
     outcomes: list[FitOutcome] = []
@@ -66,21 +64,29 @@ def fit_workspace(
 
 
 def current_fits(
-    workspace: Workspace, recipe: Recipe, *, partial: bool = False
+    workspace: Workspace,
+    recipe: Recipe,
+    *,
+    partial: bool = False,
+    wanted: Sequence[FitKind] = (),
 ) -> "dict[FitKind, FitResult]":
     """Load the fits that the scene requires, as far as they are of what is there now.
 
     Raises MissingError naming the command where one is missing or its inputs changed since; with
-    ``partial`` it is enough that one is there.
+    ``partial`` it is enough that one is there. ``wanted`` names those that must be there; others
+    are left out, but for friction, which a cut builds on.
     """
     from scissorcal.calibration import load_fit
 
     fits: dict[FitKind, FitResult] = {}
     needed = [item.name for item in requirements(recipe).fits]
-    for what in (kind for kind in _ORDER if kind in needed):
+    if wanted:
+        _refuse_unneeded(workspace, wanted, needed)
+        needed = [kind for kind in needed if kind in wanted or kind == "friction"]
+    for what in (kind for kind in FIT_ORDER if kind in needed):
         path = workspace.fit_path(what)
         if not path.is_file():
-            if partial and fits:
+            if partial and fits and what not in wanted:
                 continue
             raise MissingError(f"There is no fit of {what} yet: run 'scissorcal fit' first.")
         fits[what] = load_fit(path)
@@ -119,9 +125,6 @@ def expected_hash(
     return fit_inputs_hash(what, recordings, settings, effort, upstream)
 
 
-_ORDER: tuple[FitKind, ...] = ("friction", "cut")
-
-
 def _fit(
     workspace: Workspace,
     recipe: Recipe,
@@ -152,7 +155,7 @@ def _fit(
         stored = load_fit(path)
         if stored.inputs_hash == expected_hash(workspace, recipe, what, chosen, upstream):
             return FitOutcome(what, stored, path, cached=True)
-    rng = np.random.default_rng([seed, _ORDER.index(what)])
+    rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
     if friction is None:
         result = fit_friction(
             usable.recordings, recipe.fit.friction, effort=chosen, rng=rng, progress=progress
@@ -163,6 +166,17 @@ def _fit(
         )
     save_fit(result, path)
     return FitOutcome(what, result, path, cached=False)
+
+
+def _refuse_unneeded(
+    workspace: Workspace, wanted: Sequence[FitKind], needed: Sequence[str]
+) -> None:
+    for kind in wanted:
+        if kind not in needed:
+            raise InputError(
+                f"{workspace.recipe_path}: this scene requires no fit of {kind}; it requires "
+                f"{' and '.join(needed)}."
+            )
 
 
 def _friction_is_current(workspace: Workspace, recipe: Recipe) -> bool:

@@ -22,6 +22,7 @@ SOURCES: Mapping[str, str] = {
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
+    "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or
 a function that gives the schema itself, as an object or as text."""

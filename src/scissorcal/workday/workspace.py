@@ -22,8 +22,9 @@ DEMO_MARKER = ".scissorcal-demo"
 class Workspace:
     """The file names of one workspace.
 
-    captures/<kind>-<UTC stamp>.mcap, fits/friction.nc and fits/cut.nc, report/report.html and
-    report/report.json, package/<recipe name>.zip, all below ``root``.
+    captures/<kind>-<UTC stamp>.mcap, fits/friction.nc and fits/cut.nc with their trust checks
+    fits/<what>.verify.json, report/report.html and report/report.json, package/<recipe name>.zip,
+    all below ``root``.
     """
 
     root: Path
@@ -67,6 +68,12 @@ class Workspace:
 
     def fit_path(self, what: FitKind) -> Path:
         return self.root / "fits" / f"{what}.nc"
+
+    def verify_path(self, what: FitKind) -> Path:
+        return self.root / "fits" / f"{what}.verify.json"
+
+    def verify_partial_path(self, what: FitKind) -> Path:
+        return self.root / "fits" / f"{what}.verify.partial.jsonl"
 
     def package_path(self, recipe: "Recipe") -> Path:
         return self.root / "package" / f"{recipe.name}.zip"

@@ -1,0 +1,40 @@
+"""The trust check: are intervals right, do halves of the data agree, what does the prior do?"""
+
+from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.result import (
+    Calibration,
+    Check,
+    Coverage,
+    Halves,
+    HalvesRow,
+    PriorKind,
+    RankBand,
+    RankedQuantity,
+    Sensitivity,
+    SensitivityRow,
+    VerifyResult,
+)
+from scissorcal.calibration.verify.storage import load_verify, save_verify
+from scissorcal.calibration.verify.study import Study, Task, run
+
+__all__ = [
+    "Calibration",
+    "Check",
+    "Coverage",
+    "Halves",
+    "HalvesRow",
+    "PriorKind",
+    "RankBand",
+    "RankedQuantity",
+    "Sensitivity",
+    "SensitivityRow",
+    "Study",
+    "Task",
+    "VerifyResult",
+    "assess",
+    "load_verify",
+    "make_study",
+    "run",
+    "save_verify",
+    "tasks_of",
+]

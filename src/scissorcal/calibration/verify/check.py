@@ -1,0 +1,141 @@
+"""The trust check as a whole: what has to be fitted, and what it says when it is done."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.verify.generating import generating_prior, residual_noise
+from scissorcal.calibration.verify.halves import StrokeFacts, split_strokes
+from scissorcal.calibration.verify.judgement import FALSE_ALARM, RANKS_SHARE, judge
+from scissorcal.calibration.verify.result import FORMAT, Check, PriorKind, VerifyResult
+from scissorcal.calibration.verify.study import Record, Study, Task
+from scissorcal.calibration.verify.summary import (
+    summarise_halves,
+    summarise_sensitivity,
+    summarise_simulated,
+)
+from scissorcal.errors import MissingError
+
+Array = NDArray[np.float64]
+
+_NOISE_STREAM, _HALVES_STREAM = 10, 11
+
+
+def make_study(
+    experiment: Experiment,
+    fit: FitResult,
+    *,
+    seed: int,
+    prior: PriorKind = "local",
+    spread: float = 3.0,
+    sheets: Mapping[int, int] | None = None,
+) -> Study:
+    """Say what data are simulated from and how they are parted, for a finished fit.
+
+    ``experiment`` is the fit's own design. ``sheets`` gives the piece of material of each stroke,
+    where there are several. Raises MissingError where the fit does not hold the draws it takes.
+    """
+    draws = unconstrained_draws(experiment, fit)
+    generating = generating_prior(experiment, draws, prior, spread)
+    start = draws.mean(axis=0)
+    rng = _stream(seed, _NOISE_STREAM)
+    return Study(
+        experiment=experiment,
+        effort=fit.effort,
+        seed=seed,
+        generating=generating,
+        noise=residual_noise(experiment, start, rng),
+        start=start,
+        split=split_strokes(experiment.strokes, _facts(fit, sheets or {})),
+    )
+
+
+def tasks_of(study: Study, checks: Sequence[Check], fits: int) -> tuple[Task, ...]:
+    """List the fits that ``checks`` need, the few decisive ones first."""
+    tasks: list[Task] = []
+    if "prior" in checks:
+        tasks.append(Task("whole", 0))
+    if "halves" in checks and study.split is not None:
+        tasks += [Task("half", 0), Task("half", 1)]
+    if "sbc" in checks:
+        tasks += [Task("simulated", index) for index in range(fits)]
+    return tuple(tasks)
+
+
+def assess(
+    study: Study, fit: FitResult, checks: Sequence[Check], records: Sequence[Record]
+) -> VerifyResult:
+    """Judge a fit by the records of all tasks, in any order."""
+    by_kind = {
+        kind: sorted((r for r in records if r["kind"] == kind), key=lambda r: int(r["index"]))
+        for kind in ("simulated", "half", "whole")
+    }
+    not_done: list[str] = []
+    calibration = halves = sensitivity = None
+    if "sbc" in checks:
+        units = [fit.parameter(name).unit for name in study.quantities[:-1]]
+        calibration = summarise_simulated(
+            study, by_kind["simulated"], [*units, fit.effort_unit], RANKS_SHARE
+        )
+        if calibration is None:
+            not_done += _broken(by_kind["simulated"][:1], "Every simulated fit broke")
+    if "halves" in checks:
+        broken = _broken(by_kind["half"], "A half could not be fitted")
+        if study.split is None:
+            not_done.append("There are too few strokes to part into two halves: record more.")
+        elif broken:
+            not_done += broken
+        else:
+            rng = _stream(study.seed, _HALVES_STREAM)
+            halves = summarise_halves(study, by_kind["half"], rng)
+    if "prior" in checks:
+        broken = _broken(by_kind["whole"], "The fit could not be repeated")
+        not_done += broken
+        sensitivity = None if broken else summarise_sensitivity(study, by_kind["whole"][0])
+    return VerifyResult(
+        format=FORMAT,
+        what=fit.what,
+        fit_hash=fit.inputs_hash,
+        rung=fit.rung,
+        effort=fit.effort,
+        seed=study.seed,
+        calibration=calibration,
+        halves=halves,
+        sensitivity=sensitivity,
+        not_done=tuple(not_done),
+        false_alarm=FALSE_ALARM,
+        verdicts=judge(fit.what, checks, calibration, halves, sensitivity, not_done),
+    )
+
+
+def unconstrained_draws(experiment: Experiment, fit: FitResult) -> Array:
+    """A fit's draws with those of its nuisance parameters, in unconstrained coordinates (n, p)."""
+    columns = {parameter.name: fit.draws[:, i] for i, parameter in enumerate(fit.parameters)}
+    if fit.nuisance_draws is not None:
+        columns |= {p.name: fit.nuisance_draws[:, i] for i, p in enumerate(fit.nuisance)}
+    parameters = experiment.layout.parameters
+    missing = [parameter.name for parameter in parameters if parameter.name not in columns]
+    if missing:
+        raise MissingError(
+            f"The fit of {fit.what} holds no draws of {', '.join(missing)}: an earlier version "
+            f"made it. Run 'scissorcal fit {fit.what} --force' first."
+        )
+    return np.stack([p.unconstrained(columns[p.name]) for p in parameters], axis=1)
+
+
+def _facts(fit: FitResult, sheets: Mapping[int, int]) -> tuple[StrokeFacts, ...]:
+    return tuple(
+        StrokeFacts(error.stroke, error.kind, error.speed, sheets.get(error.stroke))
+        for error in fit.held_out
+    )
+
+
+def _broken(records: Sequence[Record], what: str) -> list[str]:
+    return [f"{what} ({record['broken']})." for record in records if "broken" in record]
+
+
+def _stream(seed: int, stream: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))

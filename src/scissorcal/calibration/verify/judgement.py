@@ -1,0 +1,157 @@
+"""Verdicts of the trust check, each with its threshold and its reason."""
+
+from collections.abc import Sequence
+
+from scissorcal.calibration.verify.result import (
+    Calibration,
+    Check,
+    Halves,
+    RankedQuantity,
+    Sensitivity,
+)
+from scissorcal.calibration.verify.study import EFFORT
+from scissorcal.verdicts import Status, Verdict
+
+FALSE_ALARM = 0.01
+"""Probability that any of the statistical verdicts fails although all is right."""
+
+RANKS_SHARE = 0.5 * FALSE_ALARM
+"""What of it the calibration may use; the two verdicts on halves share the rest."""
+
+HALVES_SHARE = 0.25 * FALSE_ALARM
+FEWEST_FITS = 20
+UNRELIABLE_LIMIT = 0.05
+"""Share of simulated fits that may break or fail their own diagnostics."""
+
+
+def judge(
+    what: str,
+    checks: Sequence[Check],
+    calibration: Calibration | None,
+    halves: Halves | None,
+    sensitivity: Sensitivity | None,
+    not_done: Sequence[str],
+) -> tuple[Verdict, ...]:
+    """Judge what was asked for; what could not be made is not evaluated, for the reasons given."""
+    scope = f"verify.{what}"
+    because = " ".join(not_done) or "It could not be made."
+    verdicts: list[Verdict] = []
+    if "sbc" in checks:
+        verdicts += _calibration(scope, calibration, because)
+    if "halves" in checks:
+        verdicts += _halves(scope, halves, because)
+    if "prior" in checks:
+        verdicts.append(_prior(scope, sensitivity, because))
+    return tuple(verdicts)
+
+
+def _calibration(scope: str, found: Calibration | None, because: str) -> list[Verdict]:
+    if found is None:
+        return [Verdict(scope, "calibration", "not_evaluated", None, RANKS_SHARE, because)]
+    return [_ranks(scope, found), _refits(scope, found)]
+
+
+def _ranks(scope: str, found: Calibration) -> Verdict:
+    check, limit = "calibration", found.band.alpha
+    if found.fits < FEWEST_FITS:
+        why = f"{found.fits} simulated fits tell little; {FEWEST_FITS} are needed, better 200."
+        return Verdict(scope, check, "not_evaluated", None, limit, why)
+    worst = min(found.quantities, key=lambda quantity: quantity.ecdf_p)
+    if worst.ecdf_p >= limit:
+        why = (
+            f"In {found.fits} fits to simulated data the truth's ranks are uniform for all "
+            f"{len(found.quantities)} quantities ({worst.name} least so, p = {worst.ecdf_p:.2g})."
+        )
+        return Verdict(scope, check, "pass", worst.ecdf_p, limit, why)
+    wrong = [quantity for quantity in found.quantities if quantity.ecdf_p < limit]
+    mend = (
+        "They are on the safe side; a longer recording narrows them."
+        if all(quantity.width < 1.0 - abs(quantity.shift) for quantity in wrong)
+        else "Do not rely on these intervals: record more strokes, or choose a simpler rung or a "
+        "higher effort."
+    )
+    how = "; ".join(_how_wrong(quantity) for quantity in wrong)
+    why = f"In {found.fits} fits to simulated data {how}. {mend}"
+    return Verdict(scope, check, "fail", worst.ecdf_p, limit, why)
+
+
+def _how_wrong(quantity: RankedQuantity) -> str:
+    name, width, shift = quantity.name, quantity.width, quantity.shift
+    fifty, ninety = quantity.coverage
+    held = f"(50 % intervals held {fifty.share:.0%}, 90 % ones {ninety.share:.0%})"
+    if abs(shift) > abs(width - 1.0):
+        side = "below" if shift > 0 else "above"
+        return (
+            f"intervals of {name} lie {abs(shift):.2g} standard deviations {side} the truth {held}"
+        )
+    if width > 1.0:
+        return f"intervals of {name} are too narrow by a factor of about {width:.2g} {held}"
+    return f"intervals of {name} are too wide by a factor of about {1 / width:.2g} {held}"
+
+
+def _refits(scope: str, found: Calibration) -> Verdict:
+    every = found.fits + len(found.broken)
+    share = (found.unreliable * found.fits + len(found.broken)) / every
+    status: Status = "pass" if share <= UNRELIABLE_LIMIT else "fail"
+    why = (
+        f"{share:.1%} of {every} simulated fits broke or failed their own diagnostics, "
+        f"{found.escalated:.1%} went to a higher effort."
+    )
+    if found.broken:
+        why += f" One ended with: {found.broken[0]}"
+    return Verdict(scope, "refits", status, share, UNRELIABLE_LIMIT, why)
+
+
+def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
+    checks = ("halves", "halves-effort")
+    if found is None or found.p_value is None or found.effort_p_value is None:
+        why = because if found is None else "Each half holds too little to be judged by itself."
+        return [Verdict(scope, name, "not_evaluated", None, HALVES_SHARE, why) for name in checks]
+    largest = max((row for row in found.rows if row.z is not None), key=lambda r: abs(r.z or 0.0))
+    size = f"{largest.name} differs most, by {abs(largest.z or 0.0):.1f} standard deviations"
+    p, effort_p = found.p_value, found.effort_p_value
+    if p >= HALVES_SHARE:
+        why = f"Two halves of the data agree within what each claims (p = {p:.2g}; {size})."
+        one = Verdict(scope, checks[0], "pass", p, HALVES_SHARE, why)
+    else:
+        why = (
+            f"Two halves of the data differ by more than each claims (p = {p:.2g}; {size}): the "
+            "law or the rig changes between strokes. Look at the residuals by stroke, and repeat "
+            "some."
+        )
+        one = Verdict(scope, checks[0], "fail", p, HALVES_SHARE, why)
+    what = (
+        f"the halves' predictions differ by {found.effort_difference:.2%} of the effort's rms "
+        f"where {found.effort_expected:.2%} is expected (p = {effort_p:.2g})"
+    )
+    status: Status = "pass" if effort_p >= HALVES_SHARE else "fail"
+    return [one, Verdict(scope, checks[1], status, effort_p, HALVES_SHARE, f"{what.capitalize()}.")]
+
+
+def _prior(scope: str, found: Sensitivity | None, because: str) -> Verdict:
+    if found is None:
+        return Verdict(scope, "prior", "not_evaluated", None, None, because)
+    worst = max(found.rows, key=lambda row: row.prior)
+    effort = next(row for row in found.rows if row.name == EFFORT)
+    conflict = [row.name for row in found.rows if row.diagnosis == "prior-data conflict"]
+    weak = [row.name for row in found.rows if row.diagnosis == "weak likelihood"]
+    said = []
+    if conflict:
+        said.append(
+            f"prior and data pull {', '.join(conflict)} apart: check units and signs, or widen the "
+            "recipe's prior"
+        )
+    if weak:
+        said.append(
+            f"the data say little about {', '.join(weak)}, and the prior decides: record strokes "
+            "that excite it"
+        )
+    status: Status = "fail" if conflict or effort.prior >= found.threshold else "pass"
+    why = (
+        f"Sensitivity to the prior is {worst.prior:.2g} at most ({worst.name}); the data decide."
+        if not said
+        else "; ".join(said).capitalize() + "."
+    )
+    if weak and status == "pass":
+        why += " The predicted effort does not depend on it."
+    return Verdict(scope, "prior", status, worst.prior, found.threshold, why)

@@ -1,0 +1,169 @@
+"""What the trust check ends in: calibration, halves, prior sensitivity, verdicts."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from scissorcal.calibration.result import Effort
+from scissorcal.verdicts import Verdict
+
+FORMAT = "scissorcal-verify/1"
+
+Check = Literal["sbc", "halves", "prior"]
+Diagnosis = Literal["fine", "prior-data conflict", "weak likelihood"]
+PriorKind = Literal["local", "recipe"]
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How often the central interval of probability ``level`` held the truth.
+
+    ``share`` stays between ``low`` and ``high`` where intervals are right, for all quantities and
+    levels of one check at once.
+    """
+
+    level: float
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class RankedQuantity:
+    """One parameter, or the effort that all of them predict, over all simulated fits.
+
+    ``ranks`` and ``truths`` (fits,) are the truth's rank among the posterior's draws and its value
+    in ``unit``. ``ecdf_p`` and ``chi_square_p`` test the ranks' uniformity, by their empirical
+    distribution and in bins (None with too few fits). ``width`` is the factor by which intervals
+    are too narrow (above 1) or too wide (below 1), ``shift`` how far they lie below the truth, in
+    their own standard deviations.
+    """
+
+    name: str
+    unit: str
+    ranks: tuple[int, ...]
+    truths: tuple[float, ...]
+    ecdf_p: float
+    chi_square_p: float | None
+    width: float
+    shift: float
+    coverage: tuple[Coverage, ...]
+
+
+@dataclass(frozen=True)
+class RankBand:
+    """Simultaneous band for the share of ranks below ``z`` of their range, all (k,).
+
+    The probability that one calibrated quantity leaves it is ``alpha``.
+    """
+
+    alpha: float
+    z: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Simulation-based calibration of a fit over its own motion, with its own noise.
+
+    Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` say in words what truths and
+    data were drawn from; ``spread`` is the factor by which the local prior is wider than the
+    posterior. ``escalated`` is the share of fits that went to a higher effort by themselves,
+    ``unreliable`` that of fits whose posterior failed its own diagnostics, ``broken`` the
+    sentences of fits that gave none. ``seconds`` is the median time of a fit.
+    """
+
+    fits: int
+    levels: int
+    prior: PriorKind
+    spread: float
+    generating: str
+    noise: str
+    quantities: tuple[RankedQuantity, ...]
+    band: RankBand
+    escalated: float
+    unreliable: float
+    broken: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class HalvesRow:
+    """One parameter by two halves of the data: ``z`` is the difference over its ``sd``.
+
+    ``first``, ``second`` and ``sd`` are in ``unit``; ``z`` is taken in the fit's unconstrained
+    coordinates. ``z`` is None where both halves repeat their common prior.
+    """
+
+    name: str
+    unit: str
+    first: float
+    second: float
+    sd: float
+    z: float | None
+
+
+@dataclass(frozen=True)
+class Halves:
+    """Two fits to disjoint strokes, differenced against the uncertainty that they claim.
+
+    ``first_strokes`` and ``second_strokes`` label the strokes, ``split`` says how they were
+    parted. ``statistic`` is the difference's squared Mahalanobis length over ``dimensions``,
+    ``p_value`` its probability, from an F distribution with ``independent`` observations.
+    ``effort_difference`` is the rms difference of the predicted effort over all the motion, as a
+    share of its rms; ``effort_expected`` what the claimed uncertainty makes one expect, and
+    ``effort_p_value`` the probability of so large a one.
+    """
+
+    split: str
+    first_strokes: tuple[int, ...]
+    second_strokes: tuple[int, ...]
+    rows: tuple[HalvesRow, ...]
+    statistic: float | None
+    dimensions: int
+    independent: float
+    p_value: float | None
+    effort_difference: float
+    effort_expected: float
+    effort_p_value: float | None
+
+
+@dataclass(frozen=True)
+class SensitivityRow:
+    """Sensitivity of one quantity's posterior to the powers of prior and likelihood."""
+
+    name: str
+    prior: float
+    likelihood: float
+    diagnosis: Diagnosis
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Power-scaling sensitivities, the predicted effort's last; above ``threshold`` they matter."""
+
+    threshold: float
+    rows: tuple[SensitivityRow, ...]
+
+
+@dataclass(frozen=True)
+class VerifyResult:
+    """The trust check of one fit, as stored in fits/<what>.verify.json.
+
+    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not asked for are None;
+    ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
+    probability that any statistical verdict fails although the fit is right.
+    """
+
+    format: str
+    what: Literal["friction", "cut"]
+    fit_hash: str
+    rung: str
+    effort: Effort
+    seed: int
+    calibration: Calibration | None
+    halves: Halves | None
+    sensitivity: Sensitivity | None
+    not_done: tuple[str, ...]
+    false_alarm: float
+    verdicts: tuple[Verdict, ...]

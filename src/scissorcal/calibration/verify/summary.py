@@ -1,0 +1,172 @@
+"""From the records of single fits to calibration, difference of halves and sensitivity."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.verify.generating import noise_in_words
+from scissorcal.calibration.verify.halves import HalfFit, compare, effort_difference
+from scissorcal.calibration.verify.power import SENSITIVE, diagnose
+from scissorcal.calibration.verify.result import (
+    Calibration,
+    Coverage,
+    Halves,
+    HalvesRow,
+    RankBand,
+    RankedQuantity,
+    Sensitivity,
+    SensitivityRow,
+)
+from scissorcal.calibration.verify.study import LEVELS, Record, Study
+from scissorcal.calibration.verify.uniformity import (
+    acceptance,
+    chi_square_p_value,
+    ecdf_band,
+    ecdf_p_value,
+)
+from scissorcal.inference import gradient
+
+Array = NDArray[np.float64]
+
+COVERAGE_LEVELS = (0.5, 0.9)
+K_HAT_LIMIT = 0.7
+RUNGS = ("draft", "standard", "thorough")
+SLOPE_STEP = 1e-3
+"""Step of the effort's derivatives, in standard deviations of the difference of halves."""
+
+
+def summarise_simulated(
+    study: Study, records: Sequence[Record], units: Sequence[str], alpha: float
+) -> Calibration | None:
+    """Judge the ranks of simulated fits; None where all of them broke.
+
+    ``alpha`` is the probability that any calibrated quantity leaves the band, or any coverage its
+    limits: it is shared out evenly (Bonferroni).
+    """
+    sound = [record for record in records if "broken" not in record]
+    if not sound:
+        return None
+    ranks = np.array([record["ranks"] for record in sound], dtype=np.int64)
+    truths = np.array([record["truths"] for record in sound])
+    names = study.quantities
+    each = alpha / len(names)
+    quantities = tuple(
+        _ranked(name, unit, ranks[:, i], truths[:, i], each)
+        for i, (name, unit) in enumerate(zip(names, units, strict=True))
+    )
+    band = ecdf_band(len(sound), each)
+    higher = RUNGS.index(study.effort)
+    reached = [RUNGS.index(record["effort"]) for record in sound]
+    return Calibration(
+        fits=len(sound),
+        levels=LEVELS,
+        prior=study.generating.kind,
+        spread=study.generating.spread,
+        generating=study.generating.words,
+        noise=noise_in_words(study.noise, units[-1]),
+        quantities=quantities,
+        band=RankBand(each, _plain(band.z), _plain(band.low), _plain(band.high)),
+        escalated=float(np.mean([rung > higher for rung in reached])),
+        unreliable=float(np.mean([_unreliable(record) for record in sound])),
+        broken=tuple(record["broken"] for record in records if "broken" in record),
+        seconds=float(np.median([record["seconds"] for record in sound])),
+    )
+
+
+def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Generator) -> Halves:
+    """Difference the two halves' fits, in parameters and in the effort that they predict."""
+    experiment, layout = study.experiment, study.experiment.layout
+    assert study.split is not None
+    first, second = (
+        HalfFit(np.array(r["mean"]), np.array(r["covariance"]), r["independent"]) for r in records
+    )
+    prior = experiment.rung(experiment.observed).prior_precision
+    found = compare(first, second, prior)
+    centre = 0.5 * (first.mean + second.mean)
+    step = SLOPE_STEP * np.sqrt(np.diag(first.covariance + second.covariance))
+    slopes = gradient(experiment.mean, centre, step)
+    difference, expected, probability = effort_difference(found, slopes, rng)
+    size = float(np.sqrt(np.mean(experiment.observed**2)))
+    return Halves(
+        split=study.split.words,
+        first_strokes=_labels(experiment.strokes[study.split.first]),
+        second_strokes=_labels(experiment.strokes[study.split.second]),
+        rows=tuple(
+            _halves_row(layout, i, first, second, found.covariance, found.z) for i in study.wanted
+        ),
+        statistic=_finite(found.statistic),
+        dimensions=found.dimensions,
+        independent=found.independent,
+        p_value=_finite(found.p_value),
+        effort_difference=difference / size,
+        effort_expected=expected / size,
+        effort_p_value=_finite(probability) if found.dimensions else None,
+    )
+
+
+def summarise_sensitivity(study: Study, record: Record) -> Sensitivity:
+    """Name what the posterior owes to its prior."""
+    rows = tuple(
+        SensitivityRow(name, prior, likelihood, diagnose(prior, likelihood))
+        for name, prior, likelihood in zip(
+            study.quantities, record["prior"], record["likelihood"], strict=True
+        )
+    )
+    return Sensitivity(SENSITIVE, rows)
+
+
+def _ranked(
+    name: str, unit: str, ranks: NDArray[np.int64], truths: Array, alpha: float
+) -> RankedQuantity:
+    from scipy.stats import norm
+
+    scores = norm.ppf((ranks + 0.5) / LEVELS)
+    chi = chi_square_p_value(ranks, LEVELS)
+    return RankedQuantity(
+        name=name,
+        unit=unit,
+        ranks=tuple(ranks.tolist()),
+        truths=tuple(truths.tolist()),
+        ecdf_p=ecdf_p_value(ranks, LEVELS),
+        chi_square_p=_finite(chi),
+        width=float(np.sqrt(np.mean((scores - scores.mean()) ** 2))),
+        shift=float(scores.mean()),
+        coverage=tuple(_coverage(ranks, level, alpha) for level in COVERAGE_LEVELS),
+    )
+
+
+def _coverage(ranks: NDArray[np.int64], level: float, alpha: float) -> Coverage:
+    outside = LEVELS * (1 - level) / 2
+    inside = (ranks >= outside) & (ranks < LEVELS - outside)
+    low, high = acceptance(len(ranks), level, alpha / len(COVERAGE_LEVELS))
+    return Coverage(level, float(inside.mean()), low, high)
+
+
+def _unreliable(record: Record) -> bool:
+    k = record["k_hat"]
+    failed = record["effort"] == "standard" and (k is None or k >= K_HAT_LIMIT)
+    return failed or not record["settled"]
+
+
+def _halves_row(
+    layout: Layout, i: int, first: HalfFit, second: HalfFit, covariance: Array, z: Array
+) -> HalvesRow:
+    parameter = layout.parameters[i]
+    low, high = (float(parameter.natural(half.mean[i])) for half in (first, second))
+    middle, reach = 0.5 * (first.mean[i] + second.mean[i]), 0.5 * np.sqrt(covariance[i, i])
+    sd = float(parameter.natural(middle + reach) - parameter.natural(middle - reach))
+    return HalvesRow(parameter.name, parameter.unit, low, high, sd, _finite(z[i]))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _plain(values: Array) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _labels(strokes: NDArray[np.int64]) -> tuple[int, ...]:
+    return tuple(int(label) for label in np.unique(strokes))

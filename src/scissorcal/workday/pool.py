@@ -1,0 +1,168 @@
+"""Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, ParamSpec, TypeVar
+
+from scissorcal.errors import InputError, ScissorcalError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
+
+AHEAD = 2
+"""Jobs handed in for each worker, so that none waits for the next one."""
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Pool:
+    """An executor, how many jobs it does at a time, and how many it is handed at once."""
+
+    executor: Executor
+    workers: int
+    ahead: int = AHEAD
+
+    def work(
+        self, job: Callable[[T], R], items: Iterable[T], finished: Callable[[R], None]
+    ) -> None:
+        """Do ``job`` for every item and call ``finished`` here with each result, as they come.
+
+        Raises what a job raised, and ScissorcalError where a worker died.
+        """
+        todo = iter(items)
+        running: set[Future[R]] = set()
+        try:
+            while True:
+                while len(running) < self.workers * self.ahead:
+                    item = next(todo, _END)
+                    if item is _END:
+                        break
+                    running.add(self.executor.submit(job, item))  # type: ignore[arg-type]
+                if not running:
+                    return
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    finished(future.result())
+        except BrokenProcessPool as error:
+            raise ScissorcalError(
+                "A worker process was killed, most likely for want of memory. What was done is "
+                "kept: run the same command again, with fewer --workers."
+            ) from error
+        finally:
+            for future in running:
+                future.cancel()
+
+
+@contextmanager
+def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+    """Open processes of this machine, or the dask.distributed cluster at an address.
+
+    ``workers`` is the number of processes, all cores if not given; one worker is this process
+    itself. Processes are started afresh, with one thread of linear algebra each, and end when this
+    one does, whatever ends it. Raises InputError where the cluster cannot be reached.
+    """
+    if cluster is not None:
+        with _cluster(cluster) as pool:
+            yield pool
+        return
+    count = workers or len(os.sched_getaffinity(0))
+    if count == 1:
+        yield Pool(_Here(), 1, ahead=1)
+        return
+    context = multiprocessing.get_context("spawn")
+    with (
+        _single_threaded(),
+        ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker) as executor,
+    ):
+        try:
+            yield Pool(executor, count)
+        except BaseException:
+            executor.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+class _End:
+    pass
+
+
+_END = _End()
+
+
+class _Here(Executor):
+    """Runs each job at once, in this thread."""
+
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        future: Future[R] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - handed on to whoever asks for the result
+            future.set_exception(error)
+        return future
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Pool]:
+    try:
+        distributed: Any = import_module("dask.distributed")
+    except ImportError as error:
+        raise InputError(
+            "--cluster needs dask.distributed, which is not installed: pip install "
+            "'scissorcal[cluster]'."
+        ) from error
+    try:
+        client = distributed.Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"No dask scheduler answers at {address}: start one with 'dask scheduler' and workers "
+            "with 'dask worker ADDRESS --nthreads 1', then give its address, such as "
+            "tcp://host:8786."
+        ) from error
+    try:
+        threads = sum(client.nthreads().values())
+        if threads == 0:
+            raise InputError(
+                f"The cluster at {address} has no workers: start some with 'dask worker {address} "
+                "--nthreads 1', where scissorcal is installed."
+            )
+        with client.get_executor(pure=False) as executor:
+            yield Pool(executor, threads)
+    finally:
+        client.close()
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Let processes started meanwhile use one thread for linear algebra each."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,111 @@
+"""Results kept one by one while a long run goes on, so that a killed one loses none."""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from scissorcal.errors import InputError
+from scissorcal.recording.partfile import try_lock
+
+FORMAT = "scissorcal-records/1"
+
+Record = Mapping[str, Any]
+
+
+class RecordFile:
+    """A file of JSON lines that one run at a time appends to.
+
+    Its first line holds the hash of what the records were made from. Records of other inputs are
+    put aside under another name, never mixed with these; ``note`` then says so. A line that a
+    killed run left half-written is cut off.
+
+    >>> with RecordFile(Path("a.jsonl"), "1234") as file:
+    ...     file.append({"index": 0})
+    >>> with RecordFile(Path("a.jsonl"), "1234") as file:
+    ...     file.records
+    [{'index': 0}]
+    >>> with RecordFile(Path("a.jsonl"), "99") as file:
+    ...     file.records, file.note
+    ([], 'a.jsonl was made from other inputs; it is kept as a.jsonl.1234.')
+    """
+
+    def __init__(self, path: Path, inputs: str) -> None:
+        self.path, self.inputs = path, inputs
+        self.records: list[Record] = []
+        self.note = ""
+
+    def __enter__(self) -> "RecordFile":
+        """Open the file and read what is there. Raises InputError where another run holds it."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._open()
+        known, self.records, sound = _read(self.path)
+        if known == self.inputs:
+            self._stream.truncate(sound)
+        elif sound or self.path.stat().st_size:
+            aside = self._aside(known)
+            self._stream.close()
+            self.path.rename(aside)
+            self.note = f"{self.path.name} was made from other inputs; it is kept as {aside.name}."
+            self.records = []
+            self._open()
+        if self._stream.seek(0, os.SEEK_END) == 0:
+            self._write({"format": FORMAT, "inputs": self.inputs})
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stream.close()
+
+    def append(self, record: Record) -> None:
+        """Add one record, and hand it to the operating system before returning."""
+        self._write(record)
+        self.records.append(record)
+
+    def _open(self) -> None:
+        self._stream = self.path.open("a+b")
+        if not try_lock(self._stream):
+            self._stream.close()
+            raise InputError(
+                f"{self.path} is being written by another run of this command: wait for it, or "
+                "stop it."
+            )
+
+    def _aside(self, known: str) -> Path:
+        base = f"{self.path.name}.{known[:8] or 'unreadable'}"
+        aside, number = self.path.with_name(base), 1
+        while aside.exists():
+            number += 1
+            aside = self.path.with_name(f"{base}-{number}")
+        return aside
+
+    def _write(self, record: Record) -> None:
+        text = json.dumps(record, allow_nan=False, separators=(",", ":"))
+        self._stream.write(text.encode() + b"\n")
+        self._stream.flush()
+
+
+def _read(path: Path) -> tuple[str, list[Record], int]:
+    """The inputs' hash, the records, and the length of what is whole; an empty hash if none is."""
+    data = path.read_bytes()
+    lines = data.splitlines(keepends=True)
+    found: list[Record] = []
+    sound = 0
+    for line in lines:
+        try:
+            record = json.loads(line)
+        except ValueError:
+            break
+        if not line.endswith(b"\n") or not isinstance(record, dict):
+            break
+        found.append(record)
+        sound += len(line)
+    if not found or found[0].get("format") != FORMAT:
+        return "", [], 0
+    return str(found[0].get("inputs", "")), found[1:], sound
