@@ -90,13 +90,12 @@ def locate_board(corners: Corners, camera: Camera) -> BoardPose:
     covariance = _covariance(best, corners, camera, used, noise, kept)
     other = refined[1] if len(refined) > 1 and _apart(refined[0], refined[1]) else None
     frames = len(np.unique(corners.frame[used]))
-    tiny = np.finfo(float).tiny
     gap = (other.square - best.square) / (noise + kept * frames) if other else np.inf
     return BoardPose(
         pose=Pose.from_rotation_vector(best.pose[:3], best.pose[3:], covariance),
         other=Pose.from_rotation_vector(other.pose[:3], other.pose[3:]) if other else None,
         odds=float(np.exp(min(0.5 * gap, 700.0))),
-        ambiguity=float(np.sqrt(other.square / max(best.square, tiny))) if other else np.inf,
+        ambiguity=_ratio(other.square, best.square) if other else np.inf,
         rms_px=float(np.sqrt(np.mean(np.sum(best.residuals[used] ** 2, axis=1)))),
         sd_px=sd,
         used=used,
@@ -222,6 +221,11 @@ def _covariance(
     turn = np.eye(6)
     turn[:3, :3] = left_jacobian(best.pose[:3])
     return np.asarray(turn @ inverse @ spread @ inverse @ turn.T)
+
+
+def _ratio(worse: float, better: float) -> float:
+    """Ratio of rms errors; infinite where the better pose leaves nothing."""
+    return float(np.sqrt(worse / better)) if better > 1e-12 * worse else float(np.inf)
 
 
 def _apart(a: _Refined, b: _Refined) -> bool:
