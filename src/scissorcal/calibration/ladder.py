@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -122,8 +123,8 @@ class Climbed:
     """A rung after its fit.
 
     ``scores`` holds the log density of each stroke by a fit that had not seen it,
-    ``held_out_residuals`` (n,) that fit's error at each bin, ``left_out`` the same densities by
-    the posterior instead of by one point; ``share`` is the share of bins that are independent.
+    ``held_out_residuals`` (n,) that fit's error at each bin. ``information`` (p, p) is the
+    likelihood's at the optimum, ``share`` the share of bins that are independent.
     ``series`` and ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them,
     that cannot be told from the best one; :func:`choose` fills it in for the rung that it takes.
     """
@@ -132,12 +133,25 @@ class Climbed:
     optimum: Optimum
     scores: Array
     held_out_residuals: Array
-    left_out: LeftOut
+    information: Array
     log_likelihood: float
     share: float
     series: Integers
     strokes: Integers
     alike: tuple[str, ...] = ()
+
+    @cached_property
+    def left_out(self) -> LeftOut:
+        """Densities of strokes by the posterior without them, worked out when first asked for."""
+        labelled = tuple(self.strokes == label for label in np.unique(self.strokes))
+        return leave_strokes_out(
+            self.rung.problem(self.series),
+            self.optimum.point,
+            self.information,
+            self.rung.prior_precision,
+            labelled,
+            self.share,
+        )
 
     @property
     def observations(self) -> int:
@@ -178,9 +192,7 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
         optimum=optimum,
         scores=np.array([densities[here].sum() for here in labelled]),
         held_out_residuals=residuals,
-        left_out=leave_strokes_out(
-            problem, point, information, rung.prior_precision, labelled, white.share
-        ),
+        information=information,
         log_likelihood=problem.log_likelihood(point),
         share=white.share,
         series=series,
@@ -238,6 +250,8 @@ def choose(climbed: list[Climbed], signal_rms: float = 0.0) -> Climbed:
     The latter needs a ``signal_rms``, and suits rungs that differ in their mean only. The result
     is the rung that is used, with ``alike`` filled in, not a winner.
     """
+    if len(climbed) == 1:
+        return replace(climbed[0], alike=(climbed[0].rung.name,))
     best = best_of(climbed)
     share = best.share
     alike = [
@@ -293,10 +307,12 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
     chosen. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
     independent, the same share for every rung. ``loo`` is the log density of all strokes, each by
     the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index. ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
+    stroke's tail index; they are NaN for a single rung, as there is nothing to compare.
+    ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
     ``key`` and ``values`` (by name, at the best point) are what a rung's law is drawn from.
     """
     share = best_of(climbed).share
+    compared = len(climbed) > 1
     return tuple(
         {
             "name": candidate.rung.name,
@@ -305,9 +321,7 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
             + len(candidate.optimum.point) * float(np.log(candidate.observations * share)),
             "held_out_rms": candidate.held_out_rms,
             "held_out_score": float(candidate.scores.sum()) * share,
-            "loo": float(candidate.left_out.scores.sum()) * share,
-            "loo_se": _standard_error(candidate.left_out.scores * share),
-            "loo_k_hat": float(candidate.left_out.k_hats.max()),
+            **_loo(candidate, share if compared else float("nan")),
             "equivalent": candidate.rung is chosen.rung or candidate.rung.name in chosen.alike,
             "chosen": candidate.rung is chosen.rung,
             "key": dict(candidate.rung.key),
@@ -318,6 +332,17 @@ def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any],
         }
         for candidate in climbed
     )
+
+
+def _loo(candidate: Climbed, share: float) -> dict[str, float]:
+    if not np.isfinite(share):
+        return {"loo": share, "loo_se": share, "loo_k_hat": share}
+    found = candidate.left_out
+    return {
+        "loo": float(found.scores.sum()) * share,
+        "loo_se": _standard_error(found.scores * share),
+        "loo_k_hat": float(found.k_hats.max()),
+    }
 
 
 def _standard_error(scores: Array) -> float:
