@@ -118,6 +118,8 @@ def _diagnostics(
         "whiteness_p": white.p_value,
         "first_lag_autocorrelation": white.first_lag,
         "largest_inflation": float(posterior.inflation.max()),
+        "noise_order": ", ".join(str(order) for order in posterior.noise_orders),
+        "dispersion": posterior.dispersion,
         "residual_rms": float(np.sqrt(np.mean(residuals**2))),
         "relative_error": float(np.linalg.norm(residuals) / np.linalg.norm(measured)),
         "r_squared": float(1 - np.sum(residuals**2) / np.sum((measured - measured.mean()) ** 2)),
