@@ -1,7 +1,8 @@
 """One file per thing that is fitted: recording + model + inference -> result."""
 
-from scissorcal.calibration.cut import fit_cut
+from scissorcal.calibration.cut import cut_experiment, fit_cut
 from scissorcal.calibration.cut_data import cutting_from
+from scissorcal.calibration.cut_experiment import CutExperiment
 from scissorcal.calibration.experiment import Experiment
 from scissorcal.calibration.friction import fit_friction, friction_experiment
 from scissorcal.calibration.friction_experiment import FrictionExperiment, friction_law
@@ -10,12 +11,14 @@ from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter,
 from scissorcal.calibration.storage import load_fit, save_fit
 
 __all__ = [
+    "CutExperiment",
     "Experiment",
     "FitResult",
     "FitSeries",
     "FittedParameter",
     "FrictionExperiment",
     "StrokeError",
+    "cut_experiment",
     "cutting_from",
     "fit_cut",
     "fit_friction",

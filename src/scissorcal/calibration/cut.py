@@ -1,26 +1,30 @@
 """Fit the material's response and fracture to strokes through it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.conditioning import condition
-from scissorcal.calibration.cut_data import CutData, cutting_from
-from scissorcal.calibration.cut_ladder import NUISANCE, climb_cut_ladder
+from scissorcal.calibration.cut_data import FrictionPrior, edge_of
+from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
+from scissorcal.calibration.cut_experiment import CutExperiment
+from scissorcal.calibration.cut_ladder import climb_cut_ladder, cut_design, cut_designs
+from scissorcal.calibration.cut_motion import CutMotion, cut_motion
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import choose
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
 from scissorcal.inference import infer
+from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-ACCELERATION_CUTOFF_HZ = 150.0
 CUTOFF_HZ = 300.0
 """The latter leaves the ripple to the averaging over bins, whose effect is known exactly."""
 
@@ -38,6 +42,7 @@ def fit_cut(
     effort: Effort,
     rng: np.random.Generator,
     progress: Progress | None = None,
+    edge: EdgeBelief | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses).
 
@@ -50,44 +55,89 @@ def fit_cut(
     Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
-    every = condition(recordings, CUTOFF_HZ, ACCELERATION_CUTOFF_HZ)
-    data = CutData(every, recipe, friction)
-    _refuse_no_contact(data, recordings)
-    climbed = climb_cut_ladder(
-        data, recipe, lambda done, sentence: tell(0.5 * done, f"cut: {sentence}")
-    )
+    belief = edge or edge_of(recipe)
+    prior = FrictionPrior.of(friction)
+    motion = _motion(recordings, recipe, belief)
+    _refuse_no_contact(motion, prior, recordings)
+    designs = cut_designs(motion, prior, recipe, belief)
+    climbed = climb_cut_ladder(designs, lambda done, sentence: tell(0.5 * done, f"cut: {sentence}"))
     chosen = choose(climbed)
+    design = next(one for one in designs if one.name == chosen.rung.name)
     tell(0.5, f"cut: inferring {chosen.rung.name}")
     posterior = infer(
-        chosen.rung.problem(data.bins.series),
+        chosen.rung.problem(motion.bins.series),
         "draft" if effort == "draft" else "standard",
         rng,
         count=DRAWS,
         optimum=chosen.optimum,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
-    friction_names = data.friction_layout.names
     u = chosen.optimum.point
-    structure = {**chosen.rung.key, **data.geometry}
     return assemble(
         what="cut",
         effort=effort,
         posterior=posterior,
         climbed=climbed,
         chosen=chosen,
-        structure=structure,
-        bins=data.bins,
-        strokes=data.strokes,
-        measured=data.material_torque(u),
-        contact=data.contact(cutting_from(structure, chosen.rung.layout.natural(u))),
+        structure=design.structure,
+        bins=motion.bins,
+        strokes=motion.strokes,
+        measured=design.empty_drive(u) - motion.bins.drive,
+        contact=design.expected(u).contact,
         recordings=recordings,
         joint=recordings[0].joint,
         inputs_hash=fit_inputs_hash(
             "cut", recordings, settings_of(recipe), effort, friction.inputs_hash
         ),
-        nuisance=(*NUISANCE, *friction_names),
+        nuisance=design.nuisance,
         rng=rng,
         critic=recipe.fit.cut.critic,
+    )
+
+
+def cut_experiment(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    fit: FitResult,
+    edge: EdgeBelief | None = None,
+) -> CutExperiment:
+    """Give the design of a finished fit: its law and priors over its own motion.
+
+    All but ``fit`` are what the fit was made of; its law is taken from ``fit.structure``. A search
+    over other outcomes begins where the fit ended.
+    """
+    belief = edge or edge_of(recipe)
+    design = cut_design(
+        _motion(recordings, recipe, belief),
+        FrictionPrior.of(friction),
+        recipe,
+        belief,
+        str(fit.structure["response"]),
+        str(fit.structure["fracture"]),
+    )
+    return replace(design, begin=tuple(_where_it_ended(design, fit).tolist()))
+
+
+def _where_it_ended(design: CutExperiment, fit: FitResult) -> Array:
+    """The fit's best point; what it does not report starts at its prior's centre."""
+    layout = design.layout
+    centre = np.concatenate([design.material.mean, design.belief.mean, design.friction.mean])
+    known = {p.name: v for p, v in zip(fit.parameters, fit.map_point.tolist(), strict=True)}
+    known |= dict.fromkeys(("noise", "slow_noise"), float(fit.diagnostics["residual_rms"]))
+    for index, parameter in enumerate(layout.parameters):
+        if parameter.name in known:
+            centre[index] = float(parameter.unconstrained(np.asarray(known[parameter.name])))
+    return centre
+
+
+def _motion(recordings: tuple[Recording, ...], recipe: Recipe, belief: EdgeBelief) -> CutMotion:
+    return cut_motion(
+        condition(recordings, CUTOFF_HZ, ACCELERATION_CUTOFF_HZ),
+        belief.edge,
+        recipe.rig.moving_blades,
+        recipe.upper_face_m,
+        recipe.fit.cut.reference_indentation_mm * 1e-3,
     )
 
 
@@ -103,17 +153,21 @@ def settings_of(recipe: Recipe) -> str:
     )
 
 
-def _refuse_no_contact(data: CutData, recordings: tuple[Recording, ...]) -> None:
+def _refuse_no_contact(
+    motion: CutMotion, friction: FrictionPrior, recordings: tuple[Recording, ...]
+) -> None:
     names = ", ".join(recording.source or "the recording" for recording in recordings)
-    if len(data.bins.opening) == 0:
+    bins = motion.bins
+    if len(bins.opening) == 0:
         raise InputError(
             f"{names}: no stroke through material is marked in it; capture cuts with "
             "'scissorcal capture cut', or mark strokes and sheets when importing."
         )
-    felt = int(np.sum(data.material_torque(data.friction_mean) > FELT * data.empty_noise))
+    torque = friction.empty_drive(friction.mean, bins) - bins.drive
+    felt = int(np.sum(torque > FELT * friction.noise_Nm))
     if felt < FEWEST_CONTACT_BINS:
         raise InputError(
             f"{names}: the blades hardly touched the material (torque beyond friction in "
-            f"{felt * data.bins.bin_s:.2g} s). Check that the sheet lay between the blades and "
+            f"{felt * bins.bin_s:.2g} s). Check that the sheet lay between the blades and "
             "that advance was zero at its near edge, then capture again."
         )

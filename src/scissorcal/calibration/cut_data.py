@@ -1,7 +1,7 @@
-"""Cuts made ready for a fit: conditioned, freed from friction, with the geometry they need."""
+"""What a cut's fit needs beside its motion: friction's posterior, geometry, the law by name."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,102 +11,77 @@ from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.friction_experiment import friction_law
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.result import FitResult
-from scissorcal.model import Cutting, Edge, Response, cut_torque_along, friction_torque
+from scissorcal.model import Cutting, Edge, EdgeBelief, Response, friction_torque
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
+SIGNED = ("offset", "angle_slope", "angle_curvature")
+
 
 @dataclass(frozen=True)
-class CrackHistory:
-    """What the crack did at each bin of CutData.whole, all (n,).
+class FrictionPrior:
+    """Friction as the empty sweeps left it: normal in unconstrained coordinates.
 
-    ``advancing`` says whether it moved, ``last`` which bin moved it last (itself, while it
-    advances), ``begun`` whether the sheet has been cut into at all.
+    ``inertia`` is held at its mean: it is known to a percent, while the noise of the acceleration
+    in a cut would draw it towards zero. ``noise_Nm`` is what the sweeps left unexplained.
     """
 
-    advancing: NDArray[np.bool_]
-    last: NDArray[np.int64]
-    begun: NDArray[np.bool_]
+    layout: Layout
+    mean: Array
+    precision: Array
+    structure: Mapping[str, Any]
+    inertia: float
+    noise_Nm: float
 
-
-class CutData:
-    """Conditioned cuts with the friction they are to be freed from.
-
-    ``whole`` has every bin with a sheet in place, which the crack's history needs; ``used``
-    (whole,) marks those within strokes and surely moving, ``bins`` holds them. ``begins`` (whole,)
-    marks the first bin of each sheet, ``strokes`` numbers the strokes of the
-    used bins, ``runs`` their uninterrupted stretches.
-    """
-
-    def __init__(self, every: Bins, recipe: Recipe, friction: FitResult) -> None:
-        loaded = every.sheet >= 0
-        self.whole = every.where(loaded)
-        self.used = self.whole.moving & (self.whole.stroke >= 0)
-        self.bins = self.whole.where(self.used)
-        self.strokes = self.bins.stroke
-        self.runs = np.cumsum(~self.used)[self.used] + len(self.used) * self.bins.stroke
-        self.geometry = geometry_of(recipe)
-        self.center = float(friction.structure["angle_center"])
-        self.friction_layout, self.friction_mean, self.friction_precision = _friction_prior(
-            friction
-        )
-        self.inertia = friction.parameter("inertia").mean
-        self.empty_noise = float(friction.diagnostics["residual_rms"])
-        self.sheets = _runs(self.whole.sheet)
-        node = self.whole.rate * self.whole.bin_s / np.sqrt(12.0)
-        self.fine_opening = np.stack(
-            [self.whole.opening - node, self.whole.opening + node], axis=1
-        ).ravel()
-        self.fine_advance = np.repeat(self.whole.advance, 2)
-        self.begins = np.zeros(len(self.whole.sheet), dtype=bool)
-        self.begins[[run.start for run in self.sheets if run.stop > run.start]] = True
-
-    def material_torque(self, u: Array) -> Array:
-        """Torque that is left for the material, given a point's friction parameters (last)."""
-        own = u[-len(self.friction_layout.parameters) :]
-        values = self.friction_layout.natural(own)
-        bins = self.bins
-        empty = friction_torque(friction_law(values, self.center), bins.opening, bins.rate)
-        offset = values.get("offset", np.asarray(0.0))
-        return np.asarray(self.inertia * bins.acceleration + empty + offset - bins.drive)
-
-    def along(self, cutting: Cutting) -> tuple[Array, Array]:
-        """Model torque, averaged over each bin of ``whole``, and the crack tip at its end.
-
-        The response bends within a bin where the blades close fast, so that the mean is taken over
-        the two Gauss-Legendre points of the bin, not its middle.
-        """
-        torque = np.empty(2 * len(self.whole.opening))
-        tip = np.empty_like(torque)
-        for run in self.sheets:
-            fine = slice(2 * run.start, 2 * run.stop)
-            torque[fine], tip[fine] = cut_torque_along(
-                cutting, self.fine_opening[fine], self.fine_advance[fine], 0.0
+    @classmethod
+    def of(cls, friction: FitResult) -> "FrictionPrior":
+        """Take the prior from the posterior draws of a friction fit."""
+        columns, rows = [], []
+        for parameter in friction.parameters:
+            if parameter.name == "inertia":
+                continue
+            draws = friction.column(parameter.name)
+            signed = parameter.name in SIGNED or bool(np.any(draws <= 0.0))
+            u = draws if signed else np.log(draws)
+            columns.append(u)
+            rows.append(
+                Parameter(
+                    parameter.name,
+                    parameter.unit,
+                    "identity" if signed else "log",
+                    float(u.mean()),
+                    float(u.std(ddof=1)),
+                    parameter.meaning,
+                )
             )
-        return torque.reshape(-1, 2).mean(axis=1), tip[1::2]
+        cloud = np.stack(columns, axis=1)
+        return cls(
+            layout=Layout(tuple(rows)),
+            mean=cloud.mean(axis=0),
+            precision=np.linalg.inv(np.atleast_2d(np.cov(cloud, rowvar=False))),
+            structure=dict(friction.structure),
+            inertia=friction.parameter("inertia").mean,
+            noise_Nm=float(friction.diagnostics["residual_rms"]),
+        )
 
-    def history(self, cutting: Cutting) -> CrackHistory:
-        """When the crack advances, by a model of it."""
-        _, tip = self.along(cutting)
-        moved = np.where(self.begins, 0.0, np.diff(tip, prepend=tip[:1])) > 0
-        index = np.arange(len(tip))
-        last = np.maximum.accumulate(np.where(moved | self.begins, index, 0))
-        return CrackHistory(moved, last, tip > 0.0)
-
-    def contact(self, cutting: Cutting) -> Array:
-        """Contact x_c at every used bin."""
-        return np.asarray((self.along(cutting)[1] - self.whole.advance)[self.used])
+    def empty_drive(self, u: Array, bins: Bins) -> Array:
+        """Drive (n,) that the motion would ask for in air, at friction's parameters ``u`` (q,)."""
+        values = self.layout.natural(u)
+        law = friction_law(values, float(self.structure["angle_center"]))
+        empty = friction_torque(law, bins.opening, bins.rate)
+        offset = values.get("offset", np.asarray(0.0))
+        return np.asarray(self.inertia * bins.acceleration + empty + offset)
 
 
-def cutting_from(structure: dict[str, Any], values: dict[str, Array]) -> Cutting:
+def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Cutting:
     """The model of a cut from a fit's structure and parameters by name.
 
     ``values`` may hold scalars or arrays that broadcast with what the model is evaluated on.
+    Parameters that begin with ``edge_`` take the place of the structure's own of the edge.
     """
-    edge = structure["edge"]
     return Cutting(
-        edge=Edge(**edge),
+        edge=edge_from(structure, values),
         response=Response(
             structure["response"],
             values["response_force"],
@@ -121,9 +96,32 @@ def cutting_from(structure: dict[str, Any], values: dict[str, Array]) -> Cutting
     )
 
 
-def geometry_of(recipe: Recipe) -> dict[str, Any]:
-    """A recipe's geometry as the structure that a cut's fit carries."""
-    edge = recipe.rig.edge
+def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:
+    """The edge of a fit's structure, with the parameters among ``values`` that describe it."""
+    edge = Edge(**structure["edge"])
+    named = {name.removeprefix("edge_"): v for name, v in values.items() if _of_edge(name)}
+    if not named:
+        return edge
+    belief = EdgeBelief(edge, tuple(named), np.zeros((len(named), len(named))))
+    return belief.with_values(named)
+
+
+def edge_layout(belief: EdgeBelief) -> Layout:
+    """Parameters of an edge that is believed, with the belief as their prior."""
+    units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
+    sds = np.sqrt(np.diag(belief.covariance))
+    return Layout(
+        tuple(
+            Parameter(
+                f"edge_{name}", units.get(name, "m"), "identity", float(mean), float(sd), "the edge"
+            )
+            for name, mean, sd in zip(belief.names, belief.mean, sds, strict=True)
+        )
+    )
+
+
+def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
+    """A recipe's geometry, with the edge that is believed, as the structure of a cut's fit."""
     return {
         "closure": recipe.scene.closure,
         "reference_indentation_m": recipe.fit.cut.reference_indentation_mm * 1e-3,
@@ -131,44 +129,44 @@ def geometry_of(recipe: Recipe) -> dict[str, Any]:
         "upper_face_m": recipe.upper_face_m,
         "edge": {
             "family": edge.family,
-            "offset_m": edge.offset_mm * 1e-3,
-            "taper_rad": float(np.radians(edge.taper_deg)),
-            "length_m": edge.length_mm * 1e-3,
-            "curvature_per_m": edge.curvature_per_m,
+            "offset_m": float(edge.offset_m),
+            "taper_rad": float(edge.taper_rad),
+            "length_m": edge.length_m,
+            "curvature_per_m": float(edge.curvature_per_m),
+            **({"bend_per_m2": float(edge.bend_per_m2)} if np.any(edge.bend_per_m2) else {}),
+            **(
+                {
+                    "spline_m": tuple(np.asarray(edge.spline_m).tolist()),
+                    "spline_start_m": edge.spline_start_m,
+                }
+                if edge.family == "spline"
+                else {}
+            ),
         },
     }
 
 
-def _runs(labels: NDArray[np.int64]) -> list[slice]:
-    ends = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
-    return [slice(low, high) for low, high in pairwise(ends)]
+def edge_of(recipe: Recipe) -> EdgeBelief:
+    """The edge that a recipe states, with what it says of its uncertainty."""
+    edge = recipe.rig.edge
+    stated = Edge(
+        edge.family,
+        edge.offset_mm * 1e-3,
+        float(np.radians(edge.taper_deg)),
+        edge.length_mm * 1e-3,
+        edge.curvature_per_m,
+    )
+    sds = {
+        "offset_m": edge.offset_sd_mm * 1e-3,
+        "taper_rad": float(np.radians(edge.taper_sd_deg)),
+    }
+    open_ones = {name: sd for name, sd in sds.items() if sd > 0.0}
+    return EdgeBelief(
+        stated,
+        tuple(open_ones),
+        np.diag(np.square(list(open_ones.values()))).reshape(len(open_ones), len(open_ones)),
+    )
 
 
-def _friction_prior(friction: FitResult) -> tuple[Layout, Array, Array]:
-    """Friction's posterior as a normal prior in unconstrained coordinates.
-
-    Without the inertia, which is held at its mean: it is known to a percent, while the noise of
-    the acceleration in a cut would draw it towards zero.
-    """
-    signed = ("offset", "angle_slope", "angle_curvature")
-    columns, rows = [], []
-    for parameter in friction.parameters:
-        if parameter.name == "inertia":
-            continue
-        draws = friction.column(parameter.name)
-        signed_one = parameter.name in signed
-        u = draws if signed_one else np.log(draws)
-        columns.append(u)
-        rows.append(
-            Parameter(
-                parameter.name,
-                parameter.unit,
-                "identity" if signed_one else "log",
-                float(u.mean()),
-                float(u.std(ddof=1)),
-                parameter.meaning,
-            )
-        )
-    cloud = np.stack(columns, axis=1)
-    covariance = np.cov(cloud, rowvar=False)
-    return Layout(tuple(rows)), cloud.mean(axis=0), np.linalg.inv(covariance)
+def _of_edge(name: str) -> bool:
+    return name.startswith("edge_")

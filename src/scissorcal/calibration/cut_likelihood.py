@@ -1,32 +1,19 @@
-"""The likelihood of a cut: mean torque, noise, and what a fracture in steps adds to both."""
+"""The likelihood of a cut: blocks of bins, and resting cracks whose places are integrated out."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut_data import CrackHistory, CutData, cutting_from
-from scissorcal.calibration.layout import Layout
-from scissorcal.model import Cutting, ripple_spread
+from scissorcal.calibration.cut_expected import BLOCK_BINS, Expected
 
 Array = NDArray[np.float64]
 
-BLOCK_BINS = 8
-UNEVEN_LENGTH_M = 2e-3
-"""Length over which a sheet's toughness is taken to vary: fibres of paper, threads of cloth."""
-
-
-@dataclass(frozen=True)
-class Expected:
-    """What parameters expect of each bin's torque (n,): mean in N m, and two variances.
-
-    ``slow`` is the variance that bins of a block have in common, ``fast`` what each has alone.
-    """
-
-    mean: Array
-    slow: Array
-    fast: Array
+TRIED = np.linspace(-2.4, 2.4, 9)
+"""Places of rest that are tried first, in standard deviations from the one expected."""
+STEPS = 4
+LONGEST_STEP = 0.7
+DIFFERENCE = np.array([-1e-4, 0.0, 1e-4])
 
 
 @dataclass(frozen=True)
@@ -48,88 +35,103 @@ def make_blocks(run: NDArray[np.int64]) -> Blocks:
     return Blocks(place, first, np.bincount(first, minlength=len(run))[first])
 
 
-def split(residuals: Array, expected: Expected, blocks: Blocks) -> tuple[Array, Array]:
-    """Residuals (n,) as block means and contrasts over their standard deviations, and log of those.
+def contrasts(values: Array, blocks: Blocks) -> Array:
+    """Block means and contrasts of values (n,), by Helmert's orthonormal transform.
 
-    Helmert's orthonormal transform: the first of a block becomes its mean times the root of its
-    length, the k-th the difference between itself and the mean of those before. An uneven material
-    varies slowly and shows in the means, a ripple is fast and shows in the contrasts, so that
-    neither is taken for the other.
+    The first of a block becomes its mean times the root of its length, the k-th the difference
+    between itself and the mean of those before. An uneven material varies slowly and shows in the
+    means, a ripple is fast and shows in the contrasts, so that neither is taken for the other.
     """
     k, first, length = blocks.place, blocks.first, blocks.length
-    total = np.cumsum(residuals)
-    before = total - residuals - (total - residuals)[first]
-    last = first + length - 1
-    whole = total[last] - (total - residuals)[first]
-    contrast = (before - k * residuals) / np.sqrt(np.maximum(k * (k + 1), 1))
-    coefficients = np.where(k == 0, whole / np.sqrt(length), contrast)
-    fast = _block_mean(expected.fast, first, length)
-    slow = _block_mean(expected.slow, first, length)
-    variance = np.where(k == 0, fast + length * slow, fast)
-    return coefficients / np.sqrt(variance), 0.5 * np.log(variance)
+    total = np.cumsum(values)
+    start = (total - values)[first]
+    contrast = (total - values - start - k * values) / np.sqrt(np.maximum(k * (k + 1), 1))
+    means = (total[first + length - 1] - start) / np.sqrt(length)
+    return np.asarray(np.where(k == 0, means, contrast))
+
+
+def variance_of_contrasts(slow: Array, fast: Array, blocks: Blocks) -> Array:
+    """Variance of what :func:`contrasts` gives (n,), from what bins share and have alone."""
+    alone = _block_mean(fast, blocks.first, blocks.length)
+    shared = _block_mean(slow, blocks.first, blocks.length)
+    return np.asarray(np.where(blocks.place == 0, alone + blocks.length * shared, alone))
+
+
+def normal_terms(torque: Array, expected: Expected, blocks: Blocks) -> tuple[Array, Array]:
+    """Whitened residuals of the material's torque (n,), and log standard deviations (n,).
+
+    Where a crack rests, its place x is normal about what is expected, and integrated out: about
+    the place that fits best, torque is straight in x, so that residuals r = J (x - expected) +
+    noise have the covariance V + s^2 J J', whose root and determinant are known in closed form
+    (Sherman and Morrison 1950, doi:10.1214/aoms/1177729893). The sum of the squares is the
+    smallest over x of misfit plus prior (Laplace's method in x).
+    """
+    slow, fast = expected.variances
+    sd = np.sqrt(variance_of_contrasts(slow, fast, blocks))
+    residual = torque - expected.mean
+    if len(expected.resting.place) == 0:
+        return contrasts(residual, blocks) / sd, np.log(sd)
+    z, change, slope = _best(residual, expected)
+    borne, rest = expected.borne, expected.motion.bin_rest
+    lift = np.zeros_like(residual)
+    along = np.zeros_like(residual)
+    lift[borne.bins] = slope * z[borne.rest] - change
+    along[borne.bins] = slope
+    white = contrasts(residual + lift, blocks) / sd
+    return _integrated(white, contrasts(along, blocks) / sd, np.log(sd), rest, len(z))
+
+
+def _integrated(
+    white: Array, along: Array, log_sd: Array, rest: NDArray[np.int64], rests: int
+) -> tuple[Array, Array]:
+    group = np.where(rest < 0, rests, rest)
+    length2 = np.bincount(group, weights=along**2, minlength=rests + 1)
+    safe = np.maximum(length2, 1e-300)
+    projected = np.bincount(group, weights=along * white, minlength=rests + 1)
+    shrink = (1.0 - 1.0 / np.sqrt(1.0 + length2)) * projected / safe
+    share = along**2 / safe[group]
+    z = white - along * shrink[group]
+    return z, log_sd + 0.5 * np.log1p(length2)[group] * share
+
+
+def best_rests(torque: Array, expected: Expected) -> Array:
+    """Where the cracks rested (rests,), by the torque (n,) that re-closing onto them took."""
+    z, _, _ = _best(torque - expected.mean, expected)
+    return np.asarray(expected.resting.place + z * expected.resting.sd)
+
+
+def _best(residual: Array, expected: Expected) -> tuple[Array, Array, Array]:
+    """Best places in standard deviations (rests,), and the mean's change and slope there (b,).
+
+    The best of a few places, then Gauss-Newton steps of misfit plus prior.
+    """
+    resting, borne = expected.resting, expected.borne
+    slow, fast = expected.variances
+    rests = len(resting.place)
+    weight = 1.0 / (slow + fast)[borne.bins]
+    left = residual[borne.bins]
+
+    def summed(values: Array) -> Array:
+        counted = np.bincount(borne.rest, weights=values, minlength=rests)
+        return np.asarray(counted, dtype=np.float64)
+
+    def change(z: Array) -> Array:
+        return borne.change(resting.place + z * resting.sd)
+
+    tried = change(np.repeat(TRIED[:, None], rests, axis=1))
+    heights = np.stack([summed(weight * (left - one) ** 2) for one in tried])
+    z = TRIED[np.argmin(heights + TRIED[:, None] ** 2, axis=0)]
+    for step in range(STEPS + 1):
+        low, middle, high = change(z + DIFFERENCE[:, None])
+        slope = (high - low) / (DIFFERENCE[2] - DIFFERENCE[0])
+        if step == STEPS:
+            break
+        pull = summed(weight * slope * (left - middle)) - z
+        bend = summed(weight * slope**2) + 1.0
+        z = z + np.clip(pull / bend, -LONGEST_STEP, LONGEST_STEP)
+    return z, middle, slope
 
 
 def _block_mean(values: Array, first: NDArray[np.int64], length: NDArray[np.int64]) -> Array:
     total = np.concatenate([[0.0], np.cumsum(values)])
     return np.asarray((total[first + length] - total[first]) / length)
-
-
-class MaterialModel:
-    """What the material's parameters expect, remembering the last ones it was asked for.
-
-    Differences by friction's parameters leave the material unchanged, and the material is what
-    costs time.
-    """
-
-    def __init__(
-        self,
-        data: CutData,
-        structure: dict[str, Any],
-        layout: Layout,
-        history: CrackHistory | None = None,
-    ) -> None:
-        """Bind the data; a rippled structure needs the crack's ``history``."""
-        self.data, self.structure, self.layout, self.history = data, structure, layout, history
-        self.last: tuple[bytes, Expected] | None = None
-
-    def __call__(self, u: Array) -> Expected:
-        """Expected torque at unconstrained material parameters (p,)."""
-        key = u.tobytes()
-        if self.last is None or self.last[0] != key:
-            self.last = (key, self._expect(u))
-        return self.last[1]
-
-    def _expect(self, u: Array) -> Expected:
-        data, values = self.data, self.layout.natural(u)
-        cutting = cutting_from(self.structure, values)
-        torque, tip = data.along(cutting)
-        mean = torque[data.used]
-        travel = np.where(data.begins, 0.0, np.diff(tip, prepend=tip[:1]))[data.used]
-        blocks_apart = BLOCK_BINS * travel / UNEVEN_LENGTH_M
-        within = blocks_apart / (3.0 + blocks_apart)
-        uneven = (values["variation"] * mean) ** 2
-        slow = values["slow_noise"] ** 2 + uneven * (1.0 - within)
-        fast = values["noise"] ** 2 + uneven * within
-        if self.history is not None:
-            window = data.bins.bin_s * float(values["ripple_period"])
-            advancing, resting = self._ripple(cutting, tip, self.history, window)
-            fast = fast + (values["ripple_visibility"] * advancing[data.used]) ** 2
-            slow = slow + (values["ripple_visibility"] * resting[data.used]) ** 2
-        return Expected(mean, slow, fast)
-
-    def _ripple(
-        self, cutting: Cutting, tip: Array, history: CrackHistory, window_s: float
-    ) -> tuple[Array, Array]:
-        """Spread by the ripple at every bin: of the saw-tooth, and of where the crack rests.
-
-        The place of a resting crack is common to all bins of a rest, which blocks respect only
-        within themselves: the autocorrelation that is left widens the posterior afterwards.
-        """
-        whole = self.data.whole
-        contact = tip - whole.advance
-        spread = ripple_spread(cutting, whole.opening, whole.rate, contact, window_s)
-        place_sd = np.where(history.begun, spread.cycle_m[history.last] / np.sqrt(12.0), 0.0)
-        return (
-            np.where(history.advancing, spread.advancing, 0.0),
-            np.where(history.advancing, 0.0, spread.torque_per_metre * place_sd),
-        )

@@ -4,6 +4,7 @@ from scissorcal.model.cutting import (
     Cutting,
     cut_torque,
     cut_torque_along,
+    mean_share,
     ripple_moments,
     ripple_spread,
     settled_contact,
@@ -11,6 +12,15 @@ from scissorcal.model.cutting import (
 from scissorcal.model.edge import Edge, EdgeBelief, EdgeView, draw_edges, edge_height
 from scissorcal.model.friction import FrictionLaw, friction_torque
 from scissorcal.model.response import Response
+from scissorcal.model.stance import (
+    Settled,
+    Stance,
+    Turned,
+    held_torque,
+    settle,
+    take_stance,
+    torque_of,
+)
 
 __all__ = [
     "Cutting",
@@ -19,12 +29,20 @@ __all__ = [
     "EdgeView",
     "FrictionLaw",
     "Response",
+    "Settled",
+    "Stance",
+    "Turned",
     "cut_torque",
     "cut_torque_along",
     "draw_edges",
     "edge_height",
     "friction_torque",
+    "held_torque",
+    "mean_share",
     "ripple_moments",
     "ripple_spread",
+    "settle",
     "settled_contact",
+    "take_stance",
+    "torque_of",
 ]

@@ -25,6 +25,7 @@ class Cutting:
     is J_c h in J per metre of cut (newtons), None where nothing is cut. ``kappa`` is the share of
     the fracture energy at which a running crack stops: 1 is smooth, below 1 ripples. ``closure`` is
     the torque's law: ``work`` derives from the stored energy, ``eq4`` is tau = x_c g cos(alpha).
+    ``rate_damping`` c (s/m) makes the force at the edge g (1 + c d(delta)/dt), never below 0.
     """
 
     edge: Edge
@@ -34,6 +35,7 @@ class Cutting:
     fracture_energy: float | Array | None
     kappa: float | Array = 1.0
     closure: Literal["work", "eq4"] = "work"
+    rate_damping: float | Array = 0.0
 
 
 def cut_torque(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
@@ -91,7 +93,7 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
         slope = (sine + taper * cosine) / (cosine - taper * sine)
         cuts = slope > STEEPEST_START
         peak = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
-        force = peak * _mean_share(cutting, peak)
+        force = peak * mean_share(cutting, peak)
         target = cutting.upper_face_m - cutting.response.indentation_at(force)
         height = station * sine + edge.offset_at(station) * cosine
         rise = np.where(cuts, sine + taper * cosine, 1.0)
@@ -203,12 +205,21 @@ def ripple_spread(
     )
 
 
-def _mean_share(cutting: Cutting, peak: Array) -> Array:
+def mean_share(cutting: Cutting, peak: ArrayLike) -> Array:
+    """Mean force over a fracture cycle as a share of its peak (N), see :func:`ripple_moments`.
+
+    A power law has the same share at every peak, (1 - kappa^((n+1)/n)) / ((n+1) (1 - kappa^(1/n))).
+    """
     kappa = np.asarray(cutting.kappa)
     if np.all(kappa >= 1.0):
         return np.asarray(1.0)
     response = cutting.response
-    low, high = response.indentation_at(kappa * peak), response.indentation_at(peak)
-    length = np.maximum(high - low, 1e-30)
-    mean = (response.energy_at(high) - response.energy_at(low)) / length
-    return np.where(high - low <= 1e-12 * high, 1.0, mean / peak)
+    if response.family == "power" and np.all(kappa < 1.0 - 1e-6):
+        power = np.asarray(response.exponent)
+        low = kappa ** (1.0 / power)
+        return np.asarray((1.0 - kappa * low) / ((power + 1.0) * (1.0 - low)))
+    force = np.asarray(peak, dtype=np.float64)
+    bottom, top = response.indentation_at(kappa * force), response.indentation_at(force)
+    length = np.maximum(top - bottom, 1e-30)
+    mean = (response.energy_at(top) - response.energy_at(bottom)) / length
+    return np.where(top - bottom <= 1e-12 * top, 1.0, mean / force)

@@ -46,7 +46,8 @@ class LogNormalPrior(Section):
 class Edge(Section):
     """The cutting edge e(s) of one blade in its own frame, until photographs give it.
 
-    ``line``: e = offset + s tan(taper). ``arc``: the same plus curvature s^2 / 2.
+    ``line``: e = offset + s tan(taper). ``arc``: the same plus curvature s^2 / 2. ``offset_sd_mm``
+    and ``taper_sd_deg`` say how well both are known; 0 holds them as they are.
     """
 
     family: Literal["line", "arc"] = "line"
@@ -54,6 +55,8 @@ class Edge(Section):
     taper_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)]
     curvature_per_m: Finite = 0.0
     length_mm: Positive
+    offset_sd_mm: NonNegative = 0.0
+    taper_sd_deg: NonNegative = 0.0
 
     @model_validator(mode="after")
     def _curvature_needs_arc(self) -> Edge:
