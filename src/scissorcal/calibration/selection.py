@@ -13,6 +13,7 @@ from scissorcal.calibration.ladder import (
     Climbed,
     best_of,
 )
+from scissorcal.calibration.leave_out import RELIABLE
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
@@ -116,6 +117,6 @@ def _unreliable(climbed: list[Climbed]) -> str:
     if good >= RELIABLE_STROKES:
         return ""
     return (
-        f" PSIS-LOO had no say: for {1 - good:.0%} of the strokes its k-hat is 0.7 or more, as "
-        "single strokes decide a parameter; record more strokes of each kind."
+        f" PSIS-LOO had no say: for {1 - good:.0%} of the strokes its k-hat is {RELIABLE:.2f} or "
+        "more, as single strokes decide a parameter; record more strokes of each kind."
     )
