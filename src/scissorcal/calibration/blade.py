@@ -1,0 +1,332 @@
+"""A blade's edge from photographs: a posterior of e(s), alpha(s) and the height over the scene."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.blade_ladder import EdgeRung, fit_edge_rungs
+from scissorcal.calibration.blade_points import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.errors import InputError
+from scissorcal.inference import Effort
+from scissorcal.model import EdgeBelief, draw_edges, edge_height
+from scissorcal.recipe.schema import Recipe
+from scissorcal.verdicts import Status, Verdict
+from scissorcal.vision.blade import BladeMeasurement
+
+Array = NDArray[np.float64]
+
+SCOPE = "fit.blade"
+PLACES = 41
+MOST_SPOILT = 0.15
+MOST_DISAGREEMENT = 3.5
+HEIGHT_DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Band:
+    """A quantity along the blade or over the scene: mean, sd and the 5 % and 95 % points."""
+
+    mean: Array
+    sd: Array
+    q05: Array
+    q95: Array
+
+
+@dataclass(frozen=True)
+class PhotographRow:
+    """What one photograph gave: its points, its blur, and how far it lies from the joint fit."""
+
+    source: str
+    points: int
+    blur_px: float
+    clear_share: float
+    spoilt_share: float
+    length: float
+    away: float
+    away_sd: float
+    seen: str
+
+
+@dataclass(frozen=True)
+class BladeFit:
+    """One blade fitted to all its photographs.
+
+    ``belief`` is what a cut's fit takes as prior; lengths are metres where ``metric``, else blade
+    lengths. ``station`` (n,) are places along the edge with the bands ``offset`` (e) and ``taper``
+    (alpha, rad). ``opening`` (i,) and ``contact`` (j,) span the scene, ``height`` (i, j) is phi
+    there, None without a scale or a recipe. ``length_sd`` is the spread of the length over the
+    photographs; ``pivot_sd`` what the edge moves by for the pivot's sake.
+    """
+
+    name: str
+    belief: EdgeBelief
+    draws: Array
+    rungs: tuple[EdgeRung, ...]
+    chosen: int
+    station: Array
+    offset: Band
+    taper: Band
+    nicks: tuple[FoundNick, ...]
+    photographs: tuple[PhotographRow, ...]
+    length_sd: float
+    pivot_sd: float
+    metric: bool
+    opening: Array
+    contact: Array
+    height: Band | None
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def family(self) -> str:
+        return self.rungs[self.chosen].family
+
+
+def fit_blade(
+    measured: Sequence[BladeMeasurement],
+    recipe: Recipe | None,
+    *,
+    effort: Effort = "standard",
+    rng: np.random.Generator,
+    name: str = "blade",
+    length_m: float | None = None,
+) -> BladeFit:
+    """Fit one blade's edge to its measurements, one for each photograph.
+
+    ``length_m`` is the blade's known length, which gives shapes without a scale their size. Raises
+    InputError without any measurement, or where photographs with and without a scale are mixed.
+    """
+    if not measured:
+        raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
+    sized = tuple(_sized(one, length_m) for one in measured)
+    if len({one.metric for one in sized}) > 1:
+        raise InputError(
+            "Photographs with and without a scale cannot be fitted together: give --length-mm, or "
+            "leave one kind out."
+        )
+    metric = sized[0].metric
+    lengths = np.array([one.length for one in sized])
+    length = float(np.median(lengths))
+    cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
+    rungs, chosen = fit_edge_rungs(cells, length, effort, rng)
+    best = rungs[chosen]
+    first = min(float(c.station[0]) for c in cells)
+    last = max(float(c.station[-1]) for c in cells)
+    station = np.linspace(first, last, PLACES)
+    edges = best.belief.with_values(best.draws)
+    rows = _rows(sized, cells, best)
+    opening, contact, height = _height(best.belief, recipe, rng) if metric else _no_height()
+    pivot = [
+        float(np.sqrt(np.mean(np.sum(np.square(one.modes[:, _columns(one, "pivot")]), axis=1))))
+        for one in sized
+    ]
+    fit = BladeFit(
+        name,
+        best.belief,
+        best.draws,
+        rungs,
+        chosen,
+        station,
+        _band(edges.offset_at(station)),
+        _band(np.arctan(edges.slope_at(station))),
+        merged_nicks(cells),
+        rows,
+        float(lengths.std(ddof=1)) if len(lengths) > 1 else 0.0,
+        float(np.median(pivot)),
+        metric,
+        opening,
+        contact,
+        height,
+        (),
+        _notes(sized, best, metric),
+    )
+    return replace(fit, verdicts=_verdicts(fit))
+
+
+def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
+    """Nicks as all photographs show them: one row each, those of one place averaged."""
+    every = sorted((n for cells in photographs for n in cells.nicks), key=lambda n: n.station_m)
+    groups: list[list[FoundNick]] = []
+    for nick in every:
+        last = groups[-1][-1] if groups else None
+        near = last is not None and nick.station_m - last.station_m < 0.5 * (
+            nick.width_m + last.width_m
+        )
+        if near:
+            groups[-1].append(nick)
+        else:
+            groups.append([nick])
+    return tuple(
+        FoundNick(
+            float(np.mean([n.station_m for n in group])),
+            float(np.mean([n.width_m for n in group])),
+            float(np.mean([n.depth_m for n in group])),
+            ", ".join(dict.fromkeys(n.source for n in group)),
+        )
+        for group in groups
+    )
+
+
+def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
+    """The measurement in metres, or in blade lengths where nobody knows its size."""
+    if one.metric:
+        return one
+    factor = (length_m or 1.0) / one.length
+    return replace(
+        one,
+        station=one.station * factor,
+        offset=one.offset * factor,
+        sd=one.sd * factor,
+        modes=one.modes * factor,
+        length=one.length * factor,
+        hole_radius=one.hole_radius * factor,
+        metric=length_m is not None,
+    )
+
+
+def _columns(one: BladeMeasurement, name: str) -> list[int]:
+    return [index for index, known in enumerate(one.mode_names) if known == name]
+
+
+def _band(draws: Array) -> Band:
+    low, high = np.quantile(draws, [0.05, 0.95], axis=0)
+    return Band(draws.mean(axis=0), draws.std(axis=0, ddof=1), low, high)
+
+
+def _height(
+    belief: EdgeBelief, recipe: Recipe | None, rng: np.random.Generator
+) -> tuple[Array, Array, Band | None]:
+    """phi over the scene's openings and contacts."""
+    if recipe is None:
+        return _no_height()
+    opening = np.radians(np.linspace(*recipe.scene.opening_deg, 7))
+    contact = 1e-3 * np.linspace(*recipe.scene.contact_mm, 9)
+    edges = draw_edges(belief, rng, HEIGHT_DRAWS)
+    x, theta = np.meshgrid(contact, opening)
+    view = edge_height(edges, x.ravel(), theta.ravel() / recipe.rig.moving_blades)
+    shape = (-1, len(opening), len(contact))
+    return opening, contact, _band(view.height.reshape(shape))
+
+
+def _no_height() -> tuple[Array, Array, Band | None]:
+    return np.empty(0), np.empty(0), None
+
+
+def _rows(
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeRung
+) -> tuple[PhotographRow, ...]:
+    rows = []
+    begin = 0
+    for one, own in zip(measured, cells, strict=True):
+        count = len(own.station)
+        residual = best.residual[begin : begin + count]
+        begin += count
+        own_modes = [
+            k for k, name in enumerate(own.mode_names) if name not in ("tone", "shared mapping")
+        ]
+        spread = float(np.sqrt(np.mean(np.sum(own.modes[:, own_modes] ** 2, axis=1))))
+        rows.append(
+            PhotographRow(
+                one.source,
+                len(one.station),
+                one.edge.blur_px,
+                one.edge.good_share,
+                own.spoilt,
+                one.length,
+                float(residual.mean()),
+                float(np.hypot(spread, best.between_m)),
+                one.uncertainty,
+            )
+        )
+    return tuple(rows)
+
+
+def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
+    spoilt = max(row.spoilt_share for row in fit.photographs)
+    worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
+    checks = [
+        _verdict(
+            "clear edge",
+            spoilt,
+            MOST_SPOILT,
+            f"In {worst} {100 * spoilt:.1f} % of the edge's points belong neither to a smooth edge "
+            f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
+        )
+    ]
+    if len(fit.photographs) < 2:
+        checks.append(
+            Verdict(
+                SCOPE,
+                "photographs agree",
+                "not_evaluated",
+                None,
+                None,
+                "One photograph says nothing on how far others of the same blade would agree.",
+            )
+        )
+    else:
+        spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
+        scale = [max(row.away_sd, spread) for row in fit.photographs]
+        value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
+        checks.append(
+            _verdict(
+                "photographs agree",
+                float(value),
+                MOST_DISAGREEMENT,
+                f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
+                f"away; {MOST_DISAGREEMENT:g} are allowed.",
+            )
+        )
+    return tuple(checks)
+
+
+def _verdict(check: str, value: float, threshold: float, why: str) -> Verdict:
+    status: Status = "pass" if value <= threshold else "fail"
+    return Verdict(SCOPE, check, status, value, threshold, why)
+
+
+def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -> tuple[str, ...]:
+    notes = list(dict.fromkeys(one.uncertainty for one in measured))
+    if not metric:
+        notes.append(
+            "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
+            "length (--length-mm) or the scale (--scale) to make it an edge that can be used."
+        )
+    notes.append(
+        "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
+        "of its length; the rig's opening must count from where the blades' centrelines meet."
+    )
+    notes.append(best.status)
+    return tuple(notes)
+
+
+def blade_facts(fit: BladeFit) -> dict[str, Any]:
+    """What people and programs read of a fit: plain numbers, units in the names."""
+    unit = "mm" if fit.metric else "per_length"
+    size = 1e3 if fit.metric else 1.0
+    middle = len(fit.station) // 2
+    return {
+        "name": fit.name,
+        "family": fit.family,
+        f"offset_at_middle_{unit}": float(fit.offset.mean[middle]) * size,
+        f"offset_at_middle_sd_{unit}": float(fit.offset.sd[middle]) * size,
+        "taper_at_middle_deg": float(np.degrees(fit.taper.mean[middle])),
+        "taper_at_middle_sd_deg": float(np.degrees(fit.taper.sd[middle])),
+        f"length_{unit}": fit.belief.edge.length_m * size,
+        "rungs": [
+            {"name": rung.family, "evidence": rung.evidence, "chosen": index == fit.chosen}
+            for index, rung in enumerate(fit.rungs)
+        ],
+        "nicks": [
+            {
+                f"station_{unit}": nick.station_m * size,
+                f"width_{unit}": nick.width_m * size,
+                f"depth_{unit}": nick.depth_m * size,
+                "source": nick.source,
+            }
+            for nick in fit.nicks
+        ],
+    }
