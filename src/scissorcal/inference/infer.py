@@ -7,12 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.importance import (
-    K_HAT_LIMIT,
-    Sampled,
-    sample_by_importance,
-    sample_by_mixture,
-)
+from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
 from scissorcal.inference.laplace import Laplace, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
@@ -28,7 +23,7 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
-MIXTURE_ROUNDS = 6
+MIXTURE_ROUNDS = 5
 RIVAL = 12.0
 """Optima this far below the highest one still get a share of the draws."""
 
@@ -56,9 +51,10 @@ def infer(
 
     ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
-    fails its own check (k-hat above 0.7) it goes on by itself, unless ``escalate`` is false: first
-    with a mixture that adapts to the posterior, then, if ``budget`` allows, with ensembles. What
-    it became is said in the result. ``optimum`` may be passed if it is known already,
+    does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false, with a
+    mixture that adapts to the posterior; where it still fails its check (k-hat above 0.7, or 0.5
+    for a proposal that was adapted to draws) and ``budget`` allows, with ensembles. What it became
+    is said in the result. ``optimum`` may be passed if it is known already,
     ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
     ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`).
 
@@ -196,15 +192,16 @@ class _Run:
         first = self.counter.calls
         sampled = sample_by_importance(target, self.proposal, self.count, self.rng)
         said = f"k-hat {sampled.k_hat:.2f}"
-        if sampled.k_hat > K_HAT_LIMIT and escalate:
-            self.tell(0.5, f"{said}: one Student-t does not fit, adapting a mixture")
-            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count))
+        if sampled.k_hat > GOOD_K and escalate:
+            self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
+            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count) - 2)
             if rounds > 0:
-                sampled = sample_by_mixture(
+                mixed = sample_by_mixture(
                     target, sampled, self.proposal, 2 * self.count, self.rng, rounds
                 )
-                said += f", {sampled.k_hat:.2f} with an adapted mixture"
-        if sampled.k_hat <= K_HAT_LIMIT or not escalate:
+                said += f", {mixed.k_hat:.2f} with an adapted mixture"
+                sampled = mixed if mixed.trusted or not sampled.trusted else sampled
+        if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)
         wanted = fewest_evaluations(len(self.names))
@@ -222,8 +219,7 @@ class _Run:
         return self._walked(budget, checkpoint, sampled, "")
 
     def _weighed(self, sampled: Sampled, said: str) -> _Found:
-        good = sampled.k_hat <= K_HAT_LIMIT
-        status = SamplingStatus.WEIGHED if good else SamplingStatus.HEAVY_WEIGHTS
+        status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
         nothing = np.full(len(self.names), np.nan)
         return _Found(
             draws=sampled.resample(self.count, self.rng),

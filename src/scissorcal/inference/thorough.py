@@ -45,7 +45,10 @@ DISAGREEING_AFTER = 5.0
 STUCK_STEPS = 4 * BLOCK
 """A parameter that has not moved after so many steps never will."""
 
-JUMPS = 0.2
+STRETCHES = 0.2
+"""Share of moves along the line to one other walker, which do well where scales change."""
+
+JUMPS = 0.1
 """Share of moves by a whole difference between two walkers, which lead from mode to mode."""
 
 
@@ -69,7 +72,7 @@ class Chains:
 
 def walkers_for(size: int) -> int:
     """Walkers of one ensemble over ``size`` parameters; even, and more than twice as many."""
-    return max(12, 2 * size + 4)
+    return max(16, 2 * size + 4)
 
 
 def fewest_evaluations(size: int) -> int:
@@ -88,8 +91,9 @@ def run_ensembles(
 ) -> Chains:
     """Sample a posterior with four independent ensembles of walkers (emcee).
 
-    Moves are differences between two other walkers (ter Braak 2006,
-    doi:10.1007/s11222-006-8769-1), a fifth of them in full length. Walkers begin as draws of
+    Seven moves in ten are along differences between two other walkers (ter Braak 2006,
+    doi:10.1007/s11222-006-8769-1), one is by a whole such difference, two stretch the line to one
+    other walker (Goodman and Weare 2010, doi:10.2140/camcos.2010.5.65). Walkers begin as draws of
     ``proposal``. The run ends when what follows the burn-in is longer than 100 autocorrelation
     times of every parameter, those times have settled, and the ensembles agree; or when
     ``budget`` evaluations are used up. ``checkpoint`` is written after every 256 steps; where it
@@ -231,7 +235,11 @@ def _advance(walk: Walk, log_posterior: Callable[[Array], float]) -> Walk:
     import emcee
 
     walkers, size = walk.coords.shape
-    moves = [(emcee.moves.DEMove(), 1 - JUMPS), (emcee.moves.DEMove(gamma0=1.0), JUMPS)]
+    moves = [
+        (emcee.moves.DEMove(), 1 - STRETCHES - JUMPS),
+        (emcee.moves.StretchMove(), STRETCHES),
+        (emcee.moves.DEMove(gamma0=1.0), JUMPS),
+    ]
     sampler = emcee.EnsembleSampler(walkers, size, log_posterior, moves=moves)
     state = emcee.State(walk.coords, log_prob=walk.heights, random_state=walk.random_state)
     for last in sampler.sample(
