@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut_motion import CutMotion
-from scissorcal.model import Cutting, Settled, Stance, held_torque, settle, take_stance
+from scissorcal.model import (
+    Cutting,
+    Settled,
+    Stance,
+    damped,
+    held_torque,
+    settle,
+    take_stance,
+    torque_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -19,6 +28,8 @@ ACCELERATION_CUTOFF_HZ = 150.0
 SAMPLE_S = 1e-3
 UNSTEADY = 0.1
 """Relative spread of a ripple's period in a steady stroke."""
+
+MOST_PERIODS, PER_PERIOD = 4.0, 100
 
 BLOCK_BINS = 8
 FARTHEST_REST = 4.0
@@ -60,17 +71,22 @@ class Expected:
     ``slow`` is the variance that bins of a block share, ``fast`` what each has alone, both (n,).
     """
 
-    def __init__(self, motion: CutMotion, cutting: Cutting, spread: Spread) -> None:
-        """Settle the crack along the motion; each sheet is cut from its edge at 0 on."""
+    def __init__(
+        self, motion: CutMotion, cutting: Cutting, spread: Spread, stance: Stance | None = None
+    ) -> None:
+        """Settle the crack along the motion; each sheet is cut from its edge at 0 on.
+
+        ``stance`` is the edge on the motion's openings, where it is known already.
+        """
         self.motion, self.cutting, self.spread = motion, cutting, spread
         nodes = motion.nodes
-        self.stance: Stance = take_stance(cutting.edge, nodes.turned)
+        self.stance = stance or take_stance(cutting.edge, nodes.turned)
         self.settled: Settled | None = None
         if cutting.fracture_energy is not None:
             self.settled = settle(cutting, self.stance)
         self.run, self.resting = self._history()
         self.place = self._places(self.resting.place)
-        self.torque = held_torque(cutting, self.stance, self.place - nodes.advance, nodes.rate)
+        self.torque = self._torque()
         self.mean = motion.binned(self.torque)
 
     @cached_property
@@ -143,7 +159,10 @@ class Expected:
 
         See :func:`kept_of_a_saw_tooth`.
         """
-        kept = np.interp(self.periods, *kept_of_a_saw_tooth(self.motion.bins.bin_s))
+        kept = kept_of_a_saw_tooth(self.motion.bins.bin_s)
+        at = np.minimum(self.periods, MOST_PERIODS) * PER_PERIOD
+        low = np.minimum(at.astype(np.int64), len(kept) - 2)
+        kept = kept[low] + (at - low) * (kept[low + 1] - kept[low])
         return np.asarray(self.spread.visibility * self.saw_tooth * kept)
 
     @cached_property
@@ -163,6 +182,27 @@ class Expected:
         arrived = self.motion.arrived
         slope = np.where(self.settled.cuts[arrived], self.settled.view.slope[arrived], 1.0)
         return np.asarray(self._stroke(self.settled.peak[arrived]) / slope)
+
+    def _torque(self) -> Array:
+        """Torque at the nodes (N,): of the settled force where the crack just stands."""
+        cutting, nodes, contact = (
+            self.cutting,
+            self.motion.nodes,
+            self.place - self.motion.nodes.advance,
+        )
+        if self.settled is None:
+            return held_torque(cutting, self.stance, contact, nodes.rate)
+        settled = self.settled
+        view = settled.view
+        force = settled.force
+        if np.any(cutting.rate_damping):
+            force = damped(cutting, view, force, nodes.rate)
+        torque = torque_of(cutting, view, settled.contact, np.where(settled.cuts, force, 0.0))
+        waits = np.flatnonzero(contact != settled.contact)
+        torque[waits] = held_torque(
+            cutting, self.stance.of(waits), contact[waits], nodes.rate[waits]
+        )
+        return torque
 
     def _stroke(self, peak: Array) -> Array:
         """Indentation that one cycle of the ripple takes (m)."""
@@ -238,8 +278,10 @@ class Borne:
 
 
 @cache
-def kept_of_a_saw_tooth(bin_s: float) -> tuple[Array, Array]:
-    """Share of a saw-tooth's standard deviation that bins keep, against its periods in a bin.
+def kept_of_a_saw_tooth(bin_s: float) -> Array:
+    """Share of a saw-tooth's standard deviation that bins keep, at its periods in a bin.
+
+    By ``PER_PERIOD`` values to the period, from 0 to ``MOST_PERIODS``.
 
     Blades that are not held yield to a ripple faster than their controller: then it shows in
     their acceleration, which is low-passed forwards and backwards and differenced twice. The k-th
@@ -248,8 +290,8 @@ def kept_of_a_saw_tooth(bin_s: float) -> tuple[Array, Array]:
     differences over samples dt apart. The speed of a crack is never steady, so that the variance is
     averaged over a tenth of r about each r.
     """
-    periods = np.linspace(0.0, 4.0, 401)
-    fine = np.linspace(0.0, 6.0, 1201)
+    periods = np.linspace(0.0, MOST_PERIODS, round(MOST_PERIODS * PER_PERIOD) + 1)
+    fine = np.linspace(0.0, 1.5 * MOST_PERIODS, 1201)
     harmonic = np.arange(1, 80)[:, None]
     frequency = harmonic * fine / bin_s
     passed = 1.0 / (1.0 + (frequency / ACCELERATION_CUTOFF_HZ) ** 8)
@@ -257,4 +299,4 @@ def kept_of_a_saw_tooth(bin_s: float) -> tuple[Array, Array]:
     variance = 6.0 / np.pi**2 * np.sum((passed / harmonic) ** 2, axis=0)
     width = np.maximum(UNSTEADY * periods[:, None], 5e-3)
     weight = np.exp(-0.5 * ((fine - periods[:, None]) / width) ** 2)
-    return periods, np.sqrt((weight @ variance) / weight.sum(axis=1))
+    return np.asarray(np.sqrt((weight @ variance) / weight.sum(axis=1)))

@@ -16,7 +16,7 @@ from scissorcal.calibration.cut_motion import CutMotion
 from scissorcal.calibration.cut_simulation import draw_torque
 from scissorcal.calibration.ladder import Likelihood, Rung
 from scissorcal.calibration.layout import Layout
-from scissorcal.model import Cutting, EdgeBelief
+from scissorcal.model import Cutting, EdgeBelief, Stance, take_stance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -134,7 +134,13 @@ class CutExperiment:
             rest_phase=value("rest_phase", 0.0),
             rest_spread=value("rest_spread", 0.0),
         )
-        return Expected(self.motion, cutting_from(self.structure, values), spread)
+        stance = None if self.belief.names else self.stance
+        return Expected(self.motion, cutting_from(self.structure, values), spread, stance)
+
+    @cached_property
+    def stance(self) -> Stance:
+        """The edge that is most likely, on the motion's openings."""
+        return take_stance(self.belief.edge, self.motion.nodes.turned)
 
     @cached_property
     def blocks(self) -> Blocks:

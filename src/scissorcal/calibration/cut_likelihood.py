@@ -9,11 +9,11 @@ from scissorcal.calibration.cut_expected import BLOCK_BINS, Expected
 
 Array = NDArray[np.float64]
 
-TRIED = np.linspace(-2.4, 2.4, 9)
+TRIED = np.linspace(-2.5, 2.5, 6)
 """Places of rest that are tried first, in standard deviations from the one expected."""
 STEPS = 4
-LONGEST_STEP = 0.7
-DIFFERENCE = np.array([-1e-4, 0.0, 1e-4])
+LONGEST_STEP = 0.8
+DIFFERENCE = np.array([0.0, 1e-5])
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,8 @@ def _best(residual: Array, expected: Expected) -> tuple[Array, Array, Array]:
     heights = np.stack([summed(weight * (left - one) ** 2) for one in tried])
     z = TRIED[np.argmin(heights + TRIED[:, None] ** 2, axis=0)]
     for step in range(STEPS + 1):
-        low, middle, high = change(z + DIFFERENCE[:, None])
-        slope = (high - low) / (DIFFERENCE[2] - DIFFERENCE[0])
+        middle, beyond = change(z + DIFFERENCE[:, None])
+        slope = (beyond - middle) / DIFFERENCE[1]
         if step == STEPS:
             break
         pull = summed(weight * slope * (left - middle)) - z

@@ -140,6 +140,11 @@ def held_torque(
     view = stance.view(contact)
     force = cutting.response.force_at(cutting.upper_face_m - view.height)
     if rate is not None and np.any(cutting.rate_damping):
-        deepening = -view.lever * rate / cutting.moving_blades
-        force = force * np.maximum(1.0 + cutting.rate_damping * deepening, 0.0)
+        force = damped(cutting, view, force, rate)
     return torque_of(cutting, view, contact, force)
+
+
+def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array:
+    """The response's force (..., n) while the edge sinks in or withdraws at the opening's rate."""
+    deepening = -view.lever * rate / cutting.moving_blades
+    return np.asarray(force * np.maximum(1.0 + cutting.rate_damping * deepening, 0.0))
