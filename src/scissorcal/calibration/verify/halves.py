@@ -14,7 +14,7 @@ PIECES = 4
 SILENT = 0.02
 """Share of the variance of two unrelated halves below which they only repeat their prior."""
 
-MIXTURE_DRAWS = 200_000
+MIXTURE_DRAWS = 50_000
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,16 @@ def split_strokes(strokes: Integers, facts: Sequence[StrokeFacts]) -> Split | No
         for fact in present:
             first[strokes == fact.label] = fact.sheet in taken
         return Split(first, ~first, f"whole sheets, {len(taken)} of {len(sheets)} in one half")
-    kinds = sorted({fact.kind for fact in present})
-    for phase, kind in enumerate(kinds):
+    phase = 0
+    for kind in sorted({fact.kind for fact in present}):
         alike = sorted((fact for fact in present if fact.kind == kind), key=lambda f: f.speed)
+        if len(alike) == 1:
+            here = np.flatnonzero(strokes == alike[0].label)
+            first[here] = (np.arange(len(here)) * PIECES // len(here)) % 3 == 0
+            continue
         for index, fact in enumerate(alike):
-            here = np.flatnonzero(strokes == fact.label)
-            alone = len(alike) == 1
-            piece = np.arange(len(here)) * PIECES // len(here)
-            first[here] = piece % 3 == 0 if alone else (index + phase) % 2 == 0
+            first[strokes == fact.label] = (index + phase) % 2 == 0
+        phase += 1
     if not first.any() or first.all():
         return None
     return Split(first, ~first, "whole strokes of a kind, alternating by speed")
