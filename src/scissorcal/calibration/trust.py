@@ -120,17 +120,25 @@ def _identified(
 
 
 def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
-    """Directions that data leave to the prior, unless a nuisance parameter leads them."""
-    silent = [
-        direction for direction in posterior.null if direction.partition(" (")[0] not in nuisance
-    ]
+    """Directions that data leave to the prior; those with nuisance parameters in them may be.
+
+    What is reported of a law's parameter then still has the width that the nuisance gives it.
+    """
+
+    def names(direction: str) -> set[str]:
+        return {part.partition(" (")[0] for part in direction.split(" + ")}
+
+    silent = [direction for direction in posterior.null if not names(direction) & set(nuisance)]
     if silent:
         why = (
             f"The data leave {'; '.join(silent)} to the prior: parameters named together cannot be "
             "told apart. Record motion in which they act differently, or choose a simpler rung."
         )
         return Verdict(scope, "null-directions", "fail", float(len(silent)), 0.0, why)
+    mixed = [direction for direction in posterior.null if names(direction) - set(nuisance)]
     why = "The data speak in every direction of the law's parameters."
+    if mixed:
+        why = f"Only together with what describes the noise is anything left open: {mixed[0]}."
     return Verdict(scope, "null-directions", "pass", 0.0, 0.0, why)
 
 
@@ -143,26 +151,32 @@ def _varied(scope: str, what: str, chosen: Climbed, bins: Bins, contact: Array) 
             "in both directions and at several speeds."
         )
         return Verdict(scope, "strokes", "fail", float(len(labels)), 2.0, why)
-    slow, fast = np.quantile(np.abs(bins.rate), [0.05, 0.95])
-    if what == "cut":
-        strokes = [np.median(bins.rate[chosen.strokes == label]) for label in labels]
-        closing = [-float(rate) for rate in strokes if rate < 0]
-        slow, fast = (min(closing), max(closing)) if closing else (slow, fast)
-    ratio = float(fast / slow) if slow > 0 else float("inf")
+    medians = np.array([np.median(bins.rate[chosen.strokes == label]) for label in labels])
+    ratio, fast = _spread(-medians[medians < 0])
+    if what == "friction":
+        quarters = np.quantile(np.abs(bins.rate), [0.25, 0.75])
+        ratio, fast = max(_spread(np.abs(medians)), _spread(quarters))
     met = contact[np.isfinite(contact)]
     reach = float(np.ptp(np.quantile(met, [0.05, 0.95]))) if len(met) else float("nan")
     same = [] if ratio >= OTHER_SPEED else [f"speed (all near {fast:.2g})"]
     if what == "cut" and not reach >= OTHER_CONTACT_M:
         same.append("where the material is met along the blades")
     if not same:
-        why = f"Strokes differ in what matters: speeds by a factor of {min(ratio, 1e6):.3g}."
-        return Verdict(scope, "strokes", "pass", min(ratio, 1e6), OTHER_SPEED, why)
+        why = f"Strokes differ in what matters: speeds by a factor of {ratio:.3g}."
+        return Verdict(scope, "strokes", "pass", ratio, OTHER_SPEED, why)
     status: Status = "fail" if what == "friction" or len(same) == 2 else "not_evaluated"
     why = (
         f"Strokes are alike in {' and '.join(same)}, so the fit says nothing of others: record "
         "some that differ in it."
     )
     return Verdict(scope, "strokes", status, ratio, OTHER_SPEED, why)
+
+
+def _spread(speeds: Array) -> tuple[float, float]:
+    """Ratio of the fastest to the slowest of speeds (k,), and the fastest; 1 and 0 for none."""
+    if len(speeds) == 0 or speeds.min() <= 0:
+        return 1.0, float(speeds.max(initial=0.0))
+    return float(speeds.max() / speeds.min()), float(speeds.max())
 
 
 def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) -> Verdict:
