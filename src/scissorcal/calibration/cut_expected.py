@@ -34,8 +34,9 @@ MOST_PERIODS, PER_PERIOD = 4.0, 100
 BLOCK_BINS = 8
 FARTHEST_REST = 4.0
 """Standard deviations from where it is expected within which a crack is taken to rest."""
-SHORTEST_RESTART_M = 1e-4
-"""A crack that starts again passes from resting to running over one cycle, at least over this."""
+SHORTEST_RESTART_M = 2e-5
+"""A waiting crack starts over a length that follows from the material's unevenness, at least over
+this."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +85,35 @@ class Expected:
         self.settled: Settled | None = None
         if cutting.fracture_energy is not None:
             self.settled = settle(cutting, self.stance)
-        self.run, self.resting = self._history()
-        self.place = self._places(self.resting.place)
-        self.torque = self._torque()
+        self.run, self.breaks, self.resting = self._history()
+        self.running_torque = self._running_torque()
+        soft = nodes.soft
+        self.soft_stance = self.stance.of(soft)
+        self.waiting = np.zeros(len(nodes.advance))
+        self.torque = self.running_torque.copy()
+        self.waiting[soft], self.torque[soft] = self.held_at(
+            slice(None), self.soft_stance, np.append(self.resting.place, 0.0)[nodes.rest[soft]]
+        )
         self.mean = motion.binned(self.torque)
+
+    def held_at(
+        self, which: NDArray[np.int64] | slice, stance: Stance, place: Array
+    ) -> tuple[Array, Array]:
+        """Share in which a crack at ``place`` (..., k) still waits, and the torque (..., k).
+
+        ``which`` selects soft nodes, ``stance`` is the edge on them. A crack that rests bears what
+        the response gives, until that has grown to the peak that starts it; from then on it runs,
+        and on average bears less. The local toughness, and with it the moment, is uncertain.
+        """
+        nodes = self.motion.nodes
+        k = nodes.soft[which]
+        held = held_torque(self.cutting, stance, place - nodes.advance[k], nodes.rate[k])
+        if self.settled is None:
+            return np.ones_like(held), held
+        share = np.clip((place - self.breaks[k]) / self._restart[which] + 0.5, 0.0, 1.0)
+        waits = np.where(nodes.leaving[k], 1.0, share * share * (3.0 - 2.0 * share))
+        running = self.running_torque[k]
+        return waits, running + waits * (held - running)
 
     @cached_property
     def borne(self) -> "Borne":
@@ -95,13 +121,15 @@ class Expected:
         nodes, motion = self.motion.nodes, self.motion
         soft = nodes.soft
         rest = nodes.rest[soft]
-        margin = FARTHEST_REST * self.resting.sd[rest]
-        place = self.resting.place[rest]
-        waits = nodes.leaving[soft] | (self.run[soft] < place + margin)
-        nearest = self.stance.of(soft).view(place - margin - nodes.advance[soft])
-        soft = soft[waits & (margin > 0.0) & (nearest.height < self.cutting.upper_face_m)]
-        bins, which = np.unique(nodes.bin[soft], return_inverse=True)
-        return Borne(self, soft, self.stance.of(soft), bins, which, motion.bin_rest[bins])
+        margin = FARTHEST_REST * np.append(self.resting.sd, 0.0)[rest]
+        place = np.append(self.resting.place, 0.0)[rest]
+        late = place + margin + 0.5 * self._restart
+        waits = nodes.leaving[soft] | (self.breaks[soft] < late)
+        nearest = self.soft_stance.view(place - margin - nodes.advance[soft])
+        bears = waits & (margin > 0.0) & (nearest.height < self.cutting.upper_face_m)
+        which = np.flatnonzero(bears)
+        bins, at = np.unique(nodes.bin[soft[which]], return_inverse=True)
+        return Borne(self, which, self.soft_stance.of(which), bins, at, motion.bin_rest[bins])
 
     def mean_with(self, place: Array) -> Array:
         """Mean torque (n,) if cracks rest at ``place`` (rests,)."""
@@ -112,7 +140,10 @@ class Expected:
     @cached_property
     def contact(self) -> Array:
         """Contact x_c (n,) where the blades are near the crack, 0 elsewhere."""
-        return self.motion.binned(self.place - self.motion.nodes.advance)
+        nodes = self.motion.nodes
+        rested = np.append(self.resting.place, 0.0)[nodes.rest]
+        place = np.where(self.waiting > 0.5, rested, self.run)
+        return self.motion.binned(np.where(np.isfinite(place), place - nodes.advance, 0.0))
 
     @cached_property
     def variances(self) -> tuple[Array, Array]:
@@ -131,16 +162,8 @@ class Expected:
 
     @cached_property
     def running(self) -> Array:
-        """Share of each bin (n,) in which the crack runs on rather than rests.
-
-        A crack that rested at a phase that nobody knows starts again within a cycle.
-        """
-        nodes, motion = self.motion.nodes, self.motion
-        rested = np.append(self.resting.place, 0.0)[nodes.rest]
-        length = np.append(np.maximum(self.cycle, SHORTEST_RESTART_M), SHORTEST_RESTART_M)
-        gone = np.where(nodes.leaving, -1.0, (self.run - rested) / length[nodes.rest])
-        share = np.clip(gone + 0.5, 0.0, 1.0)
-        return motion.binned(share * share * (3.0 - 2.0 * share))
+        """Share of each bin (n,) in which the crack runs on rather than waits."""
+        return self.motion.binned(1.0 - self.waiting)
 
     @cached_property
     def periods(self) -> Array:
@@ -183,24 +206,19 @@ class Expected:
         slope = np.where(self.settled.cuts[arrived], self.settled.view.slope[arrived], 1.0)
         return np.asarray(self._stroke(self.settled.peak[arrived]) / slope)
 
-    def _torque(self) -> Array:
-        """Torque at the nodes (N,): of the settled force where the crack just stands."""
-        cutting, nodes, contact = (
-            self.cutting,
-            self.motion.nodes,
-            self.place - self.motion.nodes.advance,
-        )
+    def _running_torque(self) -> Array:
+        """Torque at the nodes (N,) if the crack runs on, on average over its ripple."""
+        cutting, nodes = self.cutting, self.motion.nodes
         if self.settled is None:
-            return held_torque(cutting, self.stance, contact, nodes.rate)
-        settled = self.settled
-        view = settled.view
-        force = settled.force
+            return held_torque(cutting, self.stance, self.run - nodes.advance, nodes.rate)
+        settled, contact = self.settled, self.run - nodes.advance
+        force = np.where(settled.cuts, settled.force, 0.0)
         if np.any(cutting.rate_damping):
-            force = damped(cutting, view, force, nodes.rate)
-        torque = torque_of(cutting, view, settled.contact, np.where(settled.cuts, force, 0.0))
-        waits = np.flatnonzero(contact != settled.contact)
-        torque[waits] = held_torque(
-            cutting, self.stance.of(waits), contact[waits], nodes.rate[waits]
+            force = damped(cutting, settled.view, force, nodes.rate)
+        torque = torque_of(cutting, settled.view, np.where(settled.cuts, contact, 0.0), force)
+        behind = np.flatnonzero(np.isfinite(contact) & (contact != settled.contact))
+        torque[behind] = held_torque(
+            cutting, self.stance.of(behind), contact[behind], nodes.rate[behind]
         )
         return torque
 
@@ -211,28 +229,35 @@ class Expected:
         response = self.cutting.response
         return response.indentation_at(peak) - response.indentation_at(self.cutting.kappa * peak)
 
-    def _places(self, resting: Array) -> Array:
-        nodes = self.motion.nodes
-        rested = np.append(resting, -np.inf)[nodes.rest]
-        return np.where(nodes.leaving, rested, np.maximum(rested, self.run))
+    @cached_property
+    def _restart(self) -> Array:
+        """Length over which a waiting crack starts to run at the soft nodes (k,), in metres."""
+        return np.maximum(3.0 * self._uneven(self.motion.nodes.soft), SHORTEST_RESTART_M)
 
-    def _uneven(self) -> Array:
-        """Standard deviation of a resting place (rests,) by the toughness there, in metres."""
-        assert self.settled is not None
-        arrived, response = self.motion.arrived, self.cutting.response
-        peak = self.settled.peak[arrived]
+    def _uneven(self, index: NDArray[np.int64]) -> Array:
+        """Standard deviation of the place at which a crack starts, by the toughness there (m)."""
+        if self.settled is None:
+            return np.zeros(len(index))
+        response = self.cutting.response
+        peak = self.settled.peak[index]
         stiffness = response.stiffness_at(response.indentation_at(peak))
-        slope = np.where(self.settled.cuts[arrived], self.settled.view.slope[arrived], 1.0)
+        slope = np.where(self.settled.cuts[index], self.settled.view.slope[index], 1.0)
         return np.asarray(self.spread.variation * peak / (stiffness * slope))
 
-    def _history(self) -> tuple[Array, Resting]:
-        """Furthest settled place since the last rest (N,), and where cracks rest."""
-        motion, nodes = self.motion, self.motion.nodes
+    def _history(self) -> tuple[Array, Array, Resting]:
+        """Furthest places since the last rest, and where cracks rest.
+
+        The first (N,) are those at which a running crack settles, the second (N,) those from
+        which a waiting one starts: there the force is at its peak.
+        """
+        motion, nodes, settled = self.motion, self.motion.nodes, self.settled
         run = np.zeros(len(nodes.advance))
+        breaks = np.full(len(nodes.advance), -np.inf)
         place = np.zeros(len(motion.arrived))
-        if self.settled is None:
-            return run, Resting(place, np.zeros_like(place))
-        tip = self.settled.contact + nodes.advance
+        if settled is None:
+            return run, breaks, Resting(place, np.zeros_like(place))
+        tip = settled.contact + nodes.advance
+        ahead = tip - self._climb(settled)
         reached = 0.0
         for first, end, rest in motion.spans:
             if rest < 0:
@@ -241,38 +266,46 @@ class Expected:
                 place[rest] = reached
             furthest = np.maximum.accumulate(tip[first:end])
             run[first:end] = np.maximum(furthest, 0.0) if rest < 0 else furthest
+            breaks[first:end] = np.maximum.accumulate(ahead[first:end])
             if end > first:
                 reached = max(reached, float(run[end - 1]))
         begun = place > 0.0
-        sd = np.hypot(self.spread.rest_spread * self.cycle, self._uneven())
+        sd = np.hypot(self.spread.rest_spread * self.cycle, self._uneven(motion.arrived))
         place = place + np.where(begun, self.spread.rest_phase * self.cycle, 0.0)
-        return run, Resting(place, np.where(begun, sd, 0.0))
+        return run, breaks, Resting(place, np.where(begun, sd, 0.0))
+
+    def _climb(self, settled: Settled) -> Array:
+        """How much nearer a crack stands at its peak force than where it settles (N,), in m."""
+        if np.all(np.asarray(self.cutting.kappa) >= 1.0):
+            return np.zeros_like(settled.peak)
+        response = self.cutting.response
+        deeper = response.indentation_at(settled.peak) - response.indentation_at(settled.force)
+        return np.asarray(deeper / np.where(settled.cuts, settled.view.slope, 1.0))
 
 
 @dataclass(frozen=True)
 class Borne:
     """The nodes (k,) and bins (b,) that bear on resting cracks.
 
-    ``which`` (k,) is a node's place among ``bins``, ``rest`` (b,) the rest of each bin.
+    ``which`` (k,) selects the motion's soft nodes, ``at`` (k,) is a node's place among ``bins``,
+    ``rest`` (b,) the rest of each bin.
     """
 
     expected: Expected
-    nodes: NDArray[np.int64]
+    which: NDArray[np.int64]
     stance: Stance
     bins: NDArray[np.int64]
-    which: NDArray[np.int64]
+    at: NDArray[np.int64]
     rest: NDArray[np.int64]
 
     def change(self, place: Array) -> Array:
         """Change of the mean torque (tries, b) if cracks rest at ``place`` (tries, rests)."""
-        expected, nodes, k = self.expected, self.expected.motion.nodes, self.nodes
-        rested = place[:, nodes.rest[k]]
-        here = np.where(nodes.leaving[k], rested, np.maximum(rested, expected.run[k]))
-        contact = here - nodes.advance[k]
-        torque = held_torque(expected.cutting, self.stance, contact, nodes.rate[k])
+        expected, nodes = self.expected, self.expected.motion.nodes
+        k = nodes.soft[self.which]
+        _, torque = expected.held_at(self.which, self.stance, place[:, nodes.rest[k]])
         parts = nodes.weight[k] * (torque - expected.torque[k])
         tries, count = len(place), len(self.bins)
-        at = self.which + count * np.arange(tries)[:, None]
+        at = self.at + count * np.arange(tries)[:, None]
         summed = np.bincount(at.ravel(), weights=parts.ravel(), minlength=tries * count)
         return np.asarray(summed, dtype=np.float64).reshape(tries, count)
 

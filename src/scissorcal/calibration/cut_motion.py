@@ -29,7 +29,7 @@ class Nodes:
     ``bin`` is the used bin that a node belongs to, -1 for those that only move the crack on;
     ``weight`` its share of it. ``rest`` is the rest that the node comes after or belongs to, -1
     before a sheet's first one, ``leaving`` whether the blades withdraw. ``soft`` (k,) indexes the
-    nodes after a rest at which the crack may still stand where it rested.
+    nodes at which the crack may still wait where it rested, or at the sheet's edge.
     """
 
     turned: Turned
@@ -185,7 +185,7 @@ def _nodes(
         weight=1.0 / count[at],
         rest=rest,
         leaving=rests.leaving[at],
-        soft=np.flatnonzero((count[at] == 2) & (rest >= 0) & (number[at] >= 0)),
+        soft=np.flatnonzero(count[at] == 2),
     )
 
 
