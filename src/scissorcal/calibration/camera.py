@@ -65,10 +65,11 @@ def fit_camera(
     if len(photos) < FEWEST_VIEWS:
         raise MissingError(_too_few(len(photos)))
     width, height = photos[0].width, photos[0].height
-    views = [SeenBoard(p.name, p.detection.points, p.detection.pixels) for p in photos]
-    refuse_parallel(views, guess(width, height))
+    views = [seen_board(photo.name, photo.detection) for photo in photos]
+    start = guess(width, height)
+    refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
-    rungs = climb(views, guess(width, height), tell)
+    rungs = climb(views, np.append(start, [0.0, 0.0]), tell)
     (chosen,) = (rung for rung in rungs if rung.chosen)
     bundle = chosen.bundle
     refuse_undetermined(bundle, width, height)
@@ -86,6 +87,7 @@ def fit_camera(
         rungs=tuple(_row(rung) for rung in rungs),
         draws=rng.multivariate_normal(bundle.camera, spread.covariance, _DRAWS, method="eigh"),
         views=rows,
+        bulge_mm=(float(1e3 * bundle.shared[-2]), float(1e3 * bundle.shared[-1])),
         noise_px=bundle.sd_px,
         stretch=spread.stretch,
         region=region,
@@ -96,6 +98,12 @@ def fit_camera(
         inputs_hash=inputs_hash,
         sources=tuple(photo.name for photo in photos),
     )
+
+
+def seen_board(name: str, detection: Detection) -> SeenBoard:
+    """Give a detection as the bundle's arrays."""
+    board = detection.board
+    return SeenBoard(name, detection.points, detection.pixels, (board.width_m, board.height_m))
 
 
 def guess(width: int, height: int) -> Array:
@@ -127,8 +135,7 @@ def slant_of(detection: Detection, width: int, height: int) -> tuple[float, floa
     """Roughly how a board is slanted before a camera not yet known: rad about x and about y."""
     import cv2
 
-    seen = SeenBoard("", detection.points, detection.pixels)
-    turn, _ = cv2.Rodrigues(first_pose(seen, guess(width, height))[:3])
+    turn, _ = cv2.Rodrigues(first_pose(seen_board("", detection), guess(width, height))[:3])
     normal = turn[:, 2] * np.sign(turn[2, 2])
     return float(np.arctan2(normal[1], normal[2])), float(np.arctan2(normal[0], normal[2]))
 

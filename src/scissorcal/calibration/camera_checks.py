@@ -45,7 +45,7 @@ def refuse_undetermined(bundle: Bundle, width: int, height: int) -> None:
     """Raise VerdictError where a fit came out with a focal length that it does not know."""
     fx, fy, cx, cy = bundle.camera[:4]
     widest = _widest_deg(_normals(bundle.poses))
-    inverse = np.linalg.pinv(bundle.information.sum(axis=0), hermitian=True)
+    inverse = np.linalg.pinv(bundle.information.sum(axis=0) + bundle.prior, hermitian=True)
     sd = float(np.sqrt(max(inverse[0, 0], 0.0))) * bundle.sd_px
     aside = max(abs(cx / width - 0.5), abs(cy / height - 0.5))
     if widest < _PARALLEL_DEG or not sd < _UNDETERMINED * fx or aside > 1.0 or min(fx, fy) <= 0.0:

@@ -66,9 +66,10 @@ class CameraFit:
     ``rungs`` lists those compared, cheapest first, each with ``name``, ``free``, ``unseen_px`` (rms
     on photographs left out), ``behind`` and ``behind_se`` (how much worse than the best, in
     log-likelihood per photograph), ``equivalent`` and ``chosen``. ``draws`` (draws, 9) are of the
-    posterior, columns as in `scissorcal.vision.camera.PARAMETERS`. ``noise_px`` is the scale of
-    corner errors, ``stretch`` the factor by which their standard errors were widened because errors
-    within a photograph go together. ``region`` (k, 2) outlines where corners were seen.
+    posterior, columns as in `scissorcal.vision.camera.PARAMETERS`. ``bulge_mm`` is how far the
+    board's middle stands out along its width and its height, ``noise_px`` the scale of corner
+    errors, ``stretch`` the factor by which standard errors were widened because errors within a
+    photograph go together. ``region`` (k, 2) outlines where corners were seen.
     """
 
     camera: Camera
@@ -78,6 +79,7 @@ class CameraFit:
     rungs: tuple[Mapping[str, Any], ...]
     draws: Array
     views: tuple[ViewError, ...]
+    bulge_mm: tuple[float, float]
     noise_px: float
     stretch: float
     region: Array

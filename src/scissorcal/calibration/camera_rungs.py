@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.bundle import (
     DEGREES_OF_FREEDOM,
+    SHARED,
     Bundle,
     SeenBoard,
     Structure,
@@ -22,11 +23,12 @@ FOLDS = 5
 _SQUARE = (("fx", "fy"), ("cx",), ("cy",))
 
 
-def _structure(*groups: tuple[str, ...]) -> Structure:
-    spread = np.zeros((len(PARAMETERS), len(groups)))
+def _structure(*camera: tuple[str, ...]) -> Structure:
+    groups = (*camera, ("bulge_x",), ("bulge_y",))
+    spread = np.zeros((len(SHARED), len(groups)))
     for column, group in enumerate(groups):
         for name in group:
-            spread[PARAMETERS.index(name), column] = 1.0
+            spread[SHARED.index(name), column] = 1.0
     return Structure(tuple(group[0] if len(group) == 1 else "f" for group in groups), spread)
 
 
@@ -41,7 +43,7 @@ RUNGS: tuple[tuple[str, Structure], ...] = (
     ),
     ("k1, k2, p1, p2, k3, oblong pixels", _structure(*((name,) for name in PARAMETERS))),
 )
-"""Pixels are square (fx = fy) but on the upper two rungs."""
+"""Pixels are square (fx = fy) but on the upper two rungs. The board may bulge on every rung."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +71,11 @@ def climb(
     paired differences over photographs. The cheapest such is chosen: what a richer one gains, the
     data cannot tell from chance.
     """
-    camera = start
+    shared = start
     bundles = []
     for _, structure in RUNGS:
-        bundles.append(fit_bundle(views, structure, camera))
-        camera = bundles[-1].camera
+        bundles.append(fit_bundle(views, structure, shared))
+        shared = bundles[-1].shared
     sd = bundles[-1].sd_px
     losses, errors = [], []
     for index, (name, structure) in enumerate(RUNGS):
@@ -102,10 +104,10 @@ def unseen_residuals(
     for fold in range(folds):
         seen = [index for index in range(len(views)) if index % folds != fold]
         trained = fit_bundle(
-            [views[index] for index in seen], structure, whole.camera, whole.poses[seen]
+            [views[index] for index in seen], structure, whole.shared, whole.poses[seen]
         )
         for index in range(fold, len(views), folds):
-            found[index] = fit_pose(views[index], trained.camera, whole.poses[index])
+            found[index] = fit_pose(views[index], trained.shared, whole.poses[index])
     return found
 
 

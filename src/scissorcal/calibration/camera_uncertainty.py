@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.bundle import Bundle, SeenBoard, fit_bundle, projected
 from scissorcal.calibration.camera_result import CrossValidation, PixelMap
-from scissorcal.vision.camera import Camera
+from scissorcal.vision.camera import PARAMETERS, Camera
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,8 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
     from elsewhere.
     """
     structure = bundle.structure
-    root = np.linalg.cholesky(bundle.information.sum(axis=0))
-    back = np.linalg.inv(root)
-    noise = back @ bundle.noise @ back.T
+    back = np.linalg.inv(np.linalg.cholesky(bundle.information.sum(axis=0) + bundle.prior))
+    noise = back @ (bundle.noise + bundle.sd_px**2 * bundle.prior) @ back.T
     if stretch is None:
         pulls = np.array(
             [
@@ -54,7 +53,8 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
         ratio = float(np.trace(np.linalg.solve(noise, pulls.T @ pulls))) / len(back)
         stretch = float(np.sqrt(max(ratio, 1.0)))
     single = back.T @ noise @ back
-    return Spread(stretch**2 * structure.spread @ single @ structure.spread.T, stretch)
+    own = structure.spread[: len(PARAMETERS)]
+    return Spread(stretch**2 * own @ single @ own.T, stretch)
 
 
 def _inverse_root(symmetric: Array) -> Array:
@@ -67,7 +67,7 @@ def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] 
     if len(views) < FEWEST_VIEWS:
         return None
     first, second = (
-        fit_bundle(views[at::2], bundle.structure, bundle.camera, bundle.poses[at::2])
+        fit_bundle(views[at::2], bundle.structure, bundle.shared, bundle.poses[at::2])
         for at in (0, 1)
     )
     return first, second
