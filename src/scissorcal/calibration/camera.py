@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.bundle import Bundle, SeenBoard, first_pose
+from scissorcal.calibration.bundle import Bundle, SeenBoard
 from scissorcal.calibration.camera_checks import (
     FEWEST_VIEWS,
     OUTLYING,
@@ -129,15 +129,6 @@ def tilt_of(pose: Array) -> float:
 
     turn, _ = cv2.Rodrigues(pose[:3])
     return float(np.arccos(np.clip(abs(turn[2, 2]), 0.0, 1.0)))
-
-
-def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
-    """Roughly how a board is slanted before a camera not yet known: rad about x and about y."""
-    import cv2
-
-    turn, _ = cv2.Rodrigues(first_pose(seen_board("", detection), guess(width, height))[:3])
-    normal = turn[:, 2] * np.sign(turn[2, 2])
-    return float(np.arctan2(normal[1], normal[2])), float(np.arctan2(normal[0], normal[2]))
 
 
 def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ...]:

@@ -7,7 +7,7 @@ printed, x to the right, y down, z into the sheet; all in metres.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class CharucoBoard:
     first_id: int = 0
     dictionary: str = DICTIONARY
     legacy: bool = False
+    kind: Literal["charuco"] = "charuco"
 
     @property
     def width_m(self) -> float:
@@ -86,6 +87,7 @@ class MarkerBoard:
     centres_m: tuple[tuple[float, float], ...]
     first_id: int
     dictionary: str = DICTIONARY
+    kind: Literal["markers"] = "markers"
 
     @property
     def ids(self) -> tuple[int, ...]:
@@ -122,6 +124,7 @@ class Chessboard:
     columns: int
     rows: int
     square_m: float
+    kind: Literal["chessboard"] = "chessboard"
 
     @property
     def width_m(self) -> float:

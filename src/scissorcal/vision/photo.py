@@ -33,8 +33,8 @@ class Photo:
     ``image`` is (rows, columns) grey or (rows, columns, 3) blue-green-red, eight bits. ``width``
     and ``height`` are those of the whole photograph, turned upright; ``reduction`` says how many of
     its pixels make one of ``image`` along each side (1, 2, 4 or 8), ``origin`` where the corner of
-    ``image`` lies in it. ``exif_orientation_applied``
-    tells whether the file asked to be turned or mirrored. ``sha256`` is of the file's bytes.
+    ``image`` lies in it. ``orientation`` is what EXIF asked for: 1 to 8, 1
+    for nothing. ``sha256`` is of the file's bytes.
     """
 
     image: Picture
@@ -42,9 +42,14 @@ class Photo:
     height: int
     reduction: int
     origin: tuple[int, int]
-    exif_orientation_applied: bool
+    orientation: int
     sha256: str
     source: str
+
+    @property
+    def exif_orientation_applied(self) -> bool:
+        """Whether the file asked to be turned or mirrored, and was."""
+        return self.orientation != 1
 
     @property
     def grey(self) -> Picture:
@@ -115,7 +120,7 @@ def _photo(path: Path, opened: "Image.Image", digest: str, max_pixels: int, colo
     origin = _origin(spare, orientation)
     if orientation >= 5:
         width, height = height, width
-    return Photo(image, width, height, reduction, origin, orientation != 1, digest, path.name)
+    return Photo(image, width, height, reduction, origin, orientation, digest, path.name)
 
 
 def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:

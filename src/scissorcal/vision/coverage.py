@@ -1,0 +1,116 @@
+"""Which places, sizes and slants a board has been seen in, and what is still wanted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.boards import Board
+from scissorcal.vision.detect import Detection
+
+Array = NDArray[np.float64]
+
+PLACES = (
+    "upper left",
+    "top",
+    "upper right",
+    "left",
+    "middle",
+    "right",
+    "lower left",
+    "bottom",
+    "lower right",
+)
+SIZES = ("far", "middling", "near")
+SLANTS = ("square-on", "facing left", "facing right", "facing up", "facing down")
+
+_FAR, _NEAR = 0.4, 0.65
+_SQUARE_ON = np.radians(12.0)
+
+
+@dataclass(frozen=True)
+class ViewCoverage:
+    """What has been seen: ninths of the picture, sizes of the board in it, ways it faces.
+
+    A board is far where it spans less than 40 % of the picture, near where it spans more than 65 %.
+    """
+
+    places: frozenset[str] = frozenset()
+    sizes: frozenset[str] = frozenset()
+    slants: frozenset[str] = frozenset()
+
+    def with_view(self, detection: Detection, width: int, height: int) -> "ViewCoverage":
+        """Add a photograph of ``width`` by ``height`` pixels."""
+        return ViewCoverage(
+            self.places | _places(detection.pixels, width, height),
+            self.sizes | {_size(detection, width, height)},
+            self.slants | {_slant(detection, width, height)},
+        )
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """What no photograph has shown yet."""
+        return (
+            *(place for place in PLACES if place not in self.places),
+            *(size for size in SIZES if size not in self.sizes),
+            *(slant for slant in SLANTS if slant not in self.slants),
+        )
+
+    def sentence(self) -> str:
+        """Say how much has been seen and what is wanted next."""
+        seen = (
+            f"places {len(self.places)} of {len(PLACES)}, sizes {len(self.sizes)} of {len(SIZES)}, "
+            f"slants {len(self.slants)} of {len(SLANTS)}"
+        )
+        return f"{seen}; wanted: {', '.join(self.wanted)}" if self.wanted else seen
+
+
+def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
+    """How a board is turned from square-on, to the right and up (rad), by a guess of the camera.
+
+    A focal length of 1.1 times the picture's longer side is right to a third for most cameras,
+    which is enough to tell slants apart.
+    """
+    import cv2
+
+    focal = 1.1 * max(width, height)
+    matrix = np.array([[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]])
+    _, turns, _, _ = cv2.solvePnPGeneric(
+        detection.points, detection.pixels, matrix, None, flags=cv2.SOLVEPNP_IPPE
+    )
+    normal = cv2.Rodrigues(turns[0])[0][:, 2]
+    facing = -normal * np.sign(normal[2])
+    return float(np.arctan2(facing[0], -facing[2])), float(np.arctan2(-facing[1], -facing[2]))
+
+
+def view_words(detection: Detection, width: int, height: int) -> str:
+    """Say where and how a board stands in one photograph."""
+    return f"{_size(detection, width, height)}, {_slant(detection, width, height)}"
+
+
+def _places(pixels: Array, width: int, height: int) -> frozenset[str]:
+    column = np.clip((3.0 * pixels[:, 0] / width).astype(int), 0, 2)
+    row = np.clip((3.0 * pixels[:, 1] / height).astype(int), 0, 2)
+    return frozenset(PLACES[place] for place in np.unique(3 * row + column))
+
+
+def _size(detection: Detection, width: int, height: int) -> str:
+    across, down = _squares(detection.board)
+    span = detection.square_px * max(across / width, down / height)
+    return SIZES[0] if span < _FAR else SIZES[2] if span > _NEAR else SIZES[1]
+
+
+def _squares(board: Board) -> tuple[float, float]:
+    """Width and height of a board in what ``Detection.square_px`` is the size of."""
+    unit = board.marker_m if board.kind == "markers" else board.square_m
+    return board.width_m / unit, board.height_m / unit
+
+
+def _slant(detection: Detection, width: int, height: int) -> str:
+    right, up = slant_of(detection, width, height)
+    if max(abs(right), abs(up)) < _SQUARE_ON:
+        return SLANTS[0]
+    if abs(right) > abs(up):
+        return SLANTS[2] if right > 0.0 else SLANTS[1]
+    return SLANTS[3] if up > 0.0 else SLANTS[4]

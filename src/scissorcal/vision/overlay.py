@@ -1,0 +1,134 @@
+"""Pictures for people: what was detected, and how far off a fit is, drawn over the photograph."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.detect import Detection
+from scissorcal.vision.photo import Photo, Picture
+
+Array = NDArray[np.float64]
+
+WIDEST_PX = 1600
+_GREEN, _RED, _BLUE, _WHITE, _BLACK = (
+    (60, 170, 0),
+    (40, 40, 220),
+    (200, 90, 0),
+    (255, 255, 255),
+    (0, 0, 0),
+)
+_ARROW_SHARE = 0.03
+
+
+def detection_overlay(photo: Photo, detection: Detection) -> Picture:
+    """Draw each corner that was found, the first one in red, joined in their order."""
+    import cv2
+
+    canvas, scale = _canvas(photo)
+    places = [_place(pixel, scale) for pixel in detection.pixels]
+    for before, after in zip(places[:-1], places[1:], strict=True):
+        cv2.line(canvas, before, after, _BLUE, 1, cv2.LINE_AA)
+    for index, place in enumerate(places):
+        cv2.circle(canvas, place, 5, _GREEN if index else _RED, 1, cv2.LINE_AA)
+    words = f"{photo.source}: {len(places)} corners of the {detection.board.name}"
+    return _labelled(canvas, words)
+
+
+def residual_overlay(photo: Photo, pixels: Array, residuals: Array, words: str = "") -> Picture:
+    """Draw what is left between seen and predicted corners as arrows, with a bar for their scale.
+
+    Arrows run from where the fit predicts a corner toward where it was seen. All are enlarged so
+    that the middle one is 3 % of the picture's width; those three times as long are red.
+    """
+    import cv2
+
+    canvas, scale = _canvas(photo)
+    length = np.linalg.norm(residuals, axis=1)
+    middle = max(float(np.median(length)), 1e-3)
+    magnified = _ARROW_SHARE * canvas.shape[1] / middle
+    for pixel, residual, size in zip(pixels, residuals, length, strict=True):
+        start = _place(pixel - residual, scale)
+        off = magnified * residual
+        end = (round(start[0] + off[0]), round(start[1] + off[1]))
+        colour = _RED if size > 3.0 * middle else _GREEN
+        cv2.arrowedLine(canvas, start, end, colour, 1, cv2.LINE_AA, tipLength=0.25)
+    bar = _round_length(0.1 * canvas.shape[1] / magnified)
+    _draw_bar(canvas, round(bar * magnified), f"{bar:g} px")
+    rms = float(np.sqrt(np.mean(length**2)))
+    return _labelled(canvas, f"{photo.source}: {rms:.2f} px rms {words}".rstrip())
+
+
+def write_picture(picture: Picture, path: Path) -> Path:
+    """Write a picture as PNG, complete or not at all."""
+    import cv2
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+    part.replace(path)
+    return path
+
+
+def _canvas(photo: Photo) -> tuple[Picture, float]:
+    """The photograph in pale grey at most `WIDEST_PX` wide, and its pixels per photo's pixel."""
+    import cv2
+
+    grey = photo.grey
+    small = min(1.0, WIDEST_PX / max(grey.shape))
+    size = (round(grey.shape[1] * small), round(grey.shape[0] * small))
+    pale = (0.5 * cv2.resize(grey, size, interpolation=cv2.INTER_AREA) + 127.0).astype(np.uint8)
+    canvas = np.asarray(cv2.cvtColor(pale, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    return canvas, size[0] / photo.width
+
+
+def _place(pixel: Array, scale: float) -> tuple[int, int]:
+    u, v = (np.asarray(pixel) + 0.5) * scale - 0.5
+    return round(float(u)), round(float(v))
+
+
+def _labelled(canvas: Picture, words: str) -> Picture:
+    import cv2
+
+    size = max(canvas.shape[1] / 1600.0, 0.45)
+    cv2.putText(
+        canvas,
+        words,
+        (10, round(40 * size)),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        size,
+        _WHITE,
+        4,
+        cv2.LINE_AA,
+    )
+    cv2.putText(
+        canvas,
+        words,
+        (10, round(40 * size)),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        size,
+        _BLACK,
+        1,
+        cv2.LINE_AA,
+    )
+    return canvas
+
+
+def _draw_bar(canvas: Picture, length: int, words: str) -> None:
+    import cv2
+
+    low = canvas.shape[0] - 20
+    cv2.line(canvas, (20, low), (20 + length, low), _BLACK, 2)
+    for end in (20, 20 + length):
+        cv2.line(canvas, (end, low - 5), (end, low + 5), _BLACK, 2)
+    size = max(canvas.shape[1] / 1600.0, 0.45)
+    place = (30 + length, low + 5)
+    cv2.putText(canvas, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, _WHITE, 4, cv2.LINE_AA)
+    cv2.putText(canvas, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, _BLACK, 1, cv2.LINE_AA)
+
+
+def _round_length(length: float) -> float:
+    """The nearest of 1, 2, 5 times a power of ten below a length."""
+    power = 10.0 ** np.floor(np.log10(length))
+    step = max(step for step in (1.0, 2.0, 5.0) if step * power <= length * (1.0 + 1e-9))
+    return float(step * power)

@@ -1,0 +1,155 @@
+"""Photographs in a workspace: a folder per capture, with what was found in each."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from scissorcal.errors import InputError
+from scissorcal.vision.boards import CharucoBoard, Chessboard, MarkerBoard
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.vision.detect import Detection
+    from scissorcal.vision.photo import Photo
+
+PhotoKind = Literal["camera", "blade", "plate"]
+INDEX_FILE = "capture.json"
+
+
+class Photograph(BaseModel):
+    """One stored photograph; ``pixels`` are where ``points[ids]`` of the capture's board stand."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    file: str = Field(description="name in the capture's folder")
+    source: str = Field(description="the name it was given by")
+    sha256: str
+    width: int = Field(description="pixels, turned upright")
+    height: int
+    orientation: int = Field(default=1, description="EXIF orientation that was applied")
+    square_px: float | None = None
+    ids: tuple[int, ...] = ()
+    pixels: tuple[tuple[float, float], ...] = ()
+
+
+class PhotoIndex(BaseModel):
+    """What a folder of photographs says about itself."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: Literal["scissorcal-photographs/1"] = "scissorcal-photographs/1"
+    kind: PhotoKind
+    board: CharucoBoard | MarkerBoard | Chessboard | None = Field(
+        default=None, discriminator="kind"
+    )
+    photographs: tuple[Photograph, ...]
+
+
+@dataclass(frozen=True)
+class PhotoCapture:
+    """A folder of photographs and its index."""
+
+    folder: Path
+    index: PhotoIndex
+
+    def path(self, photograph: Photograph) -> Path:
+        return self.folder / photograph.file
+
+
+def photo_captures(workspace: Workspace, kind: PhotoKind) -> tuple[PhotoCapture, ...]:
+    """Read the captures of one kind, oldest first. Raises InputError where one is damaged."""
+    folders = sorted(workspace.captures_dir.glob(f"{kind}-*/{INDEX_FILE}"))
+    return tuple(
+        PhotoCapture(path.parent, _index(path))
+        for path in folders
+        if not path.parent.name.endswith(".part")
+    )
+
+
+class PhotoWriter:
+    """A capture that is being taken: nothing of it is to be seen until `finish`.
+
+    Leaving without it removes what was copied.
+    """
+
+    def __init__(self, workspace: Workspace, kind: PhotoKind) -> None:
+        self.kind = kind
+        self.folder = _new_folder(workspace, kind)
+        self.part = self.folder.with_name(self.folder.name + ".part")
+        self.photographs: list[Photograph] = []
+
+    def __enter__(self) -> "PhotoWriter":
+        self.part.mkdir(parents=True)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        shutil.rmtree(self.part, ignore_errors=True)
+
+    def add(self, path: Path, photo: "Photo", detection: "Detection | None" = None) -> Photograph:
+        """Copy a photograph byte for byte and note what was found in it."""
+        name = f"{len(self.photographs) + 1:03d}-{path.name}"
+        shutil.copyfile(path, self.part / name)
+        found = {}
+        if detection is not None:
+            found = {
+                "square_px": detection.square_px,
+                "ids": tuple(detection.ids.tolist()),
+                "pixels": tuple((float(u), float(v)) for u, v in detection.pixels),
+            }
+        photograph = Photograph.model_validate(
+            {
+                "file": name,
+                "source": str(path.name),
+                "sha256": photo.sha256,
+                "width": photo.width,
+                "height": photo.height,
+                "orientation": photo.orientation,
+                **found,
+            }
+        )
+        self.photographs.append(photograph)
+        return photograph
+
+    def finish(self, board: CharucoBoard | MarkerBoard | Chessboard | None) -> PhotoCapture:
+        """Write the index and let the capture be seen, all at once."""
+        index = PhotoIndex(kind=self.kind, board=board, photographs=tuple(self.photographs))
+        (self.part / INDEX_FILE).write_text(index.model_dump_json(indent=1) + "\n", "utf-8")
+        self.part.rename(self.folder)
+        return PhotoCapture(self.folder, index)
+
+
+def already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:
+    """Find a photograph of these bytes among captures."""
+    for capture in captures:
+        for photograph in capture.index.photographs:
+            if photograph.sha256 == sha256:
+                return capture.path(photograph)
+    return None
+
+
+def _new_folder(workspace: Workspace, kind: PhotoKind) -> Path:
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    workspace.captures_dir.mkdir(parents=True, exist_ok=True)
+    folder = workspace.captures_dir / f"{kind}-{stamp}"
+    number = 1
+    while any(workspace.captures_dir.glob(f"{folder.name}*")):
+        number += 1
+        folder = workspace.captures_dir / f"{kind}-{stamp}-{number}"
+    return folder
+
+
+def _index(path: Path) -> PhotoIndex:
+    try:
+        return PhotoIndex.model_validate_json(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, ValidationError) as error:
+        why = str(error).splitlines()[0]
+        raise InputError(
+            f"{path} cannot be read ({why}): remove {path.parent.name} and capture its "
+            "photographs again."
+        ) from None
