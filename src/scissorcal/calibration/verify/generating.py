@@ -87,9 +87,17 @@ def residual_noise(experiment: Experiment, point: Array, rng: np.random.Generato
     quiet = irregular <= QUIET * np.median(residuals**2)
     if np.count_nonzero(quiet) < FEWEST_QUIET:
         return fit_ar(residuals, experiment.series)
-    runs = np.cumsum(np.diff(quiet.astype(np.int64), prepend=0) != 0)
-    labels = runs + (runs.max() + 1) * experiment.series
-    return fit_ar(residuals[quiet], labels[quiet])
+    return fit_ar(residuals[quiet], unbroken(experiment.series, quiet)[quiet])
+
+
+def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Labels (n,) of the stretches that stay whole where only ``kept`` bins of ``series`` are used.
+
+    >>> unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
+    array([0, 0, 1, 2, 3])
+    """
+    turns = (np.diff(series) != 0) | (np.diff(kept.astype(np.int64)) != 0)
+    return np.concatenate([[0], np.cumsum(turns)]).astype(np.int64)
 
 
 def simulate(

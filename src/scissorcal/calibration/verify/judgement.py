@@ -112,6 +112,11 @@ def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
     p, effort_p = found.p_value, found.effort_p_value
     if p >= HALVES_SHARE:
         why = f"Two halves of the data agree within what each claims (p = {p:.2g}; {size})."
+        if p > 1.0 - HALVES_SHARE:
+            why += (
+                " They agree better than chance would have it: what the law lacks repeats in every "
+                "stroke, and the intervals allow for it as if it were noise."
+            )
         one = Verdict(scope, checks[0], "pass", p, HALVES_SHARE, why)
     else:
         why = (

@@ -1,5 +1,6 @@
 """The fits of a trust check, each one by itself: picklable in, plain numbers out."""
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -9,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.experiment import Experiment
-from scissorcal.calibration.ladder import Rung
 from scissorcal.calibration.result import Effort
-from scissorcal.calibration.verify.generating import Generating, simulate
+from scissorcal.calibration.verify.generating import Generating, simulate, unbroken
 from scissorcal.calibration.verify.halves import Split
 from scissorcal.calibration.verify.power import power_sensitivity
 from scissorcal.calibration.verify.uniformity import rank_among
@@ -72,8 +72,8 @@ class Study:
 def run(study: Study, task: Task) -> Record:
     """Do one fit; the same numbers for the same study and task, wherever it runs.
 
-    The result holds plain numbers alone, so that it can stand as one line of JSON. A fit that
-    raises an arithmetic error yields ``{"broken": sentence}``; other errors are raised.
+    The result holds plain finite numbers alone, so that it can stand as one line of JSON. A fit
+    that breaks on its numbers yields ``{"broken": sentence}``; other errors are raised.
     """
     key = (_KINDS.index(task.kind), task.index)
     sequence = np.random.SeedSequence(study.seed, spawn_key=key)
@@ -81,6 +81,7 @@ def run(study: Study, task: Task) -> Record:
     began = time.perf_counter()
     try:
         found = _DO[task.kind](study, task.index, rng)
+        json.dumps(found, allow_nan=False)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
         found = {"broken": f"{type(error).__name__}: {error}"}
     seconds = round(time.perf_counter() - began, 3)
@@ -99,7 +100,7 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
             prior_precision=generating.precision,
             starts=generating.mean[None, :],
         )
-    posterior = _infer(study, rung, None, rng)
+    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=DRAWS)
     chosen = posterior.draws[rng.choice(len(posterior.draws), LEVELS - 1, replace=False)]
     truths = quantities(study, truth[None, :])
     ranks = rank_among(quantities(study, chosen), truths[0], rng)
@@ -111,10 +112,10 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     experiment = study.experiment
     keep = study.split.first if index == 0 else study.split.second
     rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
-    posterior = _infer(study, rung, keep, rng)
-    white = ljung_box(
-        rung.likelihood.standardised(posterior.optimum.point)[keep], experiment.series[keep]
-    )
+    series = unbroken(experiment.series, keep)
+    posterior = infer(rung.problem(series, keep), study.effort, rng, count=DRAWS)
+    residuals = rung.likelihood.standardised(posterior.optimum.point)
+    white = ljung_box(residuals[keep], series[keep])
     return {
         "mean": posterior.draws.mean(axis=0).tolist(),
         "covariance": np.cov(posterior.draws, rowvar=False).tolist(),
@@ -127,7 +128,7 @@ def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]
     """Sensitivities of the fit's own posterior to the powers of its prior and likelihood."""
     experiment = study.experiment
     rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
-    posterior = _infer(study, rung, None, rng)
+    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=DRAWS)
     shown = quantities(study, posterior.draws)
     wanted = study.wanted
     away = (posterior.draws - rung.prior_mean)[:, wanted]
@@ -148,13 +149,6 @@ def quantities(study: Study, points: Array) -> Array:
     natural = study.experiment.layout.columns(points)[:, study.wanted]
     effort = [float(np.sqrt(np.mean(study.experiment.mean(u) ** 2))) for u in points]
     return np.column_stack([natural, effort])
-
-
-def _infer(
-    study: Study, rung: Rung, keep: NDArray[np.bool_] | None, rng: np.random.Generator
-) -> Posterior:
-    problem = rung.problem(study.experiment.series, keep)
-    return infer(problem, study.effort, rng, count=DRAWS)
 
 
 def _diagnostics(posterior: Posterior) -> dict[str, Any]:
