@@ -46,6 +46,7 @@ def test_the_day_is_there() -> None:
         "export",
         "recording show",
         "fit",
+        "verify",
         "report",
         "package build",
         "package check",

@@ -59,7 +59,12 @@ def quick_workspace(folder: Path) -> Workspace:
     return workspace
 
 
-def record_friction(workspace: Workspace, seed: int = 1, recipe_toml: str | None = None) -> Path:
+def record_friction(
+    workspace: Workspace,
+    seed: int = 1,
+    recipe_toml: str | None = None,
+    truth: Truth | None = None,
+) -> Path:
     """Add a recording of empty sweeps; its recipe is the workspace's unless given."""
     opening, strokes = [], []
     for speed in (0.1, 0.3, 0.8):
@@ -68,7 +73,7 @@ def record_friction(workspace: Workspace, seed: int = 1, recipe_toml: str | None
             opening.append(sweep(start, end, speed))
     rng = np.random.default_rng(seed)
     places = [0.0] * len(opening)
-    made = make_recording("friction", opening, places, strokes, Truth(), rng, False)
+    made = make_recording("friction", opening, places, strokes, truth or Truth(), rng, False)
     text = workspace.recipe_path.read_text(encoding="utf-8") if recipe_toml is None else recipe_toml
     path = workspace.new_recording("friction")
     write_recording(replace(made, recipe_toml=text), path)

@@ -1,0 +1,75 @@
+"""scissorcal verify: what it prints, refuses, and how it ends."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from scissorcal.workday.fits import fit_workspace
+from scissorcal.workday.workspace import Workspace
+from tests.calibration.truth import Truth
+from tests.workday.made import quick_workspace, record_friction
+
+from .conftest import Cli
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    workspace = quick_workspace(tmp_path_factory.mktemp("verify") / "paper")
+    record_friction(workspace)
+    fit_workspace(workspace, ("friction",))
+    return workspace
+
+
+def test_it_prints_tables_and_verdicts(
+    fitted: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(fitted.captures_dir)
+    said = cli("verify", "friction", "--fits", "3", "--workers", "1")
+    assert said.code == 0
+    for words in (
+        "3 fits to simulated data (truths: a normal distribution around the posterior, 3 times as",
+        "noise: AR(",
+        "effort_rms",
+        "two halves: whole strokes of a kind, alternating by speed",
+        "sensitivity to the powers of prior and likelihood",
+        "----  verify.friction  calibration",
+        "pass  verify.friction  halves-effort",
+    ):
+        assert words in said.out, words
+    assert "friction: making ready" in said.err
+    envelope = cli("verify", "--checks", "prior", "--workers", "1", "--json").envelope
+    (check,) = envelope["result"]["checks"]
+    assert check["what"] == "friction"
+    assert check["calibration"] is None
+    assert envelope["files"] == [str(fitted.verify_path("friction"))]
+
+
+def test_a_rig_that_changed_ends_with_three(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The joint rubs half as much again in every other stroke's recording."""
+    workspace = quick_workspace(tmp_path / "changed")
+    record_friction(workspace, seed=1)
+    stiffer = dataclasses.replace(Truth(), coulomb_pos=0.0195, coulomb_neg=0.024)
+    record_friction(workspace, seed=2, truth=stiffer)
+    fit_workspace(workspace, ("friction",))
+    monkeypatch.chdir(workspace.root)
+    said = cli("verify", "friction", "--checks", "halves", "--workers", "1")
+    assert said.code == 3
+    assert "FAIL  verify.friction  halves" in said.out
+
+
+def test_wrong_words_and_a_missing_fit_are_refused(
+    cli: Cli, workspace: Path, fitted: Workspace
+) -> None:
+    said = cli("verify", "--checks", "sbc,luck")
+    assert said.code == 2
+    assert "luck is no check; name some of sbc, halves, prior" in said.err
+    assert cli("verify", "--fits", "0").code == 2
+    said = cli("verify")
+    assert said.code == 5
+    assert "run 'scissorcal fit' first" in said.err
+    said = cli("verify", "friction", "--cluster", "nonsense://1", "-w", fitted.root)
+    assert said.code == 2
+    assert "nonsense://1" in said.err
