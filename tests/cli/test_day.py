@@ -1,14 +1,20 @@
 """The day in a workspace by its commands: each does its part, once, and says what comes next."""
 
+import hashlib
+import json
 from dataclasses import replace
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
+from scissorcal.package import open_package
+from scissorcal.recipe.library import schemas_dir
 from scissorcal.recording import write_recording
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
+from tests.report.pages import read_page
 from tests.workday.made import quick_workspace, record_friction
 
 from .conftest import Cli
@@ -73,8 +79,98 @@ def test_the_day_from_captures_to_package(
     }
 
     plan = cli("plan", "--json").envelope["result"]
-    assert {step["status"] for step in plan["steps"]} == {"done"}
-    assert plan["next_command"] is None
+    assert [s["name"] for s in plan["steps"] if s["status"] != "done"] == ["report sign"]
+    assert plan["next_command"].startswith("scissorcal report sign")
+
+
+def test_a_signature_travels_with_the_package_and_is_void_once_the_report_changes(
+    recorded: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(recorded.root)
+    said = cli("report", "sign", "--name", "A. Reviewer", "--decision", "accept", "--json")
+    assert said.code == 0
+    signed = said.envelope["result"]
+    digest = hashlib.sha256(recorded.report_json.read_bytes()).hexdigest()
+    assert signed["report_sha256"] == digest
+    assert set(signed["fit_hashes"]) == {"friction", "cut"}
+    schema = json.loads((schemas_dir() / "signature.schema.json").read_text(encoding="utf-8"))
+    jsonschema.validate(json.loads(recorded.signature_path.read_text(encoding="utf-8")), schema)
+
+    before = open_package(recorded.package_path(recorded.recipe())).manifest
+    assert before.review is None
+    assert not cli("package", "build", "--json").envelope["result"]["cached"]
+    after = open_package(recorded.package_path(recorded.recipe())).manifest
+    assert after.review is not None
+    assert after.review.name == "A. Reviewer"
+    assert after.content_hash == before.content_hash
+    assert cli("package", "build", "--json").envelope["result"]["cached"]
+    assert cli("plan", "--json").envelope["result"]["next_command"] is None
+    assert "left as they are" in cli("report").out
+    assert hashlib.sha256(recorded.report_json.read_bytes()).hexdigest() == digest
+
+    whole = recorded.report_json.read_text(encoding="utf-8")
+    recorded.report_json.write_text(whole.replace("accepted", "x") + " ", encoding="utf-8")
+    steps = {s["name"]: s for s in cli("plan", "--json").envelope["result"]["steps"]}
+    assert steps["report sign"]["status"] == "stale"
+    assert "changed since it was signed" in steps["report sign"]["state"]
+    assert steps["package build"]["status"] == "stale"
+    recorded.report_json.write_text(whole, encoding="utf-8")
+
+
+def test_a_rejection_is_carried_and_fails_the_check(
+    recorded: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(recorded.root)
+    words = ("report", "sign", "--name", "B", "--decision", "reject", "--note", "it bends")
+    assert cli(*words).code == 0
+    assert any("it bends" in n for n in cli("plan", "--json").envelope["result"]["notes"])
+    assert cli("package", "build").code == 3
+    assert "rejected by B" in cli("package", "check").out
+    words = ("--device", "sim", "--strokes", "1", "--seconds", "0.3", "--no-record", "--yes")
+    assert "its report was rejected by B" in cli("render", *words).err
+
+
+def test_a_report_of_another_recipe_is_not_signed(
+    recorded: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(recorded.root)
+    text = recorded.recipe_path.read_text(encoding="utf-8")
+    recorded.recipe_path.write_text(text + "\n[limits]\ntorque_Nm = 0.5\n", encoding="utf-8")
+    said = cli("report", "sign", "--name", "C", "--decision", "accept")
+    recorded.recipe_path.write_text(text, encoding="utf-8")
+    assert said.code == 5
+    assert "it shows another recipe" in said.err
+    assert cli("report", "sign", "--name", " ", "--decision", "accept").code == 2
+
+
+def test_two_runs_stand_side_by_side_or_are_refused_for_what_differs(
+    recorded: Workspace, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = cli("report", "compare", recorded.root, recorded.report_json, "--json")
+    assert said.code == 0
+    assert [row["in_sd"] for fit in said.envelope["result"]["fits"] for row in fit["parameters"]]
+    twin = json.loads((tmp_path / "comparison" / "comparison.json").read_text(encoding="utf-8"))
+    schema = json.loads((schemas_dir() / "comparison.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(twin)
+    assert twin["torque"]["largest_difference"] == 0
+    assert read_page(tmp_path / "comparison" / "comparison.html").unbalanced == []
+
+    facts = json.loads(recorded.report_json.read_text(encoding="utf-8"))
+    facts["material"], facts["scene"]["moving"] = "tin", "upper"
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps(facts), encoding="utf-8")
+    said = cli("report", "compare", recorded.report_json, other)
+    assert said.code == 2
+    assert "the material differs (paper against tin)" in said.err
+    assert "which blades move differs (both against upper)" in said.err
+    assert (
+        cli("report", "compare", recorded.fit_path("cut"), recorded.fit_path("friction")).code == 2
+    )
+    assert cli("report", "compare", tmp_path / "nothing", other).code == 5
+    assert cli("report", "compare", tmp_path, other).code == 5
+    assert cli("report", "compare", recorded.recipe_path, other).code == 2
+    assert cli("report", "--json", "compare", other, other).code == 2
 
 
 def test_a_package_whose_bytes_were_changed_is_refused(

@@ -312,6 +312,7 @@ def _set(path: str, value: Any) -> Callable[[Any, Members], None]:
         (_set("mechanics.friction", None), "members do not fit"),
         (_set("mechanics.loop_rate_Hz", 0), "loop_rate_Hz"),
         (_set("signature", "someone"), "signature"),
+        (_set("review", "someone"), "review"),
         (_set("members", []), "members"),
         (_set("provenance.cut.parameters", []), "parameters"),
         (_set("name", "../evil"), "name"),

@@ -11,11 +11,14 @@ import pytest
 
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package import (
+    REVIEW_FORMAT,
     PackageSummary,
+    Review,
     build_package,
     check_package,
     open_package,
     package_inputs_hash,
+    put_review,
 )
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -194,8 +197,38 @@ def test_a_failed_fit_is_carried_along_and_said(tmp_path: Path) -> None:
 
 def test_an_unsigned_package_says_so(paper: PackageSummary) -> None:
     assert any("not signed" in sentence for sentence in paper.warnings)
-    signature = next(verdict for verdict in paper.verdicts if verdict.check == "signature")
-    assert signature.status == "not_evaluated"
+    review = next(verdict for verdict in paper.verdicts if verdict.check == "review")
+    assert review.status == "not_evaluated"
+
+
+def test_a_package_carries_its_review_and_nothing_else_changes(
+    paper: PackageSummary, tmp_path: Path
+) -> None:
+    plain = open_package(paper.path)
+    hashes = plain.manifest.fit_hashes
+    for decision, fits, status, words in (
+        ("accept", hashes, "pass", "accepted by A. Reviewer on 2025-01-31: bends"),
+        ("reject", hashes, "fail", "should not be rendered: its report was rejected"),
+        ("accept", {"cut": "another"}, "fail", "carries a review of other fits"),
+    ):
+        given = Review(
+            format=REVIEW_FORMAT,
+            name="A. Reviewer",
+            decision=decision,
+            note="bends",
+            time_utc="2025-01-31T15:02:00Z",
+            report_sha256="0" * 64,
+            fit_hashes=fits,
+        )
+        path = tmp_path / f"{decision}-{len(fits)}.zip"
+        put_review(plain, given, path)
+        signed = open_package(path)
+        assert signed.manifest.review == given
+        assert signed.manifest.content_hash == plain.manifest.content_hash
+        judged = {verdict.check: verdict for verdict in check_package(path)}
+        assert judged["review"].status == status
+        assert words in judged["review"].why
+        assert any(words in sentence for sentence in signed.warnings) == (status == "fail")
 
 
 def test_draws_are_thinned_to_what_the_band_needs(paper: PackageSummary, tmp_path: Path) -> None:

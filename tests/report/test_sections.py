@@ -29,7 +29,7 @@ from tests.report.fits import (
 
 
 def headline_of(fit: FitResult) -> Headline:
-    return compose_fit(fit, fit.what, []).section.headline
+    return compose_fit(fit, fit.what).section.headline
 
 
 def good(fit: FitResult) -> FitResult:
@@ -44,7 +44,7 @@ def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
     assert headline.stance == "trust"
     assert "passed all 4 checks" in headline.sentence
     assert "% (median; worst" in headline.sentence
-    assert headline.next_steps == ("Go on with `scissorcal package build`.",)
+    assert headline.next_steps == ("Read on, and sign with `scissorcal report sign`.",)
 
 
 def test_one_failure_rejects_and_says_what_to_do() -> None:

@@ -14,6 +14,7 @@ def test_a_new_workspace_lacks_everything(tmp_path: Path) -> None:
         "fit friction",
         "fit cut",
         "report",
+        "report sign",
         "package build",
     ]
     assert {step.status for step in plan.steps} == {"missing"}

@@ -46,7 +46,8 @@ def command(function: Callable[P, Answer]) -> Callable[..., None]:
     """Make a click callback of a function that returns an `Answer`.
 
     Adds ``--json`` and ``--traceback``, prints the answer, and ends with the exit code that belongs
-    to it. An error that scissorcal raises on purpose is its sentence and its exit code.
+    to it. An error that scissorcal raises on purpose is its sentence and its exit code. On a group
+    it is what the group does without a subcommand.
     """
 
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
@@ -56,6 +57,8 @@ def command(function: Callable[P, Answer]) -> Callable[..., None]:
     def callback(
         context: click.Context, /, *args: Any, as_json: bool, show_traceback: bool, **options: Any
     ) -> None:
+        if context.invoked_subcommand is not None:
+            return
         name = context.command_path.partition(" ")[2]
         began = time.perf_counter()
         try:

@@ -69,11 +69,17 @@ def render(
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.render import VirtualStrokes
-    from scissorcal.workday.renders import package_has_fallen_behind, render_workspace
+    from scissorcal.workday.renders import (
+        package_has_fallen_behind,
+        render_workspace,
+        review_warnings,
+    )
 
     workspace = open_workspace(folder)
     if package_path is None and package_has_fallen_behind(workspace):
         note("The package is not of the fits and recipe as they are now; see 'scissorcal plan'.")
+    for sentence in review_warnings(workspace, package_path):
+        note(sentence)
     with LiveView(ask=not yes) as view:
         rendered = render_workspace(
             workspace,

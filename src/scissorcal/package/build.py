@@ -41,6 +41,7 @@ from scissorcal.package.manifest import (
     units_of,
 )
 from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.review import Review
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, failed
 
@@ -72,12 +73,14 @@ def build_package(
     rng: np.random.Generator,
     *,
     tolerance: float = TOLERANCE,
+    review: Review | None = None,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
     The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
     ``rng`` picks which posterior draws travel along for the band, at most 200; the same fits,
     recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its value.
+    ``review`` is the signature under the fits' report; it changes nothing else in the package.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the
@@ -106,7 +109,7 @@ def build_package(
             bound=bound,
             provenance=record,
             members=tuple(member_of(file, array) for file, array in arrays.items()),
-            signature=None,
+            review=review,
             content_hash=UNHASHED,
         )
     )
@@ -122,6 +125,16 @@ def build_package(
         verdicts=verdicts,
         warnings=package.warnings,
     )
+
+
+def put_review(package: ModelPackage, review: Review | None, path: Path) -> ModelPackage:
+    """Write an open package to ``path`` with another review, or none; nothing else changes.
+
+    Raises InputError where the file cannot be written.
+    """
+    manifest = package.manifest.model_copy(update={"review": review})
+    write_archive(path, manifest, package.arrays)
+    return ModelPackage(manifest, package.arrays, str(path))
 
 
 def package_inputs_hash(recipe: Recipe, friction: FitResult | None, cut: FitResult | None) -> str:
@@ -282,7 +295,7 @@ def _hashed(manifest: Manifest) -> Manifest:
 
 
 def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
-    own = [verdict for verdict in failed(verdicts) if verdict.check != "fits"]
+    own = [verdict for verdict in failed(verdicts) if verdict.check not in ("fits", "review")]
     if own:
         reasons = " ".join(verdict.why for verdict in own)
         raise VerdictError(f"{path} was not written: {reasons}")

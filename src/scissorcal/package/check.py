@@ -10,6 +10,7 @@ from scissorcal.package.model_package import ModelPackage, open_package
 from scissorcal.verdicts import Status, Verdict
 
 SCOPE = "package"
+REVIEW_CHECK = "review"
 GRID_POINTS = 13_337
 """Another count, so other points than those that the bound was measured on."""
 
@@ -33,7 +34,7 @@ def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
         _extremes(package),
         _centre(package),
         _fits(package),
-        _signature(package),
+        _review(package),
     )
 
 
@@ -117,6 +118,12 @@ def _fits(package: ModelPackage) -> Verdict:
     return Verdict(SCOPE, "fits", "fail", float(len(reasons)), 0.0, why)
 
 
-def _signature(package: ModelPackage) -> Verdict:
-    why = "Nobody has signed this package yet."
-    return Verdict(SCOPE, "signature", "not_evaluated", None, None, why)
+def _review(package: ModelPackage) -> Verdict:
+    review = package.manifest.review
+    against = " ".join(package.review_warnings)
+    if review is None:
+        return Verdict(SCOPE, REVIEW_CHECK, "not_evaluated", None, None, against)
+    if against:
+        return Verdict(SCOPE, REVIEW_CHECK, "fail", 0.0, 1.0, against)
+    why = f"The report of its fits was {review.words}."
+    return Verdict(SCOPE, REVIEW_CHECK, "pass", 1.0, 1.0, why)

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from scissorcal.package.review import Digest, Review
+
 FORMAT = "scissorcal-package/1"
 
 LARGEST_MEMBER = 4_000_000
@@ -16,7 +18,6 @@ LARGEST_MEMBER = 4_000_000
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
 Text = Annotated[str, Field(max_length=10_000)]
 Range = tuple[Finite, Finite]
@@ -212,8 +213,8 @@ class Manifest(Section):
     """The whole manifest, ``manifest.json`` in the archive.
 
     ``content_hash`` is the SHA-256 of the canonical JSON of everything here except itself and
-    ``signature``; through ``members`` it covers every byte of every array. ``signature`` is the
-    reviewer's sign-off over that hash, null as long as there is none.
+    ``review``; through ``members`` it covers every byte of every array. ``review`` is the signature
+    under the report of the package's fits, null as long as there is none.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -225,7 +226,7 @@ class Manifest(Section):
     bound: Bound
     provenance: Provenance
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
-    signature: None
+    review: Review | None
     content_hash: Digest
 
     @model_validator(mode="after")
@@ -242,6 +243,12 @@ class Manifest(Section):
         if (self.provenance.friction is None) != (self.mechanics.friction is None):
             raise ValueError("mechanics.friction and provenance.friction contradict each other")
         return self
+
+    @property
+    def fit_hashes(self) -> dict[str, str]:
+        """Inputs hash of each fit in the package."""
+        cut, friction = self.provenance.cut, self.provenance.friction
+        return {"cut": cut.inputs_hash} | ({"friction": friction.inputs_hash} if friction else {})
 
     def member(self, file: str) -> Member:
         """Return the entry of one file; KeyError if there is none."""
@@ -282,8 +289,8 @@ def expected_files(manifest: Manifest) -> set[str]:
 
 
 def content_hash(facts: dict[str, Any]) -> str:
-    """Hash of a manifest given as plain JSON, whatever its ``content_hash`` and ``signature``."""
-    kept = {key: value for key, value in facts.items() if key not in ("content_hash", "signature")}
+    """Hash of a manifest given as plain JSON, whatever its ``content_hash`` and ``review``."""
+    kept = {key: value for key, value in facts.items() if key not in ("content_hash", "review")}
     return hashlib.sha256(canonical(kept)).hexdigest()
 
 

@@ -22,6 +22,7 @@ from scissorcal.package.exact import (
     torque_quantiles,
 )
 from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
+from scissorcal.package.review import against
 
 Array = NDArray[np.float64]
 
@@ -113,11 +114,13 @@ class ModelPackage:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever renders this package should know beforehand, as sentences."""
-        unsigned = (
-            f"The package {self.manifest.name} is not signed: nobody has reviewed its report."
-        )
-        signed = self.manifest.signature is not None
-        return (() if signed else (unsigned,)) + self.fit_warnings
+        return self.review_warnings + self.fit_warnings
+
+    @property
+    def review_warnings(self) -> tuple[str, ...]:
+        """What is wrong with its review: missing, of other fits, or a rejection."""
+        why = against(self.manifest.review, self.manifest.fit_hashes)
+        return (f"The package {self.manifest.name} {why}.",) if why else ()
 
     @property
     def draws(self) -> int:

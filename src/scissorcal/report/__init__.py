@@ -1,6 +1,13 @@
 """Reports: what was fitted and whether to trust it, as one offline page and its JSON twin."""
 
-from scissorcal.report.build import ReportFiles, build_report
+from scissorcal.report.build import (
+    ReportFiles,
+    build_report,
+    facts_of,
+    side_of_fit,
+    write_comparison,
+)
+from scissorcal.report.comparison import Comparison, Side, compare, side_of
 from scissorcal.report.inputs import (
     Fact,
     FactSheet,
@@ -8,13 +15,24 @@ from scissorcal.report.inputs import (
     sheet_from_mapping,
     summarise_recording,
 )
+from scissorcal.report.sections.provenance import posterior_sha256
+from scissorcal.report.twin import read_twin
 
 __all__ = [
+    "Comparison",
     "Fact",
     "FactSheet",
     "RecordingSummary",
     "ReportFiles",
+    "Side",
     "build_report",
+    "compare",
+    "facts_of",
+    "posterior_sha256",
+    "read_twin",
     "sheet_from_mapping",
+    "side_of",
+    "side_of_fit",
     "summarise_recording",
+    "write_comparison",
 ]

@@ -1,18 +1,28 @@
 """Build a report: one offline HTML file to review, and its JSON twin."""
 
+import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.report.document import compose
+from scissorcal.report.comparison import Comparison, Side
+from scissorcal.report.document import (
+    Evidence,
+    ReportDocument,
+    compose,
+    compose_fit,
+    scene_facts,
+)
 from scissorcal.report.inputs import FactSheet, RecordingSummary, summarise_recording
+from scissorcal.report.sections.verdicts import gather_verdicts
 
 
 @dataclass(frozen=True)
@@ -32,19 +42,22 @@ def build_report(
     created: datetime,
     recipe_text: str = "",
     sheets: Sequence[FactSheet] = (),
+    checks: Mapping[str, VerifyResult] | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
 
     The page needs nothing from outside itself; the twin holds the same facts. Recordings name the
     strokes and their speeds, and are matched to ``FitResult.sources`` by path, file name or hash;
-    a fit can be reported without them. ``recipe_text`` is the recipe as it was written; without it
-    the values are printed as read. ``sheets`` are further sections, such as a package's promises
-    or a run of the loop (:func:`sheet_from_mapping`). ``created`` must carry its time zone. The
-    same input gives the same bytes.
+    a fit can be reported without them, but only those with their samples give the work of each
+    stroke. ``recipe_text`` is the recipe as it was written; without it the values are printed as
+    read. ``sheets`` are further sections, such as a package's promises or a run of the loop
+    (:func:`sheet_from_mapping`); ``checks`` are trust checks by fit. ``created`` must carry its
+    time zone. The same input gives the same bytes; a report there that says just the same keeps
+    its time.
 
     Raises MissingError where there is no fit, InputError where ``output_dir`` cannot be written.
     """
-    from scissorcal.report.page import draw_fit, page_text
+    from scissorcal.report.page import draw_fit, draw_scene, page_text
     from scissorcal.report.twin import twin_text
 
     if created.tzinfo is None:
@@ -54,23 +67,78 @@ def build_report(
             "There is nothing to report yet: no fit was found. Run scissorcal fit, then "
             "scissorcal report again."
         )
-    summaries = [
-        summarise_recording(recording) if isinstance(recording, Recording) else recording
-        for recording in recordings
-    ]
+    evidence = Evidence(
+        tuple(
+            summarise_recording(recording) if isinstance(recording, Recording) else recording
+            for recording in recordings
+        ),
+        tuple(recording for recording in recordings if isinstance(recording, Recording)),
+        checks or {},
+    )
     document, materials = compose(
         recipe,
         fits,
-        summaries,
+        evidence,
         sheets,
         recipe_text=recipe_text,
         created=created,
         version=__version__,
     )
-    page = page_text(document, [draw_fit(material) for material in materials])
+    document = _with_earlier_time(document, Path(output_dir) / "report.json")
+    views = [draw_fit(material) for material in materials]
+    page = page_text(document, views, draw_scene(document, recipe, fits))
     files = ReportFiles(Path(output_dir) / "report.html", Path(output_dir) / "report.json")
     _write_both(files, page, twin_text(document))
     return files
+
+
+def facts_of(recipe: Recipe, fits: Sequence[FitResult]) -> ReportDocument:
+    """What a report of these fits would say, without recordings and figures."""
+    document, _ = compose(
+        recipe,
+        fits,
+        Evidence(),
+        (),
+        recipe_text="",
+        created=datetime.now(UTC),
+        version=__version__,
+    )
+    return document
+
+
+def side_of_fit(fit: FitResult, source: str, recipe: Recipe | None) -> Side:
+    """A fit alone as one side of a comparison; ``recipe`` says what it is of, if that is known."""
+    section = compose_fit(fit, fit.what).section
+    verdicts = gather_verdicts(fit.verdicts).rows
+    if recipe is None:
+        return Side(source, "", None, verdicts, (section,), None)
+    return Side(source, recipe.material.name, scene_facts(recipe), verdicts, (section,), None)
+
+
+def write_comparison(
+    found: Comparison, first: Side, second: Side, output_dir: str | os.PathLike[str]
+) -> ReportFiles:
+    """Write ``comparison.html`` and ``comparison.json``; InputError where that cannot be done."""
+    from scissorcal.report.comparison_page import comparison_text
+    from scissorcal.report.twin import twin_text
+
+    folder = Path(output_dir)
+    files = ReportFiles(folder / "comparison.html", folder / "comparison.json")
+    _write_both(files, comparison_text(found, first, second), twin_text(found))
+    return files
+
+
+def _with_earlier_time(document: ReportDocument, path: Path) -> ReportDocument:
+    """The document, with the time of the report there where that says just the same."""
+    from scissorcal.report.twin import twin_text
+
+    try:
+        there = path.read_text(encoding="utf-8")
+        created = datetime.fromisoformat(json.loads(there)["created"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return document
+    earlier = replace(document, created=created)
+    return earlier if twin_text(earlier) == there else document
 
 
 def _write_both(files: ReportFiles, page: str, twin: str) -> None:

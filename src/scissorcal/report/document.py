@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Literal
 
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Recording
 from scissorcal.report.inputs import FactSheet, RecordingSummary
+from scissorcal.report.sections.critic import (
+    ProposalRow,
+    ReplaySection,
+    take_proposals,
+    take_replay,
+)
 from scissorcal.report.sections.diagnostics import Diagnostic, list_diagnostics
+from scissorcal.report.sections.edge_force import EdgeForce, force_along_edge
+from scissorcal.report.sections.fracture_work import FractureWork, fracture_work
 from scissorcal.report.sections.friction_curve import FrictionCurve, trace_friction
+from scissorcal.report.sections.friction_map import FrictionMap, map_friction
 from scissorcal.report.sections.headline import Headline, write_headline
 from scissorcal.report.sections.held_out import HeldOutSection, gather_held_out
+from scissorcal.report.sections.law import named
 from scissorcal.report.sections.left_out import LeftOut, list_left_out
+from scissorcal.report.sections.pairs import Correlation, PriorRow, compare_prior, correlate
 from scissorcal.report.sections.parameters import ParameterRow, tabulate_parameters
 from scissorcal.report.sections.provenance import Provenance, trace
 from scissorcal.report.sections.residuals import StrokeResidual, rank_residuals
+from scissorcal.report.sections.response_curve import ResponseCurve, trace_response
 from scissorcal.report.sections.rungs import RungRow, compare_rungs
+from scissorcal.report.sections.scene_torque import SceneTorque, scene_torque
 from scissorcal.report.sections.sheets import SheetSection, take_sheet
 from scissorcal.report.sections.torque import TorqueSection, compare_torque
 from scissorcal.report.sections.verdicts import VerdictSection, gather_verdicts
@@ -30,21 +45,47 @@ FORMAT: Format = "scissorcal-report/1"
 
 
 @dataclass(frozen=True)
+class SceneFacts:
+    """What the recipe is about, in what two reports must agree to be compared."""
+
+    joint: str
+    cut: bool
+    moving: str
+    thickness_mm: float
+    closure: str
+    render_friction: bool
+
+
+@dataclass(frozen=True)
 class FitSection:
-    """Everything said about one fit. ``anchor`` is its address on the page."""
+    """Everything said about one fit. ``anchor`` is its address on the page.
+
+    What belongs to friction alone is None for a cut, and the other way round.
+    """
 
     anchor: str
     what: str
     rung: str
     effort: str
+    inputs_hash: str
     effort_unit: str
     position_unit: str
     headline: Headline
     friction_curve: FrictionCurve | None
+    friction_map: FrictionMap | None
     torque: TorqueSection
     residuals: tuple[StrokeResidual, ...]
+    response: ResponseCurve | None
+    fracture_work: FractureWork | None
+    edge_force: EdgeForce | None
     parameters: tuple[ParameterRow, ...]
+    correlations: tuple[Correlation, ...]
+    prior: tuple[PriorRow, ...]
+    selection: str
     rungs: tuple[RungRow, ...]
+    proposals: tuple[ProposalRow, ...]
+    replay: ReplaySection | None
+    trust_check: VerifyResult | None
     held_out: HeldOutSection
     diagnostics: tuple[Diagnostic, ...]
     notes: tuple[str, ...]
@@ -60,7 +101,9 @@ class ReportDocument:
     recipe_name: str
     recipe_description: str
     material: str
+    scene: SceneFacts
     verdicts: VerdictSection
+    scene_torque: SceneTorque
     fits: tuple[FitSection, ...]
     sheets: tuple[SheetSection, ...]
     left_out: tuple[LeftOut, ...]
@@ -76,10 +119,23 @@ class FitMaterial:
     strokes: tuple[StrokeSamples, ...]
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What fits are reported from besides themselves, all of it optional.
+
+    ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
+    checks by fit ("friction", "cut").
+    """
+
+    recordings: tuple[RecordingSummary, ...] = ()
+    raw: tuple[Recording, ...] = ()
+    checks: Mapping[str, VerifyResult] = field(default_factory=dict)
+
+
 def compose(
     recipe: Recipe,
     fits: Sequence[FitResult],
-    recordings: Sequence[RecordingSummary],
+    evidence: Evidence,
     sheets: Sequence[FactSheet],
     *,
     recipe_text: str,
@@ -87,11 +143,16 @@ def compose(
     version: str,
 ) -> tuple[ReportDocument, tuple[FitMaterial, ...]]:
     """Gather every section's facts; draws nothing and touches no file."""
+    friction = named(fits, "friction")
     materials = tuple(
-        compose_fit(fit, anchor, recordings)
+        compose_fit(fit, anchor, evidence, friction)
         for fit, anchor in zip(fits, _anchors(fits), strict=True)
     )
-    verdicts = [v for fit in fits for v in fit.verdicts] + [v for s in sheets for v in s.verdicts]
+    verdicts = [v for fit in fits for v in fit.verdicts]
+    verdicts += [
+        v for m in materials if m.section.trust_check for v in m.section.trust_check.verdicts
+    ]
+    verdicts += [v for s in sheets for v in s.verdicts]
     document = ReportDocument(
         FORMAT,
         created,
@@ -99,36 +160,70 @@ def compose(
         recipe.name,
         recipe.description,
         recipe.material.name,
+        scene_facts(recipe),
         gather_verdicts(verdicts),
+        scene_torque(recipe, fits),
         tuple(material.section for material in materials),
         tuple(take_sheet(sheet) for sheet in sheets),
         list_left_out(recipe, fits),
-        trace(recipe, recipe_text, fits, recordings),
+        trace(recipe, recipe_text, fits, evidence.recordings),
     )
     return document, materials
 
 
-def compose_fit(fit: FitResult, anchor: str, recordings: Sequence[RecordingSummary]) -> FitMaterial:
-    """Gather one fit's facts."""
-    strokes = strokes_of(fit, anchor, recordings)
+def scene_facts(recipe: Recipe) -> SceneFacts:
+    """What of a recipe two reports must agree in."""
+    return SceneFacts(
+        recipe.rig.joint,
+        recipe.scene.cut,
+        recipe.rig.moving,
+        recipe.material.thickness_mm,
+        recipe.scene.closure,
+        recipe.scene.render_friction,
+    )
+
+
+def compose_fit(
+    fit: FitResult,
+    anchor: str,
+    evidence: Evidence | None = None,
+    friction: FitResult | None = None,
+) -> FitMaterial:
+    """Gather one fit's facts; ``friction`` is the fit that a cut's torque was freed with."""
+    evidence = evidence or Evidence()
+    strokes = strokes_of(fit, anchor, evidence.recordings)
     held_out = gather_held_out(fit, [stroke.name for stroke in strokes])
     parameters = tabulate_parameters(fit)
+    cut = fit.what == "cut"
+    check = evidence.checks.get(fit.what)
+    trust = check if check is not None and check.fit_hash == fit.inputs_hash else None
     section = FitSection(
-        anchor,
-        fit.what,
-        fit.rung,
-        fit.effort,
-        fit.effort_unit,
-        fit.position_unit,
-        write_headline(fit, held_out, parameters),
-        trace_friction(fit),
-        compare_torque(fit, strokes),
-        rank_residuals(fit, strokes),
-        parameters,
-        compare_rungs(fit),
-        held_out,
-        list_diagnostics(fit),
-        fit.notes,
+        anchor=anchor,
+        what=fit.what,
+        rung=fit.rung,
+        effort=fit.effort,
+        inputs_hash=fit.inputs_hash,
+        effort_unit=fit.effort_unit,
+        position_unit=fit.position_unit,
+        headline=write_headline(fit, held_out, parameters, trust.verdicts if trust else ()),
+        friction_curve=trace_friction(fit),
+        friction_map=map_friction(fit),
+        torque=compare_torque(fit, strokes),
+        residuals=rank_residuals(fit, strokes),
+        response=trace_response(fit) if cut else None,
+        fracture_work=fracture_work(fit, friction, evidence.raw, strokes) if cut else None,
+        edge_force=force_along_edge(fit, strokes) if cut else None,
+        parameters=parameters,
+        correlations=correlate(fit),
+        prior=compare_prior(fit),
+        selection=fit.selection,
+        rungs=compare_rungs(fit),
+        proposals=take_proposals(fit),
+        replay=take_replay(fit, strokes),
+        trust_check=trust,
+        held_out=held_out,
+        diagnostics=list_diagnostics(fit),
+        notes=fit.notes,
     )
     return FitMaterial(fit, section, strokes)
 

@@ -72,7 +72,8 @@ def significant(value: Number, digits: int = 3) -> str:
         return NOT_AVAILABLE
     if number == 0.0:
         return "0"
-    decimals = digits - 1 - _exponent(_round(number, digits))
+    number = _round(number, digits)
+    decimals = digits - 1 - _exponent(number)
     return (
         _power_of_ten(number, decimals)
         if abs(number) < SMALLEST_PLAIN

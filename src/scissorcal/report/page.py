@@ -7,15 +7,25 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.trust import PRIOR_ONLY
+from scissorcal.recipe.schema import Recipe
 from scissorcal.report import numbers
 from scissorcal.report.document import FitMaterial, FitSection, ReportDocument
+from scissorcal.report.panel import Panel
+from scissorcal.report.sections.critic import show_proposals, show_replay
+from scissorcal.report.sections.edge_force import show_edge_force
+from scissorcal.report.sections.fracture_work import show_work
 from scissorcal.report.sections.friction_curve import draw_friction
+from scissorcal.report.sections.friction_map import show_friction_map
 from scissorcal.report.sections.held_out import draw_held_out
-from scissorcal.report.sections.parameters import IDENTIFIED_BELOW
+from scissorcal.report.sections.pairs import show_pairs, show_prior
 from scissorcal.report.sections.residuals import StrokeResidual, draw_residuals
+from scissorcal.report.sections.response_curve import show_response
+from scissorcal.report.sections.scene_figures import show_scene
 from scissorcal.report.sections.torque import along
 from scissorcal.report.sections.torque_figures import draw_stroke, draw_torque
+from scissorcal.report.sections.trust_check import show_trust_check
 from scissorcal.report.strokes import kind_word
 from scissorcal.report.svg import CARD, Svg, drawing_style
 
@@ -46,13 +56,20 @@ class StrokeCard:
 
 @dataclass(frozen=True)
 class FitView:
-    """A fit's facts with its figures; ``cards`` are its worst strokes, worst first."""
+    """A fit's facts with its figures; ``cards`` are its worst strokes, worst first.
+
+    ``physics``, ``posterior`` and ``doubts`` are panels on the law, its parameters, and what may
+    be wrong with either.
+    """
 
     section: FitSection
     torque: tuple[Svg, ...]
     residuals: tuple[Svg, ...]
     held_out: tuple[Svg, ...]
     cards: tuple[StrokeCard, ...]
+    physics: tuple[Panel, ...]
+    posterior: tuple[Panel, ...]
+    doubts: tuple[Panel, ...]
 
     @property
     def key(self) -> tuple[KeyEntry, ...]:
@@ -91,15 +108,50 @@ def draw_fit(material: FitMaterial) -> FitView:
                 )
                 for row in section.residuals[:MOST_CARDS]
             ),
+            _physics(material),
+            (
+                show_pairs(fit, section.correlations, section.anchor),
+                show_prior(fit, section.prior, section.anchor),
+            ),
+            (
+                show_proposals(fit, section.proposals, section.anchor),
+                show_replay(fit, section.replay, section.anchor),
+                *show_trust_check(fit, section.trust_check, section.anchor),
+            ),
         )
 
 
-def page_text(document: ReportDocument, views: Sequence[FitView]) -> str:
+def _physics(material: FitMaterial) -> tuple[Panel, ...]:
+    fit, section = material.fit, material.section
+    anchor = section.anchor
+    panels = [show_friction_map(fit, section.friction_map, material.strokes, anchor)]
+    if section.response is not None:
+        panels.append(show_response(fit, section.response, anchor))
+    if section.fracture_work is not None:
+        panels.append(show_work(section.fracture_work, anchor))
+    if section.edge_force is not None:
+        panels.append(show_edge_force(section.edge_force, anchor))
+    return tuple(panel for panel in panels if panel is not None)
+
+
+def draw_scene(document: ReportDocument, recipe: Recipe, fits: Sequence[FitResult]) -> Panel | None:
+    """Draw the rendered torque over the scene; None for what slides, which renders none."""
+    if recipe.rig.joint == "linear" or all(fit.position_unit == "m" for fit in fits):
+        return None
+    with drawing_style():
+        return show_scene(document.scene_torque, recipe, fits)
+
+
+def page_text(document: ReportDocument, views: Sequence[FitView], scene: Panel | None) -> str:
     """Write the page; every value from outside is escaped."""
-    environment = _environment()
+    template = environment().get_template("report.html.j2")
+    return template.render(document=document, views=views, scene=scene, style=style_sheet())
+
+
+def style_sheet() -> str:
+    """The style that every page carries within it."""
     style = resources.files("scissorcal.report").joinpath("templates/style.css")
-    template = environment.get_template("report.html.j2")
-    return template.render(document=document, views=views, style=style.read_text(encoding="utf-8"))
+    return style.read_text(encoding="utf-8")
 
 
 def prose(sentence: str) -> Markup:
@@ -115,17 +167,18 @@ def prose(sentence: str) -> Markup:
     )
 
 
-def _environment() -> Environment:
+def environment() -> Environment:
+    """The templates with their filters; everything is escaped unless it says otherwise."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(
+    made = Environment(
         loader=PackageLoader("scissorcal.report", "templates"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(
+    made.filters.update(
         significant=numbers.significant,
         display=numbers.display,
         short=numbers.short,
@@ -135,9 +188,8 @@ def _environment() -> Environment:
         with_decimals=numbers.with_decimals,
         prose=prose,
     )
-    environment.globals.update(
+    made.globals.update(
         decimals_for=numbers.decimals_for,
-        identified_below=IDENTIFIED_BELOW,
         prior_only=PRIOR_ONLY,
     )
-    return environment
+    return made

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -121,6 +121,53 @@ def new_axes(size: tuple[float, float]) -> tuple[Figure, Axes]:
     return figure, axes
 
 
+def new_grid(size: tuple[float, float], rows: int, columns: int) -> tuple[Figure, Any]:
+    """A figure with a grid of axes (rows, columns), margins left for labels; ``size`` in inches."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size)
+    figure.patch.set_visible(False)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for one in axes.ravel():
+        one.patch.set_visible(False)
+        one.grid(visible=False)
+    width, height = size
+    figure.subplots_adjust(
+        left=0.75 / width,
+        right=1 - 0.08 / width,
+        bottom=0.55 / height,
+        top=1 - 0.25 / height,
+        wspace=0.12,
+        hspace=0.12,
+    )
+    return figure, axes
+
+
+def label_lines(axes: Axes, lines: Sequence[tuple[Any, Any, str, str]]) -> None:
+    """Write each line's name at its highest place, apart from the others; (x, y, name, colour)."""
+    import numpy as np
+
+    low, high = axes.get_ylim()
+    step = 0.075 * (high - low)
+    taken: list[tuple[float, float]] = []
+    left, right = axes.get_xlim()
+    for x, y, name, colour in lines:
+        if not np.any(np.isfinite(y)):
+            continue
+        at = int(np.nanargmax(y))
+        place, side = float(y[at]) + 0.4 * step, float(x[at])
+        apart = 0.22 * (right - left)
+        while any(abs(place - b) < step and abs(side - a) < apart for a, b in taken):
+            place += step
+        taken.append((side, place))
+        middle = 0.5 * (left + right)
+        axes.text(
+            side, place, name, color=colour, fontsize=8.5, ha="left" if side < middle else "right"
+        )
+    if taken:
+        axes.set_ylim(low, max(high, max(place for _, place in taken) + 1.1 * step))
+
+
 def look_of(kind: str) -> tuple[str, str]:
     """Colour and marker of a kind of stroke."""
     return KIND_LOOKS.get(kind, (ORANGE, "v"))
@@ -150,7 +197,12 @@ def finish(figure: Figure, anchor: str, title: str, caption: str, reading: str =
 
 
 def _set_margins(figure: Figure) -> None:
-    """Leave room for the labels, counted in characters: a layout engine draws everything twice."""
+    """Leave room for the labels, counted in characters: a layout engine draws everything twice.
+
+    A grid of axes has its margins already.
+    """
+    if len(figure.axes) != 1:
+        return
     (axes,) = figure.axes
     formatter, places = axes.yaxis.get_major_formatter(), list(axes.get_yticks())
     longest = max((len(label) for label in formatter.format_ticks(places)), default=0)

@@ -8,6 +8,7 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.requirements import requirements
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.fits import current_fits
+from scissorcal.workday.reviews import ReviewState, review_state
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -28,13 +29,20 @@ class Built:
 def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool = False) -> Built:
     """Compile the fits of a workspace into package/<recipe>.zip.
 
-    Nothing is done where the package there was built from the same fits and recipe, unless
+    The package carries the signature under the report, where there is one that stands. Nothing is
+    done where the package there was built from the same fits, recipe and signature, unless
     ``force``. Raises MissingError where a fit is missing or has fallen behind, and what
     `scissorcal.package.build_package` raises.
     """
     import numpy as np
 
-    from scissorcal.package import build_package, check_package, open_package, package_inputs_hash
+    from scissorcal.package import (
+        build_package,
+        check_package,
+        open_package,
+        package_inputs_hash,
+        put_review,
+    )
 
     recipe = workspace.recipe()
     if not requirements(recipe).tables:
@@ -45,6 +53,7 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
     fits = current_fits(workspace, recipe)
     friction, cut = fits.get("friction"), fits.get("cut")
     path = workspace.package_path(recipe)
+    state = review_state(workspace, recipe, fits)
     if path.is_file() and not force:
         try:
             package = open_package(path)
@@ -52,7 +61,19 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
             package = None
         expected = package_inputs_hash(recipe, friction, cut)
         if package and package.manifest.provenance.inputs_hash == expected:
-            verdicts = check_package(path)
-            return Built(path, package.manifest, verdicts, package.warnings, cached=True)
-    summary = build_package(recipe, friction, cut, path, np.random.default_rng(seed))
-    return Built(path, summary.manifest, summary.verdicts, summary.warnings, cached=False)
+            cached = package.manifest.review == state.valid
+            if not cached:
+                package = put_review(package, state.valid, path)
+            warnings = _void(state) + package.warnings
+            return Built(path, package.manifest, check_package(path), warnings, cached)
+    summary = build_package(
+        recipe, friction, cut, path, np.random.default_rng(seed), review=state.valid
+    )
+    warnings = _void(state) + summary.warnings
+    return Built(path, summary.manifest, summary.verdicts, warnings, cached=False)
+
+
+def _void(state: ReviewState) -> tuple[str, ...]:
+    if not state.why:
+        return ()
+    return (f"The signature under the report was not taken along: {state.why}.",)

@@ -10,7 +10,8 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
 from scissorcal.workday.fits import is_current
 from scissorcal.workday.recordings import UnreadableError, usable_recordings
-from scissorcal.workday.reports import reported_fits
+from scissorcal.workday.reports import why_stale
+from scissorcal.workday.reviews import review_state
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def make_plan(workspace: Workspace) -> Plan:
         captured = next(step for step in steps if step.name == f"capture {what}")
         steps.append(_fit_step(workspace, recipe, what, item.why, captured, fits))
     fitted = all(step.status == "done" for step in steps)
-    steps.append(_report_step(workspace, fits, fitted))
+    report = _report_step(workspace, recipe, fits, fitted)
+    steps += [report, _review_step(workspace, recipe, fits, report, notes)]
     if needs.tables:
         steps.append(_package_step(workspace, recipe, fits, fitted))
     return Plan(recipe.name, tuple(steps), needs.tables, needs.left_out, tuple(notes))
@@ -141,15 +143,46 @@ def _fit_step(
     return Step(name, "done", state, why, command, (workspace.relative(path),))
 
 
-def _report_step(workspace: Workspace, fits: "dict[FitKind, FitResult]", fitted: bool) -> Step:
+def _report_step(
+    workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]", fitted: bool
+) -> Step:
     name, why, command = "report", "what to review before use", "scissorcal report"
     path = workspace.report_json
     if not path.is_file() or not workspace.report_html.is_file():
         return Step(name, "missing", "not written yet", why, command)
-    if not fitted or reported_fits(workspace) != {fit.inputs_hash for fit in fits.values()}:
-        return Step(name, "stale", "it shows other fits than there are now", why, command)
+    stale = why_stale(workspace, recipe, fits) if fitted else "a fit is not as it should be"
+    if stale:
+        return Step(name, "stale", stale, why, command)
     files = (workspace.relative(workspace.report_html), workspace.relative(path))
     return Step(name, "done", "shows the fits as they are now", why, command, files)
+
+
+def _review_step(
+    workspace: Workspace,
+    recipe: Recipe,
+    fits: "dict[FitKind, FitResult]",
+    report: Step,
+    notes: list[str],
+) -> Step:
+    name, why = "report sign", "who answers for it"
+    command = "scissorcal report sign --name NAME --decision accept"
+    state = review_state(workspace, recipe, fits)
+    file = workspace.relative(workspace.signature_path)
+    if state.why:
+        void = f"void: {state.why}"
+        if state.review:
+            notes.append(f"The signature is void ({state.review.words}): {state.why}.")
+        return Step(name, "stale", void, why, command)
+    if state.review is None:
+        return Step(name, "missing", "nobody has signed the report", why, command)
+    if report.status != "done":
+        return Step(name, "stale", f"the report is {report.status}", why, command)
+    if state.review.decision == "reject":
+        notes.append(
+            f"The report was {state.review.words}. Mend that, fit and report again before a "
+            "package of it is rendered."
+        )
+    return Step(name, "done", state.review.words, why, command, (file,))
 
 
 def _package_step(
@@ -168,5 +201,7 @@ def _package_step(
     expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
     if not fitted or manifest.provenance.inputs_hash != expected:
         return Step(name, "stale", "built from other fits or another recipe", why, command)
+    if manifest.review != review_state(workspace, recipe, fits).valid:
+        return Step(name, "stale", "it carries another review than there is now", why, command)
     state = f"error bound {manifest.bound.stated_Nm:.2g} N m"
     return Step(name, "done", state, why, command, (workspace.relative(path),))

@@ -68,6 +68,20 @@ def render_workspace(
     return Rendered(done, path, rig)
 
 
+def review_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:
+    """What is wrong with the review of the package that would be rendered, as sentences.
+
+    Empty where there is none that can be opened, which rendering it then says.
+    """
+    from scissorcal.package import open_package
+
+    try:
+        package = open_package(package_path or workspace.package_path(workspace.recipe()))
+    except ScissorcalError:
+        return ()
+    return package.review_warnings
+
+
 def package_has_fallen_behind(workspace: Workspace) -> bool:
     """Whether the workspace's package is of other fits or another recipe than there are now.
 

@@ -1,6 +1,7 @@
 """Write a workspace's report, and tell which fits a report shows."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
+    from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.report import FactSheet
 
 
@@ -32,48 +34,96 @@ class Reported:
 def write_workspace_report(workspace: Workspace, *, now: datetime | None = None) -> Reported:
     """Write report/report.html and report/report.json from the workspace's fits and package.
 
-    A fit that is not there yet is named as such in the report. Raises MissingError where there is
-    none at all, or one has fallen behind.
+    A fit that is not there yet is named as such in the report. Where nothing that the report says
+    has changed, it keeps its time, and with it a signature. Raises MissingError where there is no
+    fit at all, or one has fallen behind.
     """
     from scissorcal.report import build_report
 
-    recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True)
-    kinds: list[FitKind] = list(fits)
+    told = _gather(workspace)
     recordings = [
         recording
-        for kind in kinds
-        for recording in usable_recordings(workspace, recipe, kind).recordings
+        for kind in told.fits
+        for recording in usable_recordings(workspace, told.recipe, kind).recordings
     ]
-    sheets = _package_sheets(workspace, recipe, fits)
-    files = build_report(
-        recipe,
-        list(fits.values()),
+    build_report(
+        told.recipe,
+        list(told.fits.values()),
         recordings,
         workspace.report_html.parent,
         created=now or datetime.now(UTC),
         recipe_text=read_text(workspace.recipe_path),
-        sheets=sheets,
+        sheets=told.sheets,
+        checks=told.checks,
     )
-    verdicts = [verdict for fit in fits.values() for verdict in fit.verdicts]
-    verdicts += [verdict for sheet in sheets for verdict in sheet.verdicts]
-    return Reported(files.html, files.json, tuple(verdicts))
+    return Reported(workspace.report_html, workspace.report_json, told.verdicts)
+
+
+def read_workspace_report(workspace: Workspace) -> Reported:
+    """The report that lies there, left as it is, with the verdicts on what the workspace holds."""
+    return Reported(workspace.report_html, workspace.report_json, _gather(workspace).verdicts)
+
+
+def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitResult]") -> str:
+    """Say what in the workspace is no longer as the report there shows it; empty if nothing is."""
+    from scissorcal.recipe.load import parse_recipe
+    from scissorcal.report import posterior_sha256
+
+    facts = _facts(workspace)
+    provenance = facts.get("provenance", {}) if isinstance(facts, dict) else {}
+    shown = {
+        row.get("fit"): (row.get("inputs_hash"), row.get("posterior_sha256"))
+        for row in provenance.get("fits", [])
+    }
+    if set(shown) != set(fits) or any(
+        shown[what] != (fit.inputs_hash, posterior_sha256(fit)) for what, fit in fits.items()
+    ):
+        return "it shows other fits than there are now"
+    try:
+        reported = parse_recipe(str(provenance.get("recipe_text", "")), "the reported recipe")
+    except InputError:
+        return "it shows another recipe than there is now"
+    if reported != recipe:
+        return "it shows another recipe than there is now"
+    checked = {section["what"]: section.get("trust_check") for section in facts.get("fits", [])}
+    for what, check in _trust_checks(workspace, fits).items():
+        if (checked.get(what) or {}).get("seed") != check.seed:
+            return f"the trust check of {what} was made since"
+    return ""
 
 
 def reported_fits(workspace: Workspace) -> set[str]:
     """Return the inputs hashes of the fits that the report there shows; none if it is damaged."""
-    try:
-        facts = json.loads(workspace.report_json.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return set()
-    return set(_values(facts, "inputs_hash"))
+    return set(_values(_facts(workspace), "inputs_hash"))
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a workspace has to report."""
+
+    recipe: Recipe
+    fits: "dict[FitKind, FitResult]"
+    sheets: "list[FactSheet]"
+    checks: "dict[str, VerifyResult]"
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        holders = (*self.fits.values(), *self.checks.values(), *self.sheets)
+        return tuple(verdict for holder in holders for verdict in holder.verdicts)
+
+
+def _gather(workspace: Workspace) -> _Told:
+    recipe = workspace.recipe()
+    fits = current_fits(workspace, recipe, partial=True)
+    sheets = _package_sheets(workspace, recipe, fits)
+    return _Told(recipe, fits, sheets, _trust_checks(workspace, fits))
 
 
 def _package_sheets(
     workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]"
 ) -> "list[FactSheet]":
     """What the workspace's package promises, where there is one that can be opened."""
-    from scissorcal.package import check_package, open_package, package_inputs_hash
+    from scissorcal.package import REVIEW_CHECK, check_package, open_package, package_inputs_hash
     from scissorcal.report import sheet_from_mapping
 
     path = workspace.package_path(recipe)
@@ -96,8 +146,31 @@ def _package_sheets(
             "It was built from other fits or another recipe than this report shows: run "
             "`scissorcal package build`."
         )
-    verdicts = check_package(path)
+    verdicts = [verdict for verdict in check_package(path) if verdict.check != REVIEW_CHECK]
     return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts, notes=notes)]
+
+
+def _trust_checks(
+    workspace: Workspace, fits: "Mapping[FitKind, FitResult]"
+) -> "dict[str, VerifyResult]":
+    """The trust checks there that are of these very fits."""
+    from scissorcal.calibration.verify.storage import load_verify
+
+    found = {
+        what: load_verify(workspace.verify_path(what))
+        for what in fits
+        if workspace.verify_path(what).is_file()
+    }
+    return {
+        what: check for what, check in found.items() if check.fit_hash == fits[what].inputs_hash
+    }
+
+
+def _facts(workspace: Workspace) -> Any:
+    try:
+        return json.loads(workspace.report_json.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
 
 
 def _values(facts: Any, key: str) -> list[str]:

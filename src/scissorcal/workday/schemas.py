@@ -17,10 +17,12 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
+    "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
+    "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
     "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
 }

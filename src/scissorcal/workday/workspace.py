@@ -23,8 +23,8 @@ class Workspace:
     """The file names of one workspace.
 
     captures/<kind>-<UTC stamp>.mcap, fits/friction.nc and fits/cut.nc with their trust checks
-    fits/<what>.verify.json, report/report.html and report/report.json, package/<recipe name>.zip,
-    all below ``root``.
+    fits/<what>.verify.json, report/report.html and report/report.json with their signature
+    report/signature.json, package/<recipe name>.zip, all below ``root``.
     """
 
     root: Path
@@ -44,6 +44,10 @@ class Workspace:
     @property
     def report_json(self) -> Path:
         return self.root / "report" / "report.json"
+
+    @property
+    def signature_path(self) -> Path:
+        return self.root / "report" / "signature.json"
 
     def recipe(self) -> "Recipe":
         """Load the workspace's recipe; InputError where it is wrong."""

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.trust import K_HAT_LIMIT
 from scissorcal.report.numbers import Scalar, scalar
 
 MEANINGS = {
-    "k_hat": "Tail of the importance weights: below 0.7 the draws can be used.",
+    "k_hat": f"Tail of the importance weights: below {K_HAT_LIMIT} the draws can be used.",
     "effective_samples": "What the posterior draws are worth as independent ones.",
     "evaluations": "Times the model was evaluated.",
     "observations": "Bins of data that entered the likelihood.",

@@ -48,7 +48,7 @@ def trace_friction(fit: FitResult) -> FrictionCurve | None:
     rate = np.concatenate([-one_way[::-1], one_way])
     draws = fit.draws[thinned(np.arange(len(fit.draws)), MOST_DRAWS)]
     center = _center(fit)
-    curves = _friction(fit, draws[:, :, None], np.asarray(center), rate[None, :])
+    curves = friction_of(fit, draws[:, :, None], np.asarray(center), rate[None, :])
     low, high = np.quantile(curves, [0.05, 0.95], axis=0)
     return FrictionCurve(
         finite(center),
@@ -67,7 +67,7 @@ def draw_friction(
         return ()
     figure, axes = new_axes(PANEL)
     series = fit.series
-    own = _friction(fit, fit.map_point[:, None], series.opening, series.opening_rate)
+    own = friction_of(fit, fit.map_point[:, None], series.opening, series.opening_rate)
     partial = own + series.measured - series.predicted
     kinds = list(dict.fromkeys(stroke.name.kind for stroke in strokes))
     for kind in kinds:
@@ -96,7 +96,7 @@ def draw_friction(
     return (finish(figure, f"{anchor}-friction", title, caption, reading),)
 
 
-def _friction(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
+def friction_of(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
     return friction_torque(friction_law(named, _center(fit)), opening, rate)

@@ -8,6 +8,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.report.numbers import percent
 from scissorcal.report.sections.held_out import HeldOutSection
 from scissorcal.report.sections.parameters import ParameterRow
+from scissorcal.verdicts import Verdict
 
 Stance = Literal["trust", "care", "reject"]
 
@@ -45,6 +46,11 @@ ADVICE: tuple[tuple[tuple[str, ...], str], ...] = (
         "recorded is what the recipe says.",
     ),
     (
+        ("calibration", "refits"),
+        "Intervals do not hold what they promise on data simulated from the fit itself: fit with "
+        "more effort, or choose a simpler rung in the recipe's `[fit]` table.",
+    ),
+    (
         ("trust", "halves"),
         "Two halves of the data disagree by more than they claim: check that nothing moved or "
         "warmed up during the capture, then capture again.",
@@ -69,18 +75,24 @@ class Headline:
 
 
 def write_headline(
-    fit: FitResult, held_out: HeldOutSection, parameters: Sequence[ParameterRow]
+    fit: FitResult,
+    held_out: HeldOutSection,
+    parameters: Sequence[ParameterRow],
+    checked: Sequence[Verdict] = (),
 ) -> Headline:
     """Weigh a fit's verdicts, effort and identifiability into one sentence.
+
+    ``checked`` are the verdicts of its trust check, if one was made.
 
     Any failed verdict rejects. Missing verdicts, checks that were not evaluated, draft effort, or
     a parameter that only repeats its prior ask for care.
     """
-    failed = [verdict.check for verdict in fit.verdicts if verdict.status == "fail"]
+    verdicts = (*fit.verdicts, *checked)
+    failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
     draft = fit.effort == "draft"
     open_checks = [
         verdict.check
-        for verdict in fit.verdicts
+        for verdict in verdicts
         if verdict.status == "not_evaluated" and not (draft and verdict.check == DRAFT_SKIPS)
     ]
     silent = [row.name for row in parameters if row.word == "prior only"]
@@ -89,7 +101,7 @@ def write_headline(
         sentence = f"Do not rely on the {fit.what} fit: {_listed(failed)} failed.{error}"
         return Headline(fit.what, "reject", sentence, _advice(fit, failed))
     doubts, steps = [], []
-    if not fit.verdicts:
+    if not verdicts:
         doubts.append("nothing was checked")
         steps.append("Fit again, so that its checks are made.")
     if open_checks:
@@ -105,10 +117,12 @@ def write_headline(
     if doubts:
         sentence = f"Use the {fit.what} fit with care: {'; '.join(doubts)}.{error}"
         return Headline(fit.what, "care", sentence, tuple(steps))
-    count = len(fit.verdicts)
+    count = len(verdicts)
     made = "its one check" if count == 1 else f"all {count} checks"
     sentence = f"The {fit.what} fit can be trusted: it passed {made}.{error}"
-    return Headline(fit.what, "trust", sentence, ("Go on with `scissorcal package build`.",))
+    return Headline(
+        fit.what, "trust", sentence, ("Read on, and sign with `scissorcal report sign`.",)
+    )
 
 
 def _error_words(held_out: HeldOutSection) -> str:

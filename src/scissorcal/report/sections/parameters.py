@@ -7,9 +7,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite
 
-IDENTIFIED_BELOW = 0.3
-
-Word = Literal["identified", "weak", "prior only", "not available"]
+Word = Literal["identified", "prior only", "not available"]
 
 
 @dataclass(frozen=True)
@@ -50,11 +48,9 @@ def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
 def identifiability_word(ratio: Number) -> Word:
     """Say what the ratio of posterior to prior standard deviation means.
 
-    >>> identifiability_word(0.02), identifiability_word(0.5), identifiability_word(0.99)
-    ('identified', 'weak', 'prior only')
+    >>> identifiability_word(0.02), identifiability_word(0.99)
+    ('identified', 'prior only')
     """
     if ratio is None:
         return "not available"
-    if ratio < IDENTIFIED_BELOW:
-        return "identified"
-    return "weak" if ratio <= PRIOR_ONLY else "prior only"
+    return "identified" if ratio <= PRIOR_ONLY else "prior only"

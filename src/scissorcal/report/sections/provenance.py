@@ -1,7 +1,10 @@
 """Where everything comes from: recordings, hashes, devices, the recipe's text."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.schema import Recipe
@@ -36,10 +39,14 @@ class SourceRow:
 
 @dataclass(frozen=True)
 class FitOrigin:
-    """A fit's inputs: equal hashes need no second fit."""
+    """A fit's inputs, and its outcome: equal ``inputs_hash`` needs no second fit.
+
+    ``posterior_sha256`` tells a fit from another of the same inputs (:func:`posterior_sha256`).
+    """
 
     fit: str
     inputs_hash: str
+    posterior_sha256: str
     sources: tuple[str, ...]
 
 
@@ -66,10 +73,17 @@ def trace(
             users = tuple(fit.what for fit in fits if source in fit.sources)
             path, digest = split_source(source)
             rows.append(SourceRow(path, digest, "", "", None, None, None, users, (), ()))
-    origins = tuple(FitOrigin(fit.what, fit.inputs_hash, fit.sources) for fit in fits)
+    origins = tuple(
+        FitOrigin(fit.what, fit.inputs_hash, posterior_sha256(fit), fit.sources) for fit in fits
+    )
     if recipe_text:
         return Provenance(tuple(rows), origins, recipe_text, "as written")
     return Provenance(tuple(rows), origins, recipe.model_dump_json(indent=2), "as read, in JSON")
+
+
+def posterior_sha256(fit: FitResult) -> str:
+    """SHA-256 of a fit's draws: their bytes as little-endian float64, draw by draw."""
+    return hashlib.sha256(np.ascontiguousarray(fit.draws, dtype="<f8").tobytes()).hexdigest()
 
 
 def _row(

@@ -12,7 +12,9 @@ from scissorcal.report.numbers import Number, finite
 class RungRow:
     """One rung: ``bic_excess`` is its BIC above the lowest, ``held_out_rms`` in the effort unit.
 
-    ``held_out_score`` is the log density of unseen strokes, higher where they are predicted better.
+    ``held_out_score`` is the log density of unseen strokes, higher where they are predicted better;
+    ``loo`` the same by the posterior without each stroke (PSIS), with its standard error.
+    ``equivalent`` rungs cannot be told from the best.
     """
 
     name: str
@@ -21,6 +23,9 @@ class RungRow:
     bic_excess: Number
     held_out_rms: Number
     held_out_score: Number
+    loo: Number
+    loo_se: Number
+    equivalent: bool
     chosen: bool
 
 
@@ -42,5 +47,8 @@ def _row(rung: Mapping[str, Any], lowest: Number) -> RungRow:
         excess,
         finite(rung.get("held_out_rms")),
         finite(rung.get("held_out_score")),
+        finite(rung.get("loo")),
+        finite(rung.get("loo_se")),
+        bool(rung.get("equivalent", rung.get("chosen", False))),
         bool(rung.get("chosen", False)),
     )

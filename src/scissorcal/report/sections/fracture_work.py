@@ -1,0 +1,305 @@
+"""Fracture work by stroke: what the blades spent on the cut, against J_c h times its length."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration import friction_law
+from scissorcal.calibration.conditioning import Bins, condition
+from scissorcal.calibration.cut import CUTOFF_HZ
+from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
+from scissorcal.calibration.result import FitResult
+from scissorcal.errors import InputError
+from scissorcal.model import (
+    Cutting,
+    cut_torque_along,
+    edge_height,
+    friction_torque,
+    ripple_moments,
+)
+from scissorcal.recording.recording import Recording
+from scissorcal.report.numbers import Number, finite, percent, significant
+from scissorcal.report.panel import Panel, Row, Table, absent, columns
+from scissorcal.report.reduce import Array
+from scissorcal.report.sections.law import cutting_of, some_draws
+from scissorcal.report.strokes import StrokeName, StrokeSamples, split_source
+from scissorcal.report.svg import INK, MUTED, PANEL, Svg, finish, look_of, new_axes
+
+Places = NDArray[np.int64]
+
+SHORTEST_CUT_M = 2e-3
+"""Strokes that cut less than this have no work to speak of."""
+ADVANCED_SHARE = 0.05
+DRAWS = 100
+FELT = 0.07
+SURE = 3.0
+MOST_BARS = 24
+
+
+@dataclass(frozen=True)
+class StrokeWork:
+    """One stroke's balance, in J and m.
+
+    ``total`` is the work of the torque less friction and inertia, ``stored`` what of it the
+    material still held at the end more than at the beginning, ``fracture`` the rest with its
+    standard deviation ``sd`` (friction's posterior and the noise). ``expected`` is J_c h times
+    ``length``, less what a ripple does not take, with 5 and 95 %. ``advanced`` says that the pivot
+    moved along the cut meanwhile, whose work nobody measured.
+    """
+
+    name: StrokeName
+    length: Number
+    total: Number
+    stored: Number
+    fracture: Number
+    sd: Number
+    expected: Number
+    expected_low: Number
+    expected_high: Number
+    advanced: bool
+
+
+@dataclass(frozen=True)
+class FractureWork:
+    """All strokes that cut, in order; ``missing`` says why there is none."""
+
+    missing: str
+    rows: tuple[StrokeWork, ...]
+
+
+def fracture_work(
+    fit: FitResult,
+    friction: FitResult | None,
+    recordings: Sequence[Recording],
+    strokes: Sequence[StrokeSamples],
+) -> FractureWork:
+    """Balance every stroke through material over all of its samples, those at rest included."""
+    cutting = cutting_of(fit)
+    if friction is None or cutting is None:
+        return FractureWork("The work needs fits of friction and of the cut: `scissorcal fit`.", ())
+    if cutting.fracture_energy is None:
+        return FractureWork("Nothing is cut in this scene, so there is no fracture to pay for.", ())
+    wanted = [split_source(source) for source in fit.sources]
+    chosen = [
+        next((r for r in recordings if r.content_hash == digest and digest), None)
+        for _, digest in wanted
+    ]
+    if not chosen or any(recording is None for recording in chosen):
+        return FractureWork(
+            "The work is taken from the recordings themselves, and they were not handed to this "
+            "report: run `scissorcal report` in their workspace.",
+            (),
+        )
+    try:
+        every = condition(
+            tuple(r for r in chosen if r is not None), CUTOFF_HZ, ACCELERATION_CUTOFF_HZ
+        )
+    except InputError as error:
+        return FractureWork(str(error), ())
+    balance = _Balance(fit, friction, cutting, every.where(every.sheet >= 0))
+    names = {stroke.name.stroke: stroke.name for stroke in strokes}
+    rows = [balance.of(label, name) for label, name in sorted(names.items()) if label >= 0]
+    kept = tuple(row for row in rows if row is not None)
+    return FractureWork("" if kept else "No stroke cut the material.", kept)
+
+
+def show_work(section: FractureWork, anchor: str) -> Panel:
+    """The panel: all strokes together in words, work over length, the table."""
+    title, where = "Fracture work by stroke", f"{anchor}-work"
+    if section.missing:
+        return absent(where, title, section.missing)
+    found = tuple(
+        Row(
+            (
+                row.name.label + (" (pivot moved)" if row.advanced else ""),
+                significant(_milli(row.length)),
+                f"{significant(_milli(row.fracture))} ± {significant(_milli(row.sd), 2)}",
+                _expected_words(row),
+                percent(_share(row)),
+                significant(_milli(row.stored)),
+            ),
+            anchor=row.name.anchor,
+            marked=_odd(row),
+        )
+        for row in section.rows
+    )
+    heads = columns(
+        "Stroke",
+        "Cut [mm]",
+        "Fracture work [mJ]",
+        "Expected [mJ]",
+        "Measured / expected",
+        "Left in the material [mJ]",
+    )
+    lead = (
+        "Work of the torque over the whole stroke, less friction, inertia and what the pressed "
+        "material still holds at its end. Expected is J_c h times the length of the cut, which is "
+        "the model's; where fracture ripples, its mean over a cycle.",
+    )
+    return Panel(
+        where,
+        title,
+        lead,
+        _finding(section),
+        (_draw(section, where),),
+        Table("One row for each stroke that cut.", heads, found),
+    )
+
+
+def _expected_words(row: StrokeWork) -> str:
+    low, high = (significant(_milli(v)) for v in (row.expected_low, row.expected_high))
+    return f"{significant(_milli(row.expected))} ({low} to {high})"
+
+
+class _Balance:
+    """Energies of a cut's strokes from all bins with material in place."""
+
+    def __init__(self, fit: FitResult, friction: FitResult, cutting: Cutting, bins: Bins) -> None:
+        self.bins, self.cutting = bins, cutting
+        self.noise = float(fit.diagnostics.get("residual_rms", 0.0))
+        self.independent = float(fit.diagnostics.get("independent_share", 1.0)) or 1.0
+        self.drawn = cutting_of(fit, some_draws(fit, DRAWS)[:, None, :])
+        self.tip = np.concatenate(
+            [
+                cut_torque_along(cutting, bins.opening[run], bins.advance[run], 0.0)[1]
+                for run in _runs(bins)
+            ]
+            or [np.zeros(0)]
+        )
+        contact = self.tip - bins.advance
+        view = edge_height(cutting.edge, contact, bins.opening / cutting.moving_blades)
+        self.slope = view.slope
+        self.stored = cutting.moving_blades * cutting.response.energy_at(
+            cutting.upper_face_m - view.height
+        )
+        self.friction = some_draws(friction, DRAWS)
+        self.names = [parameter.name for parameter in friction.parameters]
+        self.center = float(friction.structure.get("angle_center", np.nan))
+
+    def of(self, label: int, name: StrokeName) -> StrokeWork | None:
+        """The balance of one stroke; None where it did not cut."""
+        bins = self.bins
+        at = np.flatnonzero(bins.stroke == label)
+        if len(at) < 2 or name.kind == "opening":
+            return None
+        moved = np.diff(self.tip[at])
+        length = float(moved.sum())
+        if length < SHORTEST_CUT_M:
+            return None
+        work = self._work(at)
+        stored = float(self.stored[at[-1]] - self.stored[at[0]])
+        step = bins.rate[at] * bins.bin_s
+        scatter = self.noise * float(np.sqrt(np.sum(step**2) / self.independent))
+        expected = self._expected(at, moved) * length
+        low, high = np.quantile(expected, [0.05, 0.95])
+        span = float(bins.advance[at].max() - bins.advance[at].min())
+        return StrokeWork(
+            name,
+            finite(length),
+            finite(work.mean()),
+            finite(stored),
+            finite(work.mean() - stored),
+            finite(np.hypot(work.std(), scatter)),
+            finite(expected.mean()),
+            finite(low),
+            finite(high),
+            span > ADVANCED_SHARE * length,
+        )
+
+    def _work(self, at: Places) -> Array:
+        """Work into the material over a stroke, by draws of friction (k,), in J.
+
+        At rest the sign of the rate is noise: friction is then taken in the stroke's direction,
+        and the noise of the rate averages out.
+        """
+        bins = self.bins
+        values = {name: self.friction[:, [i]] for i, name in enumerate(self.names)}
+        way = np.sign(np.sum(bins.rate[at])) or -1.0
+        rate = way * np.maximum(np.abs(bins.rate[at]), bins.rate_floor)
+        law = friction_law(values, self.center)
+        empty = friction_torque(law, bins.opening[at], rate)
+        offset = values.get("offset", np.zeros((1, 1)))
+        inertia = values.get("inertia", np.zeros((1, 1)))
+        material = inertia * bins.acceleration[at] + empty + offset - bins.drive[at]
+        return np.asarray(-np.sum(material * bins.rate[at], axis=-1) * bins.bin_s)
+
+    def _expected(self, at: Places, moved: Array) -> Array:
+        """Energy that a metre of cut takes on average, by draws (k,), in J/m."""
+        assert self.drawn is not None
+        energy = np.asarray(self.drawn.fracture_energy)
+        weight = moved / moved.sum()
+        slope = float(np.sum(weight * self.slope[at[1:]]))
+        peak = energy / (self.drawn.moving_blades * max(slope, 1e-9))
+        return np.ravel(energy * ripple_moments(self.drawn, peak).mean_share)
+
+
+def _runs(bins: Bins) -> list[slice]:
+    ends = [0, *(np.flatnonzero(np.diff(bins.sheet)) + 1).tolist(), len(bins.sheet)]
+    return [slice(a, b) for a, b in pairwise(ends) if b > a]
+
+
+def _finding(section: FractureWork) -> str:
+    good = [row for row in section.rows if not row.advanced] or list(section.rows)
+    length, work, expected = (
+        sum(getattr(row, key) or 0.0 for row in good) for key in ("length", "fracture", "expected")
+    )
+    sd = float(np.sqrt(sum((row.sd or 0.0) ** 2 for row in good)))
+    words = (
+        f"Together {len(good)} strokes spent {significant(1e3 * work)} mJ on "
+        f"{significant(1e3 * length)} mm of cut, {significant(work / length)} J/m "
+        f"(± {significant(sd / length, 2)}); the fit says {significant(expected / length)} J/m."
+    )
+    odd = [row.name.label for row in section.rows if _odd(row)]
+    return words + (f" Unlike the fit: {'; '.join(odd[:3])}." if odd else "")
+
+
+def _draw(section: FractureWork, anchor: str) -> Svg:
+    """Work per metre of cut by stroke, against what the fit expects of it."""
+    shown = section.rows[:MOST_BARS]
+    figure, axes = new_axes((PANEL[0], max(1.6, 0.9 + 0.19 * len(shown))))
+    for place, row in enumerate(shown):
+        length = row.length or 1.0
+        low, high = ((v or 0.0) / length for v in (row.expected_low, row.expected_high))
+        axes.barh(place, high - low, left=low, height=0.8, color=INK, alpha=0.2)
+        colour, marker = look_of(row.name.kind)
+        work, sd = (row.fracture or 0.0) / length, (row.sd or 0.0) / length
+        axes.plot([work - 2 * sd, work + 2 * sd], [place, place], color=MUTED, lw=1.6)
+        face = "none" if row.advanced else colour
+        address = f"#{row.name.anchor}"
+        axes.plot(work, place, marker, color=colour, mfc=face, ms=5, mew=1.1, url=address)
+    labels = axes.set_yticks(range(len(shown)), labels=[row.name.label for row in shown])
+    for tick, row in zip(labels, shown, strict=True):
+        tick.label1.set_url(f"#{row.name.anchor}")
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="y", visible=False)
+    axes.set_ylim(len(shown) - 0.4, -0.6)
+    axes.locator_params(axis="x", nbins=4)
+    axes.set_xlabel("fracture work per metre of cut [J/m]")
+    caption = (
+        "Marks are measured, with two standard deviations; the grey holds what the fit expects "
+        "with 90 %. Open marks: the pivot moved meanwhile."
+    )
+    if len(shown) < len(section.rows):
+        caption += f" The first {len(shown)} of {len(section.rows)} strokes."
+    title = "Fracture work per metre of cut"
+    return finish(figure, f"{anchor}-f", title, caption, f"{_finding(section)} {caption}")
+
+
+def _odd(row: StrokeWork) -> bool:
+    if row.fracture is None or not row.expected or not row.sd:
+        return False
+    away = row.fracture - row.expected
+    return abs(away) > SURE * row.sd and abs(away) > FELT * row.expected
+
+
+def _share(row: StrokeWork) -> Number:
+    return row.fracture / row.expected if row.fracture is not None and row.expected else None
+
+
+def _milli(value: Number) -> Number:
+    return None if value is None else 1e3 * value
