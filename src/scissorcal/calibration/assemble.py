@@ -44,6 +44,7 @@ def assemble(
     nuisance: tuple[str, ...],
     rng: np.random.Generator,
     critic: bool,
+    load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
 ) -> FitResult:
@@ -52,7 +53,8 @@ def assemble(
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
     ``extra_notes`` are what only the fit itself can say; they follow the common ones. ``critic``
-    has the residuals searched for what the law lacks, unless the effort is draft.
+    has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
+    what the joint bore, where that was measured.
     """
     layout = chosen.rung.layout
     fitted = layout.fitted(posterior.draws)
@@ -64,7 +66,7 @@ def assemble(
     diagnostics = _diagnostics(chosen, posterior, bins, measured)
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
-        critique = _criticise(what, chosen, bins, measured, joint, rng)
+        critique = _criticise(what, chosen, bins, measured, load, joint, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(
         what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
@@ -136,12 +138,12 @@ def _criticise(
     chosen: Climbed,
     bins: Bins,
     measured: Array,
+    load: Array | None,
     joint: Joint,
     rng: np.random.Generator,
 ) -> Critique:
-    """A cut's load is the torque that the law expects of the material; empty motion has none."""
-    load = None
-    if what == "cut":
+    """A cut's load, where none was measured, is the torque that the law expects of the material."""
+    if what == "cut" and load is None:
         load = measured - chosen.rung.likelihood.residuals(chosen.optimum.point)
     motion = Motion(bins.opening, bins.rate, bins.acceleration, load)
     return criticise(what, chosen, motion, joint, rng)
