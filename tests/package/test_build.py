@@ -255,3 +255,27 @@ def test_every_rung_of_friction_compiles(law: str, symmetric: bool, tmp_path: Pa
     opening = np.radians(49.0)
     both = package.torque(opening, [-0.4, 0.4], 0.06)
     assert (both[0] == pytest.approx(-both[1], rel=1e-5)) == symmetric
+
+
+def test_friction_drawn_with_the_cut_travels_with_it(tmp_path: Path) -> None:
+    """Row by row the friction that the cut was drawn with; the inertia is friction's own."""
+    chosen = recipe()
+    cut, friction = cut_fit(chosen), friction_fit()
+    names = [parameter.name for parameter in friction.parameters if parameter.name != "inertia"]
+    columns = [[p.name for p in friction.parameters].index(name) for name in names]
+    rng = np.random.default_rng(3)
+    joint = friction.draws[rng.permutation(len(cut.draws))][:, columns] * (
+        cut.draws[:, :1] / cut.draws[:, :1].mean()
+    )
+    together = replace(
+        cut,
+        nuisance=tuple(p for p in friction.parameters if p.name in names),
+        nuisance_draws=joint,
+    )
+    built = build_package(chosen, friction, together, tmp_path / "a.zip", np.random.default_rng(0))
+    arrays = open_package(built.path).arrays
+    rows = [
+        int(np.flatnonzero(cut.draws[:, 0] == value)[0]) for value in arrays["draws/cut.npy"][:, 0]
+    ]
+    assert np.array_equal(arrays["draws/friction.npy"][:, columns], joint[rows])
+    assert open_package(built.path).draws == 200

@@ -248,14 +248,24 @@ def _centre(fit: FitResult) -> FitDraws:
 def _pick_draws(
     cut: FitResult, friction: FitResult | None, rng: np.random.Generator
 ) -> dict[str, NDArray[Any]]:
-    """As many draws of each fit as the smaller one has, at most 200, paired at random."""
-    fits = {"cut": cut} | ({"friction": friction} if friction else {})
-    count = min(MOST_DRAWS, *(len(fit.draws) for fit in fits.values()))
-    picked = {}
-    for what, fit in fits.items():
-        rows = rng.permutation(len(fit.draws))[:count]
-        picked[f"draws/{what}.npy"] = np.asarray(fit.draws[rows], dtype=np.float64)
-    return picked
+    """As many draws of each fit as the smaller one has, at most 200.
+
+    A cut's fit draws friction's parameters together with its own, and those travel with it: torque
+    that the one takes for material the other does not take for friction. What it does not draw
+    (the inertia), and everything where it drew none, is paired at random.
+    """
+    count = min(MOST_DRAWS, len(cut.draws), *([len(friction.draws)] if friction else []))
+    rows = rng.permutation(len(cut.draws))[:count]
+    picked = {"draws/cut.npy": np.asarray(cut.draws[rows], dtype=np.float64)}
+    if friction is None:
+        return picked
+    own = friction.draws[rng.permutation(len(friction.draws))[:count]].astype(np.float64)
+    if cut.nuisance_draws is not None:
+        names = [parameter.name for parameter in cut.nuisance]
+        for column, parameter in enumerate(friction.parameters):
+            if parameter.name in names:
+                own[:, column] = cut.nuisance_draws[rows, names.index(parameter.name)]
+    return {**picked, "draws/friction.npy": own}
 
 
 def _bound(
