@@ -196,3 +196,32 @@ def cut_recording(truth: Truth, rng: np.random.Generator, sheets: int = 3) -> Re
                 opening.append(sweep(a, b, v))
                 advance.append(-0.018 + 0.034 * k)
     return make_recording("cut", opening, advance, strokes, truth, rng, True)
+
+
+def loaded_cut_recording(truth: Truth, rng: np.random.Generator, sheets: int = 3) -> Recording:
+    """Cuts whose strokes all end just before the crack would run: at its phase of highest force.
+
+    That is where blades that yield come to rest, and it is the worst for whoever takes a resting
+    crack to stand where it settles on average.
+    """
+    low, high = 0.22, 0.85
+    opening, advance, strokes = [], [], []
+    speeds = (0.1, 0.25, 0.6)
+    for sheet in range(sheets):
+        crack = 0.0
+        for k in range(4):
+            speed, x_n = speeds[(sheet + k) % 3], -0.018 + 0.034 * k
+            before = high
+            for angle in np.linspace(high, low, 800).tolist():
+                while truth.cut(angle, crack - x_n)[1] > truth.fracture_energy:
+                    there = truth.opening_at_drive(before, angle, crack - x_n)
+                    crack = x_n + truth.contact_at_arrest(there, crack - x_n)
+                    before = there
+                before = angle
+            runs = truth.opening_at_drive(low, low - 0.05, crack - x_n)
+            bottom = low + 0.9 * (runs - low)
+            for a, b, kind, v in ((high, bottom, "closing", speed), (bottom, high, "opening", 1.0)):
+                strokes.append(Stroke(len(strokes), kind, v, sheet))
+                opening.append(sweep(a, b, v))
+                advance.append(x_n)
+    return make_recording("cut", opening, advance, strokes, truth, rng, True)

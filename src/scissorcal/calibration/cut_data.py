@@ -113,7 +113,13 @@ def edge_layout(belief: EdgeBelief) -> Layout:
     return Layout(
         tuple(
             Parameter(
-                f"edge_{name}", units.get(name, "m"), "identity", float(mean), float(sd), "the edge"
+                f"edge_{name}",
+                units.get(name, "m"),
+                "identity",
+                float(mean),
+                float(sd),
+                "the blade's edge, as photographs or the recipe tell it",
+                believed=True,
             )
             for name, mean, sd in zip(belief.names, belief.mean, sds, strict=True)
         )

@@ -139,11 +139,14 @@ class Expected:
 
     @cached_property
     def contact(self) -> Array:
-        """Contact x_c (n,) where the blades are near the crack, 0 elsewhere."""
-        nodes = self.motion.nodes
+        """Contact x_c (n,): the crack's place, which stays while the blades are away from it."""
+        motion, nodes = self.motion, self.motion.nodes
         rested = np.append(self.resting.place, 0.0)[nodes.rest]
-        place = np.where(self.waiting > 0.5, rested, self.run)
-        return self.motion.binned(np.where(np.isfinite(place), place - nodes.advance, 0.0))
+        place = np.where((self.waiting > 0.5) | ~np.isfinite(self.run), rested, self.run)
+        near = motion.binned(np.ones(len(place))) > 0.0
+        index = np.maximum.accumulate(np.where(near, np.arange(len(near)), 0))
+        same = near[index] & (motion.bins.sheet[index] == motion.bins.sheet)
+        return np.where(same, motion.binned(place)[index], 0.0) - motion.bins.advance
 
     @cached_property
     def variances(self) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 TRIED = np.linspace(-2.5, 2.5, 6)
 """Places of rest that are tried first, in standard deviations from the one expected."""
-STEPS = 4
+STEPS = 3
 LONGEST_STEP = 0.8
 DIFFERENCE = np.array([0.0, 1e-5])
 

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 class Parameter:
     """One parameter with its prior: normal in u, where u = x, log(x) or log(x / (1 - x)).
 
-    ``mean`` and ``sd`` are the prior's in u.
+    ``mean`` and ``sd`` are the prior's in u. ``believed`` marks what other measurements have told
+    already: these data need not narrow it.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Parameter:
     mean: float
     sd: float
     meaning: str
+    believed: bool = False
 
     def natural(self, u: Array) -> Array:
         """Values in the parameter's own unit from unconstrained ones, any shape."""

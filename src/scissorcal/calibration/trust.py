@@ -39,6 +39,7 @@ def trust_verdicts(
 ) -> tuple[Verdict, ...]:
     """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
     scope = f"fit.{what}"
+    nuisance = (*nuisance, *(p.name for p in chosen.rung.layout.parameters if p.believed))
     return (
         _finite(scope, chosen, posterior, diagnostics),
         _search(scope, posterior),
