@@ -148,6 +148,7 @@ def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ..
                 distance_m=float(np.linalg.norm(pose[3:])),
                 tilt_deg=float(np.degrees(tilt_of(pose))),
                 outlying=bool(error > OUTLYING * middle),
+                pose=tuple(float(value) for value in pose),
             )
         )
     return tuple(rows)

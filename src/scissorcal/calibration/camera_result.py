@@ -15,7 +15,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ViewError:
-    """One photograph in the fit. ``tilt_deg`` is that of the board against the picture's plane."""
+    """One photograph in the fit.
+
+    ``tilt_deg`` is the angle between the board and the picture's plane, ``pose`` the rotation
+    vector (rad) and translation (m) that take the board's frame into the camera's.
+    """
 
     name: str
     corners: int
@@ -25,6 +29,7 @@ class ViewError:
     distance_m: float
     tilt_deg: float
     outlying: bool
+    pose: tuple[float, ...]
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
     "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
+    "camera": ("scissorcal.cli.capture_camera:camera", "Photographs of the printed camera board."),
 }
 
 
 @click.group("capture", cls=LazyGroup, lazy=_COMMANDS)
 def capture() -> None:
-    """Record friction or cuts from a rig.
+    """Record friction or cuts from a rig, or take in photographs.
 
     \b
     Example:

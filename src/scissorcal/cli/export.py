@@ -1,6 +1,7 @@
 """``scissorcal export``"""
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -11,16 +12,32 @@ from scissorcal.cli.output import Answer, command
 @click.argument("recording", type=click.Path(path_type=Path, dir_okay=False))
 @click.argument("table", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--overwrite", is_flag=True, help="Replace TABLE where it stands already.")
+@click.option(
+    "--style",
+    type=click.Choice(["opencv", "ros"]),
+    default="opencv",
+    show_default=True,
+    help="Of a camera's file.",
+)
 @command
-def export(recording: Path, table: Path, overwrite: bool) -> Answer:
+def export(
+    recording: Path, table: Path, overwrite: bool, style: Literal["opencv", "ros"]
+) -> Answer:
     """Write RECORDING as TABLE: Parquet or CSV, by its ending. Units stand in the headings.
+
+    Where RECORDING is the camera of a workspace (fits/camera.json), write it as a camera file for
+    OpenCV (.yml, .xml) or ROS (.yaml).
 
     \b
     Example:
       $ scissorcal export captures/friction-20261121T131415Z.mcap friction.parquet
       friction.parquet: 24841 rows
       ...
+      $ scissorcal export fits/camera.json camera.yaml --style ros
+      camera.yaml: camera of 640 x 480 for ROS
     """
+    if recording.suffix == ".json":
+        return _export_camera(recording, table, style, overwrite)
     from scissorcal.recording import export_table, read_recording
 
     read = read_recording(recording)
@@ -30,3 +47,19 @@ def export(recording: Path, table: Path, overwrite: bool) -> Answer:
     )
     result = {"table": path, "rows": len(read.samples), "notes": read.notes}
     return Answer(result, text, files=[path])
+
+
+def _export_camera(
+    fit: Path, file: Path, style: Literal["opencv", "ros"], overwrite: bool
+) -> Answer:
+    from scissorcal.calibration.camera_storage import load_camera
+    from scissorcal.errors import InputError
+    from scissorcal.vision.camera_files import write_camera_file
+
+    camera = load_camera(fit).camera
+    if file.exists() and not overwrite:
+        raise InputError(f"{file} is there already: name another file, or give --overwrite.")
+    write_camera_file(camera, file, style)
+    words = "OpenCV" if style == "opencv" else "ROS"
+    text = f"{file}: camera of {camera.width} x {camera.height} for {words}"
+    return Answer({"file": file, "style": style, "camera": camera}, text, files=[file])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("fit")
-@click.argument("what", type=click.Choice(["friction", "cut", "all"]), default="all")
+@click.argument("what", type=click.Choice(["friction", "cut", "camera", "all"]), default="all")
 @click.option(
     "--effort",
     type=click.Choice(["draft", "standard"]),
@@ -28,15 +28,16 @@ if TYPE_CHECKING:
 @workspace_option
 @command
 def fit(
-    what: Literal["friction", "cut", "all"],
+    what: Literal["friction", "cut", "camera", "all"],
     effort: Literal["draft", "standard"] | None,
     force: bool,
     seed: int,
     folder: Path | None,
 ) -> Answer:
-    """Fit friction and the cut, as far as the scene requires them.
+    """Fit friction and the cut, as far as the scene requires them; or the camera.
 
-    A fit whose recordings and settings have not changed is not done again.
+    A fit whose recordings, photographs and settings have not changed is not done again. The
+    camera's fit has one effort.
 
     \b
     Example:
@@ -51,6 +52,10 @@ def fit(
     """
     from scissorcal.workday.fits import fit_workspace
 
+    if what == "camera":
+        from scissorcal.cli.fit_camera import fit_camera
+
+        return fit_camera(folder, seed=seed, force=force)
     workspace = open_workspace(folder)
     wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
     with progress() as tell:

@@ -10,6 +10,8 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import workspace_option
 from scissorcal.cli.output import Answer, command
 
+_CAMERA_FILES = (".yaml", ".yml", ".xml")
+
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
@@ -47,9 +49,12 @@ def import_(
     output: Path | None,
     folder: Path | None,
 ) -> Answer:
-    """Bring in a log from FILE: CSV, Parquet or MATLAB .mat.
+    """Bring in a log from FILE: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
 
-    Channels are time, opening, advance, motor_torque, handle_force, torque_command and
+    A camera file is one of OpenCV, ROS (camera_info) or Kalibr (camchain); no option belongs to it
+    but --workspace.
+
+    For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command and
     force_command; a column is a heading, a number from 0, or a variable of a .mat file (X[2] for
     its third column). Units may stand in the headings; for a linear joint, opening is in metres
     and motor_torque in newtons. A scale is a number or a variable of the file.
@@ -60,8 +65,14 @@ def import_(
           -u time=s -u opening=m -u motor_torque=V -s motor_torque=gtau --joint linear
       captures/friction-20261121T131415Z.mcap: 24841 samples, 24.8 s, 8 strokes, linear joint
       ...
+      $ scissorcal import left_intrinsics.yml
+      fits/camera.json: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
+      ...
     """
     import math
+
+    if file.suffix.lower() in _CAMERA_FILES:
+        return _import_camera(file, folder)
 
     from scissorcal.recording import Joint, import_table, write_recording
 
@@ -108,6 +119,21 @@ def import_(
         "notes": notes,
     }
     return Answer(result, "\n".join(lines), files=[path])
+
+
+def _import_camera(file: Path, folder: Path | None) -> Answer:
+    from scissorcal.cli.fit_camera import camera_table
+    from scissorcal.workday.cameras import import_camera
+
+    workspace = open_workspace(folder)
+    fit, read, path = import_camera(workspace, file)
+    camera = fit.camera
+    text = (
+        f"{workspace.relative(path)}: camera of {camera.width} x {camera.height} from {file.name} "
+        f"({read.style})\n{camera_table(fit)}"
+    )
+    result = {"camera": camera, "style": read.style, "rms_px": read.rms_px, "fit": path}
+    return Answer(result, text, fit.verdicts, files=[path])
 
 
 def _pairs(option: str, given: Sequence[str]) -> list[tuple[str, str]]:

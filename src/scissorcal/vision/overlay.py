@@ -1,5 +1,6 @@
 """Pictures for people: what was detected, and how far off a fit is, drawn over the photograph."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from scissorcal.vision.photo import Photo, Picture
 
 Array = NDArray[np.float64]
 
-WIDEST_PX = 1600
+WIDEST_PX = 1400
+"""Larger photographs are drawn smaller, small ones at most twice as large."""
+
 _GREEN, _RED, _BLUE, _WHITE, _BLACK = (
     (60, 170, 0),
     (40, 40, 220),
@@ -27,7 +30,7 @@ def detection_overlay(photo: Photo, detection: Detection) -> Picture:
 
     canvas, scale = _canvas(photo)
     places = [_place(pixel, scale) for pixel in detection.pixels]
-    for before, after in zip(places[:-1], places[1:], strict=True):
+    for before, after in pairwise(places):
         cv2.line(canvas, before, after, _BLUE, 1, cv2.LINE_AA)
     for index, place in enumerate(places):
         cv2.circle(canvas, place, 5, _GREEN if index else _RED, 1, cv2.LINE_AA)
@@ -71,13 +74,14 @@ def write_picture(picture: Picture, path: Path) -> Path:
 
 
 def _canvas(photo: Photo) -> tuple[Picture, float]:
-    """The photograph in pale grey at most `WIDEST_PX` wide, and its pixels per photo's pixel."""
+    """The photograph in pale grey at a handy size, and the canvas's pixels per photo's pixel."""
     import cv2
 
     grey = photo.grey
-    small = min(1.0, WIDEST_PX / max(grey.shape))
-    size = (round(grey.shape[1] * small), round(grey.shape[0] * small))
-    pale = (0.5 * cv2.resize(grey, size, interpolation=cv2.INTER_AREA) + 127.0).astype(np.uint8)
+    zoom = min(2.0, WIDEST_PX / max(grey.shape))
+    size = (round(grey.shape[1] * zoom), round(grey.shape[0] * zoom))
+    way = cv2.INTER_AREA if zoom < 1.0 else cv2.INTER_CUBIC
+    pale = (0.5 * cv2.resize(grey, size, interpolation=way) + 127.0).astype(np.uint8)
     canvas = np.asarray(cv2.cvtColor(pale, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     return canvas, size[0] / photo.width
 
@@ -88,29 +92,8 @@ def _place(pixel: Array, scale: float) -> tuple[int, int]:
 
 
 def _labelled(canvas: Picture, words: str) -> Picture:
-    import cv2
-
-    size = max(canvas.shape[1] / 1600.0, 0.45)
-    cv2.putText(
-        canvas,
-        words,
-        (10, round(40 * size)),
-        cv2.FONT_HERSHEY_SIMPLEX,
-        size,
-        _WHITE,
-        4,
-        cv2.LINE_AA,
-    )
-    cv2.putText(
-        canvas,
-        words,
-        (10, round(40 * size)),
-        cv2.FONT_HERSHEY_SIMPLEX,
-        size,
-        _BLACK,
-        1,
-        cv2.LINE_AA,
-    )
+    size = _letter_size(canvas)
+    _write(canvas, words, (8, round(40 * size)))
     return canvas
 
 
@@ -118,13 +101,27 @@ def _draw_bar(canvas: Picture, length: int, words: str) -> None:
     import cv2
 
     low = canvas.shape[0] - 20
+    cv2.rectangle(canvas, (10, low - 16), (40 + length, low + 14), _WHITE, cv2.FILLED)
     cv2.line(canvas, (20, low), (20 + length, low), _BLACK, 2)
     for end in (20, 20 + length):
         cv2.line(canvas, (end, low - 5), (end, low + 5), _BLACK, 2)
-    size = max(canvas.shape[1] / 1600.0, 0.45)
-    place = (30 + length, low + 5)
-    cv2.putText(canvas, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, _WHITE, 4, cv2.LINE_AA)
-    cv2.putText(canvas, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, _BLACK, 1, cv2.LINE_AA)
+    _write(canvas, words, (34 + length, low + 7))
+
+
+def _write(canvas: Picture, words: str, place: tuple[int, int]) -> None:
+    """Write black on a white field; ``place`` is the left end of the baseline."""
+    import cv2
+
+    font, size = cv2.FONT_HERSHEY_SIMPLEX, _letter_size(canvas)
+    (width, height), below = cv2.getTextSize(words, font, size, 1)
+    left, low = place
+    corner = (left - 4, low - height - 4)
+    cv2.rectangle(canvas, corner, (left + width + 4, low + below + 2), _WHITE, cv2.FILLED)
+    cv2.putText(canvas, words, place, font, size, _BLACK, 1, cv2.LINE_AA)
+
+
+def _letter_size(canvas: Picture) -> float:
+    return max(canvas.shape[1] / 1900.0, 0.5)
 
 
 def _round_length(length: float) -> float:

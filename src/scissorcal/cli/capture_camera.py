@@ -1,0 +1,68 @@
+"""``scissorcal capture camera``"""
+
+from pathlib import Path
+
+import click
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import workspace_option
+from scissorcal.cli.output import Answer, command, note
+
+
+@click.command("camera")
+@click.option(
+    "--image",
+    "-i",
+    "images",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    required=True,
+    help="A photograph of the board; give it again for each.",
+)
+@click.argument("more", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--board",
+    "words",
+    default="camera",
+    show_default=True,
+    help="The printed camera board, or another: chessboard:9x6:25 (inner corners, mm), "
+    "charuco:5x7:40:20:DICT_6X6_250 (squares, mm, mm).",
+)
+@workspace_option
+@command
+def camera(
+    images: tuple[Path, ...], more: tuple[Path, ...], words: str, folder: Path | None
+) -> Answer:
+    """Take in photographs of the camera board, and say which views are still wanted.
+
+    Photographs are copied as they are. Take 15, all at one focus and zoom and held one way, with
+    the board near and far, in every corner, and turned by 20 to 45 deg to every side. What comes
+    after the first file name counts as photographs too, so that a shell's board-*.jpg works.
+
+    \b
+    Example:
+      $ scissorcal capture camera --image board-*.jpg
+      board-01.jpg: 48 of 48 corners, 65 px a square, middling, facing left
+        places 6 of 9, sizes 1 of 3, slants 1 of 5; wanted: upper left, left, lower left, ...
+      ...
+    """
+    from scissorcal.vision.board_words import board_from_words
+    from scissorcal.workday.cameras import capture_camera
+
+    board = board_from_words(words)
+    workspace = open_workspace(folder)
+    done = capture_camera(workspace, (*images, *more), board, note)
+    place = workspace.relative(done.capture.folder)
+    text = f"{place}: {len(done.taken)} photographs of the {board.name}"
+    if done.refused:
+        text += f", {len(done.refused)} left out"
+    text += f"\n{done.coverage.sentence()}"
+    result = {
+        "capture": done.capture.folder,
+        "board": board.name,
+        "photographs": done.taken,
+        "left_out": done.refused,
+        "wanted": done.coverage.wanted,
+    }
+    files = [done.capture.path(photo) for photo in done.capture.index.photographs]
+    return Answer(result, text, files=files)

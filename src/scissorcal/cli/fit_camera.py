@@ -1,0 +1,97 @@
+"""What ``scissorcal fit camera`` says."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.output import Answer, table
+from scissorcal.cli.progress import progress
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.camera_result import CameraFit
+    from scissorcal.workday.cameras import CameraOutcome
+
+_WORST = 3
+
+
+def fit_camera(folder: Path | None, *, seed: int, force: bool) -> Answer:
+    """Fit a workspace's camera, where its photographs changed, and say how well it is known."""
+    from scissorcal.workday.cameras import fit_workspace_camera
+
+    workspace = open_workspace(folder)
+    with progress() as tell:
+        outcome = fit_workspace_camera(workspace, seed=seed, force=force, progress=tell)
+    files = () if outcome.cached else (outcome.path, *outcome.pictures)
+    return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
+
+
+def camera_table(fit: "CameraFit") -> str:
+    """Set out a camera's parameters for people."""
+    import numpy as np
+
+    from scissorcal.vision.camera import PARAMETERS
+
+    camera = fit.camera
+    values = (camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5])
+    known = camera.covariance
+    rows = [["parameter", "unit", "mean", "sd"]]
+    for index, (name, value) in enumerate(zip(PARAMETERS, values, strict=True)):
+        unit = "px" if index < 4 else "1"
+        digits = f"{value:.2f}" if index < 4 else f"{value:.5f}"
+        sd = "" if known is None else f"{float(np.sqrt(known[index, index])):.2g}"
+        held = known is not None and known[index, index] == 0.0
+        rows.append([name, unit, digits, "held" if held else sd])
+    return table(rows, right=(2, 3))
+
+
+def _text(outcome: "CameraOutcome") -> str:
+    fit = outcome.fit
+    camera = fit.camera
+    size = f"{camera.width} x {camera.height}"
+    if fit.origin == "imported":
+        return f"camera: {size}, {' '.join(fit.notes)}\n{camera_table(fit)}"
+    head = f"camera: {size}, {len(fit.views)} photographs of the {fit.board}, {fit.rung}"
+    if outcome.cached:
+        head = f"camera: nothing changed since the last fit; {fit.rung} is as it was"
+    lines = [head, camera_table(fit)]
+    lines.append(
+        f"corners are found to {fit.noise_px:.2f} px; errors of one photograph go together, so "
+        f"intervals are {fit.stretch:.1f} times as wide as single corners would have them"
+    )
+    bulge = max(fit.bulge_mm, key=abs)
+    lines.append(f"the board's middle stands {abs(bulge):.2f} mm out of its plane")
+    worst = sorted(fit.views, key=lambda view: -view.rms_px)[:_WORST]
+    rows = [["worst photographs", "rms px", "worst px", "px a square", "tilt deg"]]
+    rows += [
+        [
+            view.name,
+            f"{view.rms_px:.2f}",
+            f"{view.worst_px:.2f}",
+            f"{view.square_px:.0f}",
+            f"{view.tilt_deg:.0f}",
+        ]
+        for view in worst
+    ]
+    lines.append(table(rows, right=range(1, 5)))
+    return "\n".join(lines)
+
+
+def _facts(outcome: "CameraOutcome") -> dict[str, object]:
+    fit = outcome.fit
+    camera = fit.camera
+    return {
+        "camera": camera,
+        "origin": fit.origin,
+        "cached": outcome.cached,
+        "board": fit.board,
+        "rung": fit.rung,
+        "rungs": fit.rungs,
+        "views": fit.views,
+        "noise_px": fit.noise_px,
+        "stretch": fit.stretch,
+        "bulge_mm": fit.bulge_mm,
+        "region_share": fit.region_share,
+        "two_halves": fit.cross,
+        "inputs_hash": fit.inputs_hash,
+        "pictures": outcome.pictures,
+    }

@@ -1,0 +1,249 @@
+"""Camera files of others: OpenCV, ROS and Kalibr are read, OpenCV and ROS are written."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from scissorcal.errors import InputError
+from scissorcal.vision.camera import Camera
+
+Style = Literal["opencv", "ros"]
+
+MATRIX_KEYS = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "intrinsic_matrix")
+DISTORTION_KEYS = (
+    "distortion_coefficients",
+    "dist_coeffs",
+    "distCoeffs",
+    "Distortion_Coefficients",
+    "D",
+    "D1",
+)
+
+_WIDTHS, _HEIGHTS = (
+    ("image_width", "image_Width", "width"),
+    ("image_height", "image_Height", "height"),
+)
+_ROS_MODELS = ("plumb_bob", "rational_polynomial")
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """What a file said: the camera, whose format it is, and its own figure of fit in pixels."""
+
+    camera: Camera
+    style: Literal["OpenCV", "ROS", "Kalibr"]
+    rms_px: float | None
+
+
+def read_camera_file(path: Path) -> CameraFile:
+    """Read an OpenCV (YAML or XML), ROS camera_info or Kalibr camchain file, told by its content.
+
+    Distortion must be the pinhole camera's radial-tangential one (plumb_bob, radtan; up to k6).
+    None of these files holds a covariance. Raises InputError naming what is missing or not known.
+    """
+    try:
+        text = path.read_text("utf-8", errors="replace")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    start = text.lstrip("\ufeff \t\r\n")
+    if start.startswith(("%YAML", "<?xml", "<opencv_storage", "{")) or "!!opencv-matrix" in text:
+        return _opencv(path)
+    return _plain_yaml(path, text)
+
+
+def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "camera") -> Path:
+    """Write a camera as OpenCV (.yml, .yaml, .xml or .json) or ROS camera_info (.yaml).
+
+    Covariance is not written: neither format has a place for it. Complete or not at all. Raises
+    InputError where the ending does not fit the style.
+    """
+    endings = (".yml", ".yaml", ".xml", ".json") if style == "opencv" else (".yaml", ".yml")
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path} must end in one of {', '.join(endings)} for {style}.")
+    text = _opencv_text(camera, path.suffix.lower()) if style == "opencv" else _ros(camera, name)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text, "utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}.") from None
+    return path
+
+
+def _opencv(path: Path) -> CameraFile:
+    import cv2
+
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        opened = storage.isOpened()
+    except (cv2.error, SystemError):
+        opened = False
+    if not opened:
+        raise InputError(f"{path} is damaged: save it again.")
+
+    def matrix(keys: Sequence[str]) -> Any:
+        for key in keys:
+            node = storage.getNode(key)
+            if not node.empty() and not node.isNone():
+                found = node.mat()
+                if found is not None:
+                    return found
+        return None
+
+    def number(keys: Sequence[str]) -> float | None:
+        for key in keys:
+            node = storage.getNode(key)
+            if not node.empty() and (node.isInt() or node.isReal()):
+                return float(node.real())
+        return None
+
+    try:
+        return _from_opencv(path, matrix, number)
+    finally:
+        storage.release()
+
+
+def _from_opencv(
+    path: Path,
+    matrix: Callable[[Sequence[str]], Any],
+    number: Callable[[Sequence[str]], float | None],
+) -> CameraFile:
+    K = matrix(MATRIX_KEYS)
+    if K is None or np.shape(K) != (3, 3):
+        raise InputError(f"{path} has no 3 x 3 matrix called {' or '.join(MATRIX_KEYS[:2])}.")
+    bend = matrix(DISTORTION_KEYS)
+    if number(("fisheye_model",)):
+        raise InputError(f"{path} is of a fisheye lens; {_ONLY_PINHOLE}")
+    size = number(_WIDTHS), number(_HEIGHTS)
+    camera = _camera(path, K, np.zeros(5) if bend is None else bend, size)
+    return CameraFile(camera, "OpenCV", number(("avg_reprojection_error", "rms")))
+
+
+def _plain_yaml(path: Path, text: str) -> CameraFile:
+    import yaml
+
+    try:
+        facts = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{path} is no YAML that can be read ({_first(str(error))}).") from None
+    if not isinstance(facts, Mapping):
+        raise InputError(f"{path} is no camera file of OpenCV, ROS or Kalibr.")
+    try:
+        if any(str(key).startswith("cam") and _is_kalibr(facts[key]) for key in facts):
+            return _kalibr(path, facts)
+        if "camera_matrix" in facts or "K" in facts or "k" in facts:
+            return _from_ros(path, facts)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise InputError(f"{path} is not complete ({error}): save it again.") from None
+    raise InputError(
+        f"{path} is no camera file of OpenCV, ROS or Kalibr: it has neither camera_matrix nor cam0."
+    )
+
+
+def _is_kalibr(part: Any) -> bool:
+    return isinstance(part, Mapping) and "intrinsics" in part
+
+
+def _kalibr(path: Path, facts: Mapping[str, Any]) -> CameraFile:
+    cameras = [key for key in facts if _is_kalibr(facts[key])]
+    if len(cameras) > 1:
+        raise InputError(
+            f"{path} holds {len(cameras)} cameras ({', '.join(cameras)}): keep the one of the rig."
+        )
+    part = facts[cameras[0]]
+    model = part.get("camera_model", "pinhole"), part.get("distortion_model", "radtan")
+    if model not in (("pinhole", "radtan"), ("pinhole", "none")):
+        raise InputError(f"{path} is of the model {'-'.join(model)}; {_ONLY_PINHOLE}")
+    fx, fy, cx, cy = (float(value) for value in part["intrinsics"])
+    K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    bend = np.array(part.get("distortion_coeffs", ()), dtype=np.float64)
+    width, height = part["resolution"]
+    return CameraFile(_camera(path, K, bend, (width, height)), "Kalibr", None)
+
+
+def _from_ros(path: Path, facts: Mapping[str, Any]) -> CameraFile:
+    def data(*keys: str) -> Any:
+        found = next((facts[key] for key in keys if key in facts), ())
+        return np.array(found["data"] if isinstance(found, Mapping) else found, dtype=np.float64)
+
+    model = facts.get("distortion_model", "plumb_bob")
+    if model not in _ROS_MODELS:
+        raise InputError(f"{path} is of the model {model}; {_ONLY_PINHOLE}")
+    size = tuple(
+        next((float(facts[key]) for key in keys if key in facts), None)
+        for keys in (_WIDTHS, _HEIGHTS)
+    )
+    K = data("camera_matrix", "K", "k").reshape(3, 3)
+    bend = data("distortion_coefficients", "D", "d")
+    return CameraFile(_camera(path, K, bend, (size[0], size[1])), "ROS", None)
+
+
+_ONLY_PINHOLE = (
+    "scissorcal knows the pinhole camera with radial and tangential distortion (plumb_bob, radtan) "
+    "alone: calibrate it anew with 'scissorcal capture camera'."
+)
+
+
+def _camera(path: Path, K: Any, bend: Any, size: tuple[float | None, float | None]) -> Camera:
+    width, height = size
+    if not width or not height:
+        raise InputError(
+            f"{path} does not say how large its pictures are: add image_width and image_height."
+        )
+    coefficients = [float(value) for value in np.ravel(bend)]
+    if any(coefficients[8:]):
+        raise InputError(f"{path} has {len(coefficients)} distortion coefficients; {_ONLY_PINHOLE}")
+    coefficients = coefficients[:8] if any(coefficients[5:8]) else coefficients[:5]
+    coefficients += [0.0] * (5 - len(coefficients))
+    if len(coefficients) > 5:
+        coefficients += [0.0] * (8 - len(coefficients))
+    fx, fy, cx, cy = (float(K[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    if not all(math.isfinite(value) for value in (fx, fy, cx, cy, *coefficients)):
+        raise InputError(f"{path} holds numbers that are not finite.")
+    if min(fx, fy) <= 0.0 or abs(float(K[0, 1])) > 1e-6 * fx:
+        raise InputError(f"{path} has a camera matrix with a negative focal length or a skew.")
+    return Camera(fx, fy, cx, cy, tuple(coefficients), int(width), int(height))
+
+
+def _opencv_text(camera: Camera, ending: str) -> str:
+    import cv2
+
+    kinds = {".xml": cv2.FILE_STORAGE_FORMAT_XML, ".json": cv2.FILE_STORAGE_FORMAT_JSON}
+    flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
+    storage = cv2.FileStorage("", flags | kinds.get(ending, cv2.FILE_STORAGE_FORMAT_YAML))
+    storage.write("image_width", camera.width)
+    storage.write("image_height", camera.height)
+    storage.write("camera_matrix", camera.matrix)
+    storage.write("distortion_coefficients", camera.coefficients.reshape(-1, 1))
+    return str(storage.releaseAndGetString())
+
+
+def _ros(camera: Camera, name: str) -> str:
+    import yaml
+
+    count = len(camera.distortion)
+    projection = np.hstack([camera.matrix, np.zeros((3, 1))])
+
+    def matrix(values: Any, rows: int, columns: int) -> dict[str, Any]:
+        data = [float(value) for value in np.ravel(values)]
+        return {"rows": rows, "cols": columns, "data": data}
+
+    facts = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": name,
+        "camera_matrix": matrix(camera.matrix, 3, 3),
+        "distortion_model": "plumb_bob" if count == 5 else "rational_polynomial",
+        "distortion_coefficients": matrix(camera.distortion, 1, count),
+        "rectification_matrix": matrix(np.eye(3), 3, 3),
+        "projection_matrix": matrix(projection, 3, 4),
+    }
+    return yaml.safe_dump(facts, sort_keys=False, default_flow_style=None)
+
+
+def _first(words: str) -> str:
+    return " ".join(words.split())[:120]
