@@ -50,7 +50,7 @@ def fit_plate(
     """
     if not photos:
         raise MissingError(
-            "There is no photograph of the plate's target: print it with 'scissorcal target', stick "
+            "There is no photograph of the plate's target: print it ('scissorcal target'), stick "
             "it to the plate, and take some with 'scissorcal capture plate --image plate-*.jpg'."
         )
     target = photos[0].detection.board.name
