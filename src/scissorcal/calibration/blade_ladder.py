@@ -16,14 +16,19 @@ Family = Literal["line", "arc", "cubic", "spline"]
 
 FAMILIES: tuple[Family, ...] = ("line", "arc", "cubic", "spline")
 POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
-PRIOR_SD = (0.4, 0.3, 0.25, 1.5)
+PRIOR_SD = (0.4, 0.3, 0.1, 0.4)
 """Before any photograph, for a blade of length 1: offset, slope, curvature and its change."""
 
 KNOT_SHARE = 0.1
 """Distance of the spline's knots, in shares of the measured length."""
 
-WORTH_IT = 1.0
-"""Evidence (natural logarithm) by which a richer rung must beat a poorer one."""
+REFUTED = 5.0
+"""Evidence (natural logarithm) against a richer polynomial from which on it is left out.
+
+An edge that is said to be straight has intervals that say so too; odds of 150 to 1 are asked."""
+
+SPLINE_GAIN = 2.0
+"""Evidence by which a spline, with its many parameters, must beat every polynomial."""
 
 _COUNT = {"draft": 200, "standard": 400, "thorough": 800}
 _HALF_LOG_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
@@ -69,9 +74,19 @@ def fit_edge_rungs(
     """
     data = _Data(photographs, length_m)
     rungs = tuple(_fit(data, family, effort, rng) for family in families)
-    best = max(rung.evidence for rung in rungs)
-    chosen = next(i for i, rung in enumerate(rungs) if rung.evidence > best - WORTH_IT)
-    return rungs, chosen
+    return rungs, _chosen(rungs)
+
+
+def _chosen(rungs: tuple[EdgeRung, ...]) -> int:
+    """The spline if it is clearly best, else the richest polynomial that is not refuted."""
+    simple = [i for i, rung in enumerate(rungs) if rung.family != "spline"]
+    best = max(range(len(rungs)), key=lambda i: rungs[i].evidence)
+    if not simple:
+        return best
+    top = max(rungs[i].evidence for i in simple)
+    if rungs[best].family == "spline" and rungs[best].evidence > top + SPLINE_GAIN:
+        return best
+    return max(i for i in simple if rungs[i].evidence > top - REFUTED)
 
 
 class _Data:

@@ -21,6 +21,9 @@ _ROUNDS = 30
 _FAR_OFF = 5.0
 _SHALLOWEST_M = 15e-6
 _SHORTEST_SHARE = 0.002
+_FEWEST_POINTS = 3
+_SOFTEST = 1.45
+"""A notch's border is as sharp as the edge's; a glare's is softer."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,10 @@ def _nick(
     part = off[start:stop]
     depth = float(part.max())
     inside = np.flatnonzero(part > 0.15 * depth)
-    if depth < limit or -part.min() > 0.7 * depth or len(inside) < 2:
+    if depth < limit or -part.min() > 0.7 * depth or len(inside) < _FEWEST_POINTS:
+        return None
+    deep = measured.softness[start:stop][part > 0.3 * depth]
+    if float(np.median(deep)) > _SOFTEST:
         return None
     stations = measured.station[start:stop]
     low, high = float(stations[inside[0]]), float(stations[inside[-1]])

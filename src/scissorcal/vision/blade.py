@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 TONE_SHARE = 0.12
 """By how much of its blur a border may seem shifted, since a camera's curve is not quite sRGB's."""
 
+GRAIN_SHARE = 0.5
+"""Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
+
 _MOST_POINTS = 3000
 _LEAST_GOOD = 0.6
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
@@ -30,6 +33,7 @@ class BorderPoints:
     pixels: Array
     normals: Array
     sd_px: Array
+    softness: Array
     blur_px: float
     good_share: float
 
@@ -41,14 +45,16 @@ class BladeMeasurement:
     ``station``, ``offset`` and ``sd`` (n,) are points of the edge in the blade's frame (sheet
     units: metres, or pixels without a scale), each with the noise of its own; ``modes`` (n, k) are
     what moves them together, each column by one standard deviation: the mapping, the print's
-    scale, the pivot, the centreline, the tone of blurred borders. ``mode_names`` say which.
-    ``pivot_px``, ``axis_px`` and ``edge_px`` are for pictures.
+    scale, the pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
+    say which. ``softness`` (n,) is the blur of each point against the usual one. ``pivot_px`` and
+    ``axis_px`` are for pictures.
     """
 
     source: str
     station: Array
     offset: Array
     sd: Array
+    softness: Array
     modes: Array
     mode_names: tuple[str, ...]
     length: float
@@ -84,6 +90,7 @@ def measure_blade(light: Light, view: View, parts: BladeParts, source: str) -> B
         place.station[keep],
         place.offset[keep],
         place.sd[keep],
+        edge.softness[place.order][keep],
         columns[keep],
         names,
         length,
@@ -109,11 +116,14 @@ class _Scene:
     pivot_shift: tuple[float, float] = (0.0, 0.0)
     turn: float = 0.0
     grown_px: float = 0.0
+    grain: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     values: Array | None = None
 
     def place(self) -> "_Place":
-        edge = self._on_sheet(self.edge)
-        back = self._on_sheet(self.back)
+        along = np.linspace(-1.0, 1.0, len(self.edge.pixels))
+        level, ramp, bow, behind = self.grain
+        edge = self._on_sheet(self.edge, level + ramp * along + bow * (3.0 * along**2 - 1.0) / 2.0)
+        back = self._on_sheet(self.back, behind)
         if self.hole is None:
             pivot, radius = self._moved_pivot(), 0.0
         else:
@@ -130,8 +140,9 @@ class _Scene:
         tip = float(self.parts.length + (self.parts.pivot - pivot) @ axis)
         return _Place(station[order], offset[order], sd[order], pivot, axis, up, radius, tip, order)
 
-    def _on_sheet(self, border: BorderPoints) -> Array:
-        return self.view.to_sheet(border.pixels + self.grown_px * border.normals, self.values)
+    def _on_sheet(self, border: BorderPoints, drift: Array | float = 0.0) -> Array:
+        out = np.broadcast_to(self.grown_px + np.asarray(drift), len(border.pixels))
+        return self.view.to_sheet(border.pixels + out[:, None] * border.normals, self.values)
 
     def _moved_pivot(self) -> Array:
         if self.values is None:
@@ -173,6 +184,12 @@ def _modes(scene: _Scene, place: _Place) -> tuple[Array, tuple[str, ...]]:
         add(name, replace(scene, values=values))
     shared = TONE_SHARE * scene.edge.blur_px
     add("tone", replace(scene, grown_px=shared))
+    rough = GRAIN_SHARE * float(np.median(scene.edge.sd_px))
+    behind = GRAIN_SHARE * float(np.median(scene.back.sd_px))
+    for index, size in enumerate((rough, rough, rough, behind)):
+        drift = [0.0, 0.0, 0.0, 0.0]
+        drift[index] = size
+        add("grain", replace(scene, grain=(drift[0], drift[1], drift[2], drift[3])))
     for row in _pivot_modes(scene, place):
         add("pivot", replace(scene, pivot_shift=(float(row[0]), float(row[1]))))
     add("centreline", replace(scene, turn=_turn_sd(scene, place)))
@@ -213,7 +230,11 @@ def _pivot_modes(scene: _Scene, place: _Place) -> Array:
     # neighbours along a small circle share their pixels: about one in four says something new
     spread = float(np.sqrt(np.mean(off**2)))
     information = radial.T @ radial / 4.0
-    return np.asarray(np.linalg.cholesky(np.linalg.inv(information)) * spread).T
+    moved = scene.view.to_sheet(scene.hole.pixels + scene.hole.normals, scene.values) - there
+    pixel = float(np.median(np.linalg.norm(moved, axis=1)))
+    grain = GRAIN_SHARE * float(np.median(scene.hole.sd_px)) * pixel
+    covariance = np.linalg.inv(information) * spread**2 + grain**2 * np.eye(2)
+    return np.asarray(np.linalg.cholesky(covariance)).T
 
 
 def _turn_sd(scene: _Scene, place: _Place) -> float:
@@ -304,7 +325,9 @@ def _border(
             "the metal looks darker than the sheet."
         )
     seen = points + normals * found.place[:, None]
-    return BorderPoints(seen[good], normals[good], found.sd[good], blur, share)
+    return BorderPoints(
+        seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
+    )
 
 
 def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -> None:
@@ -323,7 +346,7 @@ def _alike(found: Crossings) -> NDArray[np.bool_]:
     blur = np.median(found.blur[found.good]) if found.good.any() else 1.0
     return np.asarray(
         (contrast * np.sign(usual) > 0.25 * abs(usual))
-        & (found.blur < 2.5 * blur + 0.5)
+        & (found.blur < 1.8 * blur + 0.2)
         & (found.blur > 0.4 * blur - 0.3)
     )
 
@@ -349,7 +372,12 @@ def _hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | None:
         sure = found.good & (off < 4.0 * 1.4826 * np.median(off[found.good]) + 1e-12)
         middle, radius = _circle(view.to_sheet(seen[sure]))
     return BorderPoints(
-        seen[sure], normals[sure], found.sd[sure], float(np.median(found.blur[sure])), 1.0
+        seen[sure],
+        normals[sure],
+        found.sd[sure],
+        np.ones(int(sure.sum())),
+        float(np.median(found.blur[sure])),
+        1.0,
     )
 
 

@@ -19,7 +19,7 @@ FIRST, LAST = 0.12, 0.97
 BACK_FIRST, BACK_LAST = 0.3, 0.8
 """Where the centreline halves the blade: between edge and back over these shares of its length."""
 
-_SOLID, _ROUND = 0.82, 0.85
+_SOLID, _UNEVEN = 0.82, 0.06
 _HOLE_MM = (0.6, 8.0)
 
 
@@ -125,15 +125,23 @@ def _sides(outer: Array, pivot: Array, axis: Array, up: Array, source: str) -> t
 
 
 def _pivot_hole(shape: Silhouette, source: str) -> Array:
+    """The round opening nearest to the mat's pivot mark.
+
+    In a shadow or beside a glare no one level of light tells an opening from metal, so several
+    are tried between that of the metal and that of the sheet.
+    """
     unit = 1e-3
     best: list[tuple[float, Array]] = []
-    for hole in shape.holes:
+    for hole in shape.openings():
         middle = hole.mean(axis=0)
         radii = np.linalg.norm(hole - middle, axis=1)
-        radius = float(radii.mean()) + 0.5 * shape.pixel
-        squareness = float(radii.min() / radii.max())
-        if _HOLE_MM[0] * unit <= radius <= _HOLE_MM[1] * unit and squareness > _ROUND - 0.15:
-            best.append((float(np.hypot(*(middle - MAT_PIVOT_M))), hole))
+        radius = float(radii.mean())
+        if not _HOLE_MM[0] * unit <= radius <= _HOLE_MM[1] * unit:
+            continue
+        uneven = float(radii.std()) / radius
+        if uneven < _UNEVEN + 0.3 * shape.pixel / radius:
+            away = float(np.hypot(*(middle - MAT_PIVOT_M)))
+            best.append((away + 0.05 * uneven, hole))
     if not best:
         raise InputError(
             f"{source}: no round pivot hole of {_HOLE_MM[0]:g} to {_HOLE_MM[1]:g} mm radius can be "
@@ -157,7 +165,7 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
     if solid < _SOLID:
         raise InputError(
             f"{source}: the outline fills {100 * solid:.0f} % of its hull, where a single blade "
-            "fills nearly all. Are these two blades? Lay one down, or give --both for open scissors."
+            "fills nearly all. Two blades? Lay one down, or give --both for open scissors."
         )
 
 

@@ -19,6 +19,7 @@ LONGEST = 1000
 _LEAST_CONTRAST = 0.15
 _LEAST_SHARE = 0.002
 _ROUNDS = 6
+_LEVELS = (0.8, 0.65, 0.5, 0.35, 0.2)
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,28 @@ class Silhouette:
     def area(self) -> float:
         """Area of the outline without its holes, in square sheet units."""
         return _area(self.outer) - sum(_area(hole) for hole in self.holes)
+
+    def openings(self) -> list[Array]:
+        """Outlines (n, 2) of bright patches within the outline, at several levels of light.
+
+        The same patch may come more than once.
+        """
+        import cv2
+
+        whole = np.zeros_like(self.mask)
+        cv2.fillPoly(whole, [np.rint(self.grid(self.outer)).astype(np.int32)], 255)
+        metal = float(np.median(self.relative[self.mask > 0]))
+        inner = cv2.erode(whole, np.ones((3, 3), np.uint8))
+        found = []
+        for share in _LEVELS:
+            level = metal + share * (1.0 - metal)
+            bright = ((self.relative > level) & (inner > 0)).astype(np.uint8)
+            contours, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+            for contour in contours:
+                if cv2.contourArea(contour) > 12.0:
+                    place = np.asarray(contour, dtype=np.float64).reshape(-1, 2)
+                    found.append(place * self.pixel + np.asarray(self.origin))
+        return found
 
     def grid(self, points: Array) -> Array:
         """Places (n, 2) of sheet points in the flat picture, in its pixels."""
