@@ -1,5 +1,6 @@
 """``scissorcal capture camera``"""
 
+import tempfile
 from pathlib import Path
 
 import click
@@ -16,8 +17,20 @@ from scissorcal.cli.output import Answer, command, note
     "images",
     type=click.Path(path_type=Path),
     multiple=True,
-    required=True,
     help="A photograph of the board; give it again for each.",
+)
+@click.option(
+    "--camera",
+    "source",
+    metavar="NUMBER|VIDEO",
+    help="Pick pictures from a camera or a video file, where the board is held still.",
+)
+@click.option(
+    "--views",
+    type=click.IntRange(min=3),
+    default=20,
+    show_default=True,
+    help="Pictures to pick from --camera; Ctrl-C ends it sooner.",
 )
 @click.argument("more", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
@@ -31,7 +44,12 @@ from scissorcal.cli.output import Answer, command, note
 @workspace_option
 @command
 def camera(
-    images: tuple[Path, ...], more: tuple[Path, ...], words: str, folder: Path | None
+    images: tuple[Path, ...],
+    more: tuple[Path, ...],
+    source: str | None,
+    views: int,
+    words: str,
+    folder: Path | None,
 ) -> Answer:
     """Take in photographs of the camera board, and say which views are still wanted.
 
@@ -47,13 +65,22 @@ def camera(
       ...
     """
     from scissorcal.vision.board_words import board_from_words
+    from scissorcal.vision.live import pick_frames
     from scissorcal.workday.cameras import capture_camera
 
+    if bool(images) == bool(source):
+        raise click.UsageError("Give photographs with --image, or a camera or video with --camera.")
     board = board_from_words(words)
     workspace = open_workspace(folder)
-    done = capture_camera(workspace, (*images, *more), board, note)
+    if source:
+        with tempfile.TemporaryDirectory() as scratch:
+            frames = pick_frames(source, board, Path(scratch), views)
+            done = capture_camera(workspace, frames, board, note)
+    else:
+        done = capture_camera(workspace, (*images, *more), board, note)
     place = workspace.relative(done.capture.folder)
-    text = f"{place}: {len(done.taken)} photographs of the {board.name}"
+    count = len(done.taken)
+    text = f"{place}: {count} photograph{'s' if count > 1 else ''} of the {board.name}"
     if done.refused:
         text += f", {len(done.refused)} left out"
     text += f"\n{done.coverage.sentence()}"

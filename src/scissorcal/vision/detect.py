@@ -63,7 +63,9 @@ class Detection:
         return np.asarray(self.board.points[self.ids])
 
 
-def find_board(photo: Photo, board: Board, *, window_px: int | None = None) -> Detection:
+def find_board(
+    photo: Photo, board: Board, *, window_px: int | None = None, explain: bool = True
+) -> Detection:
     """Find a board's corners in a photograph.
 
     ChArUco boards and marker boards may be seen in part. ``window_px`` is half the side of the
@@ -71,7 +73,8 @@ def find_board(photo: Photo, board: Board, *, window_px: int | None = None) -> D
     smallest square, since a window that reaches into the next square pulls its corner away.
 
     Raises InputError saying what the photograph shows instead: nothing, another target, too few
-    corners, squares too small or too blurred.
+    corners, squares too small or too blurred; without looking for that where ``explain`` is False,
+    as for a video's frames.
     """
     if isinstance(board, Chessboard):
         ids, pixels = _chessboard(photo.grey, board, window_px)
@@ -81,7 +84,11 @@ def find_board(photo: Photo, board: Board, *, window_px: int | None = None) -> D
         ids, pixels = _marker_board(photo.grey, board)
     least = 4 if isinstance(board, MarkerBoard) else LEAST_CORNERS
     if len(ids) < least:
-        raise InputError(no_board_sentence(photo, board, len(ids), least))
+        raise InputError(
+            no_board_sentence(photo, board, len(ids), least)
+            if explain
+            else f"{photo.source} does not show the {board.name}."
+        )
     whole = photo.whole(pixels)
     return Detection(board, ids, whole, _side_px(board, ids, whole))
 

@@ -121,7 +121,7 @@ def _write(canvas: Picture, words: str, place: tuple[int, int]) -> None:
 
 
 def _letter_size(canvas: Picture) -> float:
-    return max(canvas.shape[1] / 1900.0, 0.5)
+    return max(float(canvas.shape[1]) / 1900.0, 0.5)
 
 
 def _round_length(length: float) -> float:

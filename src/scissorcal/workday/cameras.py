@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,7 +63,7 @@ class CameraOutcome:
 
 
 def capture_camera(
-    workspace: Workspace, paths: Sequence[Path], board: CameraBoard, tell: Callable[[str], None]
+    workspace: Workspace, paths: Iterable[Path], board: CameraBoard, tell: Callable[[str], None]
 ) -> CameraCapture:
     """Take photographs of a board into captures/camera-<stamp>/, copied byte for byte.
 
@@ -72,6 +72,7 @@ def capture_camera(
     its reason. Raises InputError, and keeps nothing, where that leaves none.
     """
     before = photo_captures(workspace, "camera")
+    _refuse_other_board(before, board)
     coverage = _coverage_of(before)
     taken: list[TakenPhoto] = []
     refused: list[str] = []
@@ -81,8 +82,8 @@ def capture_camera(
             try:
                 photo = read_photo(path, colour=False)
                 _refuse_known(photo, before, writer)
-                shape = _same_shape(photo, shape)
                 detection = find_board(photo, board)
+                shape = _same_shape(photo, shape)
             except InputError as error:
                 refused.append(str(error))
                 tell(f"left out: {error}")
@@ -93,7 +94,9 @@ def capture_camera(
             tell(f"{taken[-1].words}\n  {coverage.sentence()}")
         if not taken:
             raise InputError(
-                " ".join(refused[:3]) + " Nothing was kept." if refused else "Nothing to keep."
+                " ".join(refused[:3]) + " Nothing was kept."
+                if refused
+                else f"No picture showed the {board.name} held still. Nothing was kept."
             )
         capture = writer.finish(board)
     return CameraCapture(capture, tuple(taken), tuple(refused), coverage)
@@ -217,6 +220,16 @@ def _taken(photo: Photo, detection: Detection) -> TakenPhoto:
     return TakenPhoto(photo.source, len(detection.ids), detection.square_px, words)
 
 
+def _refuse_other_board(before: Sequence[PhotoCapture], board: CameraBoard) -> None:
+    for capture in before:
+        if capture.index.board != board:
+            held = capture.index.board.name if capture.index.board else "no board"
+            raise InputError(
+                f"{capture.folder} holds photographs of the {held}, and a fit takes one board: "
+                f"remove it to start anew with the {board.name}."
+            )
+
+
 def _refuse_known(photo: Photo, before: Sequence[PhotoCapture], writer: PhotoWriter) -> None:
     known = already_there(before, photo.sha256)
     if known is not None:
@@ -241,7 +254,7 @@ def _same_shape(photo: Photo, shape: Shape | None) -> Shape:
             f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom and held one way."
         )
     raise InputError(
-        f"{photo.source} was turned by its EXIF data (orientation {own[2]}) in another way than the "
+        f"{photo.source} was turned by its EXIF data (orientation {own[2]}), and not as the "
         f"photographs before it ({shape[2]}): hold the camera one way for all."
     )
 
