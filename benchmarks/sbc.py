@@ -130,7 +130,8 @@ def report(kind: str, found: Calibration, seconds: float, workers: int) -> None:
     print(
         f"{kind}: {found.fits} fits, noise {found.noise}; {found.seconds:.2f} s a fit (median), "
         f"{seconds:.0f} s in all on {workers} workers; escalated {found.escalated:.1%}, "
-        f"unreliable {found.unreliable:.1%}, broken {len(found.broken)}"
+        f"unreliable {found.unreliable:.1%}, broken {len(found.broken)}, "
+        f"{found.effective:.0f} effective draws"
     )
     print(f"{'quantity':18} {'50 %':>7} {'90 %':>7} {'width':>6} {'shift':>6} {'ecdf p':>8} chi2 p")
     for row in found.quantities:

@@ -55,6 +55,7 @@ def fit_of(experiment: Linear) -> FitResult:
         "held_out": held_out,
         "inputs_hash": "0" * 64,
         "effort_unit": "N m",
+        "diagnostics": {"k_hat": posterior.k_hat},
         "parameter": lambda name: next(p for p in fitted if p.name == name),
     }
     return cast(FitResult, SimpleNamespace(**facts))
@@ -133,7 +134,7 @@ def test_a_fit_that_breaks_is_counted_with_its_sentence():
     experiment = made(0.0)
     study = make_study(experiment, fit_of(experiment), seed=0)
     hopeless = Generating("local", 3.0, np.full(4, np.inf), np.eye(4))
-    broken = Study(experiment, "standard", 0, hopeless, study.noise, study.start, study.split)
+    broken = Study(experiment, "standard", 0, hopeless, study.noise, study.start, 600, study.split)
     with np.errstate(all="ignore"):
         records = [run(broken, Task("simulated", index)) for index in range(3)]
     assert all("broken" in record for record in records)

@@ -21,6 +21,12 @@ from scissorcal.errors import MissingError
 
 Array = NDArray[np.float64]
 
+FEWEST_DRAWS = 600
+"""Draws of each posterior where importance weights are even: a rank takes 199 of them."""
+
+EVEN_WEIGHTS = 0.5
+"""k-hat below which they are; above it, fits take as many draws as the fit itself."""
+
 _NOISE_STREAM, _HALVES_STREAM = 10, 11
 
 
@@ -49,6 +55,7 @@ def make_study(
         generating=generating,
         noise=residual_noise(experiment, start, rng),
         start=start,
+        draws=FEWEST_DRAWS if _even(fit) else max(FEWEST_DRAWS, len(fit.draws)),
         split=split_strokes(experiment.strokes, _facts(fit, sheets or {})),
     )
 
@@ -124,6 +131,12 @@ def unconstrained_draws(experiment: Experiment, fit: FitResult) -> Array:
             f"made it. Run 'scissorcal fit {fit.what} --force' first."
         )
     return np.stack([p.unconstrained(columns[p.name]) for p in parameters], axis=1)
+
+
+def _even(fit: FitResult) -> bool:
+    """Whether the weights of a fit were even, as those of its like will be."""
+    k_hat = fit.diagnostics.get("k_hat")
+    return k_hat is None or not k_hat > EVEN_WEIGHTS
 
 
 def _facts(fit: FitResult, sheets: Mapping[int, int]) -> tuple[StrokeFacts, ...]:

@@ -70,7 +70,8 @@ class Calibration:
     data were drawn from; ``spread`` is the factor by which the local prior is wider than the
     posterior. ``escalated`` is the share of fits that went to a higher effort by themselves,
     ``unreliable`` that of fits whose posterior failed its own diagnostics, ``broken`` the
-    sentences of fits that gave none. ``seconds`` is the median time of a fit.
+    sentences of fits that gave none. ``effective`` is the median number of independent draws of a
+    posterior, ``seconds`` the median time of a fit.
     """
 
     fits: int
@@ -84,6 +85,7 @@ class Calibration:
     escalated: float
     unreliable: float
     broken: tuple[str, ...]
+    effective: float
     seconds: float
 
 

@@ -24,9 +24,6 @@ Record = Mapping[str, Any]
 LEVELS = 200
 """Possible ranks: central intervals of 50 % and 90 % are whole numbers of them."""
 
-DRAWS = 600
-"""Draws of each fit: a rank takes 199 of them, and k-hat is sure enough."""
-
 EFFORT = "effort_rms"
 """Name of what all parameters predict together: the rms of the expected effort over the motion."""
 
@@ -45,8 +42,9 @@ class Task:
 class Study:
     """All that any fit of a trust check needs.
 
-    ``generating`` and ``noise`` make simulated data; ``start`` (p,) is the fit's own optimum;
-    ``split`` parts the data (None where it cannot be parted).
+    ``generating`` and ``noise`` make simulated data; ``start`` (p,) is where the fit ended,
+    ``draws`` how many are taken of each posterior; ``split`` parts the data (None where it cannot
+    be parted).
     """
 
     experiment: Experiment
@@ -55,6 +53,7 @@ class Study:
     generating: Generating
     noise: ArNoise
     start: Array
+    draws: int
     split: Split | None
 
     @property
@@ -100,7 +99,7 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
             prior_precision=generating.precision,
             starts=generating.mean[None, :],
         )
-    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=DRAWS)
+    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
     chosen = posterior.draws[rng.choice(len(posterior.draws), LEVELS - 1, replace=False)]
     truths = quantities(study, truth[None, :])
     ranks = rank_among(quantities(study, chosen), truths[0], rng)
@@ -113,7 +112,7 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     keep = study.split.first if index == 0 else study.split.second
     rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
     series = unbroken(experiment.series, keep)
-    posterior = infer(rung.problem(series, keep), study.effort, rng, count=DRAWS)
+    posterior = infer(rung.problem(series, keep), study.effort, rng, count=study.draws)
     residuals = rung.likelihood.standardised(posterior.optimum.point)
     white = ljung_box(residuals[keep], series[keep])
     return {
@@ -128,7 +127,7 @@ def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]
     """Sensitivities of the fit's own posterior to the powers of its prior and likelihood."""
     experiment = study.experiment
     rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
-    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=DRAWS)
+    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
     shown = quantities(study, posterior.draws)
     wanted = study.wanted
     away = (posterior.draws - rung.prior_mean)[:, wanted]
@@ -155,6 +154,7 @@ def _diagnostics(posterior: Posterior) -> dict[str, Any]:
     k = posterior.k_hat
     return {
         "k_hat": k if np.isfinite(k) else None,
+        "effective": posterior.effective,
         "effort": posterior.effort_reached,
         "settled": bool(posterior.optimum.success),
     }

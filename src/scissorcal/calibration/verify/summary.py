@@ -71,6 +71,7 @@ def summarise_simulated(
         escalated=float(np.mean([rung > higher for rung in reached])),
         unreliable=float(np.mean([_unreliable(record) for record in sound])),
         broken=tuple(record["broken"] for record in records if "broken" in record),
+        effective=float(np.median([record["effective"] for record in sound])),
         seconds=float(np.median([record["seconds"] for record in sound])),
     )
 
