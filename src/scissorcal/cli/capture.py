@@ -20,6 +20,7 @@ _COMMANDS = {
     "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
     "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
     "camera": ("scissorcal.cli.capture_camera:camera", "Photographs of the printed camera board."),
+    "plate": ("scissorcal.cli.capture_plate:plate", "Photographs of the plate's target."),
 }
 
 

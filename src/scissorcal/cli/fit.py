@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 @click.command("fit")
-@click.argument("what", type=click.Choice(["friction", "cut", "camera", "all"]), default="all")
+@click.argument(
+    "what", type=click.Choice(["friction", "cut", "camera", "plate", "all"]), default="all"
+)
 @click.option(
     "--effort",
     type=click.Choice(["draft", "standard"]),
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 @workspace_option
 @command
 def fit(
-    what: Literal["friction", "cut", "camera", "all"],
+    what: Literal["friction", "cut", "camera", "plate", "all"],
     effort: Literal["draft", "standard"] | None,
     force: bool,
     seed: int,
@@ -56,6 +58,10 @@ def fit(
         from scissorcal.cli.fit_camera import fit_camera
 
         return fit_camera(folder, seed=seed, force=force)
+    if what == "plate":
+        from scissorcal.cli.fit_plate import fit_plate
+
+        return fit_plate(folder, force=force)
     workspace = open_workspace(folder)
     wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
     with progress() as tell:

@@ -20,6 +20,52 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
 Range = Annotated[tuple[Finite, Finite], Strict(False)]
 Speeds = Annotated[tuple[Positive, ...], Strict(False), Field(min_length=1)]
+FrictionRung = Literal[
+    "coulomb",
+    "coulomb+angle",
+    "coulomb+load",
+    "coulomb+presliding",
+    "coulomb+angle+load",
+    "coulomb+angle+presliding",
+    "coulomb+load+presliding",
+    "coulomb+angle+load+presliding",
+    "coulomb+viscous",
+    "coulomb+viscous+angle",
+    "coulomb+viscous+load",
+    "coulomb+viscous+presliding",
+    "coulomb+viscous+angle+load",
+    "coulomb+viscous+angle+presliding",
+    "coulomb+viscous+load+presliding",
+    "coulomb+viscous+angle+load+presliding",
+    "stribeck",
+    "stribeck+angle",
+    "stribeck+load",
+    "stribeck+presliding",
+    "stribeck+angle+load",
+    "stribeck+angle+presliding",
+    "stribeck+load+presliding",
+    "stribeck+angle+load+presliding",
+]
+FrictionTerm = Literal[
+    "1",
+    "sign",
+    "rate",
+    "|rate|",
+    "rate^2",
+    "rate*|rate|",
+    "rate^3",
+    "opening",
+    "opening^2",
+    "sin(opening)",
+    "cos(opening)",
+    "sign*opening",
+    "sign*opening^2",
+    "rate*opening",
+    "rate^2*opening",
+    "load",
+    "load*sign",
+    "load*rate",
+]
 Rendered = Literal["torque", "handle_force", "translation_force"]
 
 
@@ -105,6 +151,7 @@ class Scene(Section):
     render: Annotated[tuple[Rendered, ...], Strict(False), Field(min_length=1)] = ("torque",)
     render_friction: bool = True
     closure: Literal["work", "eq4"] = "work"
+    plate_pose: Literal["known", "estimated"] = "known"
     opening_deg: Range
     opening_rate_rad_per_s: Range
     contact_mm: Range
@@ -131,6 +178,18 @@ class Scene(Section):
     def contact_m(self) -> tuple[float, float]:
         low, high = self.contact_mm
         return low * 1e-3, high * 1e-3
+
+
+class Plate(Section):
+    """How the printed target lies on the plate, where the plate's pose is estimated.
+
+    ``place_mm`` is the pattern's upper left corner as printed, in the plate's frame (x along the
+    cut from the near edge, y to the left of the cut, z out of the upper face); ``turn_deg`` turns
+    its upper edge from x towards y. The pattern faces up.
+    """
+
+    place_mm: Range = (0.0, 0.0)
+    turn_deg: Finite = 0.0
 
 
 class Limits(Section):
@@ -167,12 +226,15 @@ class Capture(Section):
 class FitFriction(Section):
     """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both.
 
+    ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
+    the windows, over which data and law are averaged alike, pass half.
     ``critic`` searches what the law leaves for terms that it lacks (not at draft effort).
     """
 
-    rung: Literal["auto", "coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"] = "auto"
+    rung: Literal["auto"] | FrictionRung = "auto"
     symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
-    cutoff_Hz: Positive = 100.0
+    adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
+    cutoff_Hz: Positive = 75.0
     critic: bool = True
 
 
@@ -204,6 +266,7 @@ class Recipe(Section):
     rig: Rig
     material: Material
     scene: Scene
+    plate: Plate = Plate()
     limits: Limits = Limits()
     capture: Capture = Capture()
     fit: Fit = Fit()

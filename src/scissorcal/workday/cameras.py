@@ -18,8 +18,9 @@ from scissorcal.vision.photo import Photo, read_photo
 from scissorcal.workday.photographs import (
     PhotoCapture,
     PhotoWriter,
-    already_there,
+    detection_of,
     photo_captures,
+    refuse_known,
 )
 from scissorcal.workday.workspace import Workspace
 
@@ -81,7 +82,7 @@ def capture_camera(
         for path in paths:
             try:
                 photo = read_photo(path, colour=False)
-                _refuse_known(photo, before, writer)
+                refuse_known(photo, before, writer)
                 detection = find_board(photo, board)
                 shape = _same_shape(photo, shape)
             except InputError as error:
@@ -230,16 +231,6 @@ def _refuse_other_board(before: Sequence[PhotoCapture], board: CameraBoard) -> N
             )
 
 
-def _refuse_known(photo: Photo, before: Sequence[PhotoCapture], writer: PhotoWriter) -> None:
-    known = already_there(before, photo.sha256)
-    if known is not None:
-        raise InputError(
-            f"{photo.source} was taken in before, as {known.parent.name}/{known.name}."
-        )
-    if any(photo.sha256 == other.sha256 for other in writer.photographs):
-        raise InputError(f"{photo.source} is given twice.")
-
-
 Shape = tuple[int, int, int]
 
 
@@ -278,16 +269,8 @@ def _photos(captures: Sequence[PhotoCapture]) -> list["CameraPhoto"]:
 
     found = []
     for capture in captures:
-        board = capture.index.board
-        if not isinstance(board, CharucoBoard | Chessboard):
-            raise InputError(f"{capture.folder} holds no photographs of a board: remove it.")
         for photo in capture.index.photographs:
-            detection = Detection(
-                board,
-                np.array(photo.ids, dtype=np.int64),
-                np.array(photo.pixels, dtype=np.float64).reshape(-1, 2),
-                photo.square_px or float("nan"),
-            )
+            detection = detection_of(capture, photo)
             found.append(CameraPhoto(photo.source, photo.width, photo.height, detection))
     return found
 

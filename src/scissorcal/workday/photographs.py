@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from scissorcal.vision.detect import Detection
     from scissorcal.vision.photo import Photo
 
-PhotoKind = Literal["camera", "blade", "plate"]
+PhotoKind = Literal["camera", "blade", "plate", "rig"]
 INDEX_FILE = "capture.json"
 
 
@@ -34,6 +34,8 @@ class Photograph(BaseModel):
     height: int
     orientation: int = Field(default=1, description="EXIF orientation that was applied")
     square_px: float | None = None
+    advance_mm: float | None = Field(default=None, description="where the rig stood; rig only")
+    opening_deg: float | None = Field(default=None, description="how far it was open; rig only")
     ids: tuple[int, ...] = ()
     pixels: tuple[tuple[float, float], ...] = ()
 
@@ -91,8 +93,17 @@ class PhotoWriter:
     def __exit__(self, *_: object) -> None:
         shutil.rmtree(self.part, ignore_errors=True)
 
-    def add(self, path: Path, photo: "Photo", detection: "Detection | None" = None) -> Photograph:
-        """Copy a photograph byte for byte and note what was found in it."""
+    def add(
+        self,
+        path: Path,
+        photo: "Photo",
+        detection: "Detection | None" = None,
+        stance: tuple[float, float] | None = None,
+    ) -> Photograph:
+        """Copy a photograph byte for byte and note what was found in it.
+
+        ``stance`` is where the rig stood: advance in mm, opening in deg.
+        """
         name = f"{len(self.photographs) + 1:03d}-{path.name}"
         shutil.copyfile(path, self.part / name)
         found = {}
@@ -110,6 +121,8 @@ class PhotoWriter:
                 "width": photo.width,
                 "height": photo.height,
                 "orientation": photo.orientation,
+                "advance_mm": stance[0] if stance else None,
+                "opening_deg": stance[1] if stance else None,
                 **found,
             }
         )
@@ -122,6 +135,34 @@ class PhotoWriter:
         (self.part / INDEX_FILE).write_text(index.model_dump_json(indent=1) + "\n", "utf-8")
         self.part.rename(self.folder)
         return PhotoCapture(self.folder, index)
+
+
+def detection_of(capture: PhotoCapture, photograph: Photograph) -> "Detection":
+    """What was found in a stored photograph. Raises InputError where its capture has no board."""
+    import numpy as np
+
+    from scissorcal.vision.detect import Detection
+
+    board = capture.index.board
+    if board is None:
+        raise InputError(f"{capture.folder} holds no photographs of a board: remove it.")
+    return Detection(
+        board,
+        np.array(photograph.ids, dtype=np.int64),
+        np.array(photograph.pixels, dtype=np.float64).reshape(-1, 2),
+        photograph.square_px or float("nan"),
+    )
+
+
+def refuse_known(photo: "Photo", before: Sequence[PhotoCapture], writer: PhotoWriter) -> None:
+    """Raise InputError where a photograph was taken in before, or is given twice."""
+    known = already_there(before, photo.sha256)
+    if known is not None:
+        raise InputError(
+            f"{photo.source} was taken in before, as {known.parent.name}/{known.name}."
+        )
+    if any(photo.sha256 == other.sha256 for other in writer.photographs):
+        raise InputError(f"{photo.source} is given twice.")
 
 
 def already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:

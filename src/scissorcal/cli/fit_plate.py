@@ -1,0 +1,64 @@
+"""What ``scissorcal fit plate`` says."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.output import Answer, table
+
+if TYPE_CHECKING:
+    from scissorcal.vision.pose import Pose
+    from scissorcal.workday.plates import PlateOutcome
+
+
+def fit_plate(folder: Path | None, *, force: bool) -> Answer:
+    """Fit a workspace's plate, where its photographs changed, and say where it stands."""
+    from scissorcal.workday.plates import fit_workspace_plate
+
+    outcome = fit_workspace_plate(open_workspace(folder), force=force)
+    files = () if outcome.cached else (outcome.path, *outcome.pictures)
+    return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
+
+
+def _text(outcome: "PlateOutcome") -> str:
+    fit = outcome.fit
+    head = f"plate: {len(fit.views)} photographs of the {fit.target}, rms {fit.rms_px:.2f} px"
+    if outcome.cached:
+        head = "plate: nothing changed since the last fit"
+    rows = [["frame", "x mm", "y mm", "z mm", "turn deg", "about x", "y", "z", "sd mm", "sd deg"]]
+    rows.append(_row("camera", fit.camera_plate))
+    if fit.rig_plate:
+        rows.append(_row("rig", fit.rig_plate))
+    return f"{head}\n{table(rows, right=range(1, 10))}"
+
+
+def _row(name: str, pose: "Pose") -> list[str]:
+    import numpy as np
+
+    vector = pose.rotation_vector
+    angle = float(np.linalg.norm(vector))
+    axis = vector / angle if angle > 0 else vector
+    cells = [name, *(f"{1e3 * value:.2f}" for value in pose.translation_m)]
+    cells += [f"{np.degrees(angle):.2f}", *(f"{value:.3f}" for value in axis)]
+    if pose.covariance is None:
+        return [*cells, "", ""]
+    sd = np.sqrt(np.diag(pose.covariance))
+    worst = np.degrees(sd[:3].max())
+    return [*cells, f"{1e3 * sd[3:].max():.2g}", f"{worst:.2g}"]
+
+
+def _facts(outcome: "PlateOutcome") -> dict[str, object]:
+    fit = outcome.fit
+    return {
+        "cached": outcome.cached,
+        "target": fit.target,
+        "camera_plate": fit.camera_plate,
+        "rig_plate": fit.rig_plate,
+        "other": fit.other,
+        "odds": min(fit.odds, 1e12),
+        "views": fit.views,
+        "two_halves": fit.halves,
+        "rms_px": fit.rms_px,
+        "inputs_hash": fit.inputs_hash,
+        "pictures": outcome.pictures,
+    }
