@@ -88,7 +88,7 @@ def build_package(
     """
     cut, friction = _wanted(recipe, friction, cut)
     record = _provenance(recipe, cut, friction)
-    draws = _pick_draws(cut, friction, rng)
+    draws = pick_draws(cut, friction, rng)
     model = central_model(_centre(cut), _centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)
     ranges = Ranges(
@@ -245,7 +245,7 @@ def _centre(fit: FitResult) -> FitDraws:
     return FitDraws(fit.structure, names, fit.map_point[None, :])
 
 
-def _pick_draws(
+def pick_draws(
     cut: FitResult, friction: FitResult | None, rng: np.random.Generator
 ) -> dict[str, NDArray[Any]]:
     """As many draws of each fit as the smaller one has, at most 200.

@@ -144,20 +144,26 @@ def new_grid(size: tuple[float, float], rows: int, columns: int) -> tuple[Figure
 
 
 def label_lines(axes: Axes, lines: Sequence[tuple[Any, Any, str, str]]) -> None:
-    """Write each line's name at its highest place, apart from the others; (x, y, name, colour)."""
+    """Write each line's name where it is farthest from the others; (x, y, name, colour)."""
     import numpy as np
 
     low, high = axes.get_ylim()
+    left, right = axes.get_xlim()
     step = 0.075 * (high - low)
     taken: list[tuple[float, float]] = []
-    left, right = axes.get_xlim()
-    for x, y, name, colour in lines:
+    for number, (x, y, name, colour) in enumerate(lines):
         if not np.any(np.isfinite(y)):
             continue
-        at = int(np.nanargmax(y))
-        place, side = float(y[at]) + 0.4 * step, float(x[at])
-        apart = 0.22 * (right - left)
-        while any(abs(place - b) < step and abs(side - a) < apart for a, b in taken):
+        apart = np.full(len(x), 0.2)
+        for other, (u, v, *_) in enumerate(lines):
+            if other != number and np.any(np.isfinite(v)):
+                gap = np.abs(y - np.interp(x, u, v, left=np.inf, right=np.inf)) / (high - low)
+                apart = np.fmin(apart, gap)
+        with np.errstate(invalid="ignore"):
+            at = int(np.nanargmax(np.round(apart, 2) + 0.05 * (y - low) / (high - low)))
+        place, side = float(y[at]) + 0.35 * step, float(x[at])
+        reach = 0.2 * (right - left)
+        while any(abs(place - b) < step and abs(side - a) < reach for a, b in taken):
             place += step
         taken.append((side, place))
         middle = 0.5 * (left + right)

@@ -10,6 +10,7 @@ import numpy as np
 from scissorcal.calibration import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import Cutting
+from scissorcal.package.build import pick_draws
 from scissorcal.package.exact import ExactModel, FitDraws, central_model, exact_model
 from scissorcal.report.reduce import Array, thinned
 
@@ -28,13 +29,17 @@ def law_of(cut: FitResult, friction: FitResult | None) -> Law | None:
     """Join a cut with the friction that is rendered; None where either has no usable numbers."""
     if cut.what != "cut" or not _usable(cut) or (friction is not None and not _usable(friction)):
         return None
-    count = min(MOST_DRAWS, *(len(fit.draws) for fit in (cut, friction) if fit is not None))
-    rng = np.random.default_rng(0)
+    picked = pick_draws(cut, friction, np.random.default_rng(0))
+    drawn = [
+        FitDraws(
+            fit.structure, tuple(p.name for p in fit.parameters), picked[f"draws/{fit.what}.npy"]
+        )
+        for fit in (cut, friction)
+        if fit is not None
+    ]
     return Law(
-        exact_model(
-            _draws(cut, count, rng), None if not friction else _draws(friction, count, rng)
-        ),
-        central_model(_centre(cut), None if not friction else _centre(friction)),
+        exact_model(drawn[0], drawn[1] if friction else None),
+        central_model(_centre(cut), _centre(friction) if friction else None),
     )
 
 
@@ -61,11 +66,6 @@ def _usable(fit: FitResult) -> bool:
     wanted = {"response", "edge"} if fit.what == "cut" else {"angle_center"}
     known = wanted <= set(fit.structure) and len(fit.parameters) > 0 and len(fit.draws) > 1
     return known and bool(np.all(np.isfinite(fit.draws)) and np.all(np.isfinite(fit.map_point)))
-
-
-def _draws(fit: FitResult, count: int, rng: np.random.Generator) -> FitDraws:
-    names = tuple(parameter.name for parameter in fit.parameters)
-    return FitDraws(fit.structure, names, fit.draws[rng.permutation(len(fit.draws))[:count]])
 
 
 def _centre(fit: FitResult) -> FitDraws:

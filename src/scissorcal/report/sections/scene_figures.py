@@ -61,7 +61,8 @@ def show_scene(section: SceneTorque, recipe: Recipe, fits: Sequence[FitResult]) 
     friction = "with friction, as the scene asks" if section.with_friction else "without friction"
     lead = (
         f"What a loop would render from these fits, {friction}. The shade holds it with "
-        f"{percent(section.confidence)} probability. Lines are full where data lie nearby and "
+        f"{percent(section.confidence)} probability; where none is seen, it is narrower than the "
+        "line. Lines are full where data lie nearby and "
         "dashed where the model goes on alone. Marks are measured: by what they differ from the "
         "model where they were taken, they lie off the line.",
     )

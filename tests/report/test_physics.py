@@ -1,0 +1,239 @@
+"""What the report says of the physics, against laws that are known in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recording.recording import Stroke
+from scissorcal.report.document import Evidence, compose_fit
+from scissorcal.report.sections.edge_force import EdgeForce, force_along_edge
+from scissorcal.report.sections.fracture_work import fracture_work
+from scissorcal.report.sections.friction_map import map_friction
+from scissorcal.report.sections.response_curve import trace_response
+from scissorcal.report.sections.scene_torque import findings, scene_torque
+from scissorcal.report.strokes import strokes_of
+from tests.calibration.truth import Truth, make_recording, sweep
+from tests.report.conftest import paper
+from tests.report.fits import friction_fit, linear_fit, without_numbers
+from tests.report.laws import known_cut, known_friction, strokes_along_edge
+
+
+def edge_of(fit: FitResult) -> EdgeForce:
+    return force_along_edge(fit, strokes_of(fit, "cut", []))
+
+
+def swept(ratio: np.ndarray, seed: int, strokes: int = 9) -> FitResult:
+    rng = np.random.default_rng(seed)
+    return strokes_along_edge(known_cut(Truth()), ratio, strokes, rng)
+
+
+def test_a_blunt_place_is_found_where_it_is() -> None:
+    station = np.linspace(0.016, 0.064, 240)
+    blunt = (station > 0.036) & (station < 0.044)
+    found = edge_of(swept(np.where(blunt, 1.25, 1.0), seed=1))
+    odd = [place for place in found.places if place.conspicuous]
+    assert odd
+    for place in odd:
+        assert place.station_high > 0.036
+        assert place.station_low < 0.044
+    whole = [p for p in odd if p.station_low >= 0.036 and p.station_high <= 0.044]
+    assert whole
+    for place in whole:
+        assert place.low is not None
+        assert place.high is not None
+        assert place.low < 1.25 < place.high
+    assert "more force than the model says" in found.finding
+    assert "blunt spot" in found.finding
+
+
+def test_an_even_edge_is_seldom_blamed() -> None:
+    blamed = sum(
+        any(place.conspicuous for place in edge_of(swept(np.ones(120), seed)).places)
+        for seed in range(60)
+    )
+    assert blamed <= 9  # 5 % of 60 expected for all places together; 9 has a chance of 0.4 %
+
+
+def test_two_strokes_say_nothing_with_certainty() -> None:
+    found = edge_of(swept(np.ones(120), seed=2, strokes=2))
+    assert all(place.low is None and not place.conspicuous for place in found.places)
+    assert "record more strokes" in found.finding
+
+
+def test_the_work_of_a_stroke_is_the_toughness_times_its_cut() -> None:
+    truth, rng = Truth(), np.random.default_rng(11)
+    opening, advance, strokes = [], [], []
+    for place, speed in ((-0.018, 0.25), (0.016, 0.6)):
+        for start, end, kind, rate in (
+            (0.85, 0.22, "closing", speed),
+            (0.22, 0.85, "opening", 1.0),
+        ):
+            strokes.append(Stroke(len(strokes), kind, rate, 0))
+            opening.append(sweep(start, end, rate))
+            advance.append(place)
+    recording = make_recording("cut", opening, advance, strokes, truth, rng, True)
+    fit = _with_strokes(known_cut(truth, recording), len(strokes))
+    section = fracture_work(fit, known_friction(truth), [recording], strokes_of(fit, "cut", []))
+    assert [row.name.stroke for row in section.rows] == [0, 2]
+    for row in section.rows:
+        assert row.length is not None
+        assert row.length > 0.03
+        assert row.fracture is not None
+        assert row.fracture / row.length == pytest.approx(truth.fracture_energy, rel=0.02)
+        assert row.expected is not None
+        assert row.expected / row.length == pytest.approx(truth.fracture_energy, rel=0.01)
+        assert not row.advanced
+        assert row.total == pytest.approx((row.fracture or 0) + (row.stored or 0))
+
+
+def test_the_work_says_why_it_is_missing() -> None:
+    truth = Truth()
+    cut = known_cut(truth)
+    assert "not handed to" in fracture_work(cut, known_friction(truth), [], ()).missing
+    assert "fits of friction" in fracture_work(cut, None, [], ()).missing
+    keep = [i for i, p in enumerate(cut.parameters) if p.name != "fracture_energy"]
+    pressing = replace(
+        cut,
+        parameters=tuple(cut.parameters[i] for i in keep),
+        draws=cut.draws[:, keep],
+        map_point=cut.map_point[keep],
+        structure={**cut.structure, "fracture": "none"},
+    )
+    assert "Nothing is cut" in fracture_work(pressing, known_friction(truth), [], ()).missing
+
+
+def test_torque_over_the_scene_is_the_law_with_its_band() -> None:
+    """A thin sheet, stiff response: tau = J_c h |dx_c / dtheta|, whatever the response is."""
+    truth = Truth(force=200.0, upper_face=5e-5)
+    recipe = paper()
+    scene = recipe.scene.model_copy(update={"render_friction": False})
+    recipe = recipe.model_copy(update={"scene": scene})
+    fit = swept_like(truth)
+    section = scene_torque(recipe, [fit])
+    cut = next(s for s in section.slices if s.along == "opening")
+    opening = np.array(cut.x, dtype=float)
+    torque = np.array(cut.torque, dtype=float)
+    low, high = np.array(cut.band_low, float), np.array(cut.band_high, float)
+    reached = np.array([_contact(truth, theta) for theta in opening])
+    settled = reached > (cut.contact or 0.0) + 5e-4
+    step = 1e-5
+    slope = np.array(
+        [(_contact(truth, t + step) - _contact(truth, t - step)) / (2 * step) for t in opening]
+    )
+    expected = truth.fracture_energy * np.abs(slope)
+    assert np.sum(settled) > 10
+    assert np.allclose(torque[settled], expected[settled], rtol=0.02)
+    half = 0.5 * (high - low)[settled] / torque[settled]
+    assert np.allclose(half, 1.96 * 0.01, rtol=0.4)
+    assert section.within_tolerance == 1.0
+    assert "within its tolerance of 7.0 %" in findings(section)
+
+
+def swept_like(truth: Truth) -> FitResult:
+    """A fit whose samples lie where the crack stands, at openings below 0.5 rad only."""
+    rng = np.random.default_rng(3)
+    fit = strokes_along_edge(known_cut(truth), np.ones(150), 3, rng)
+    opening = np.tile(np.linspace(0.5, 0.22, 150), 3)
+    contact = np.array([_contact(truth, theta) for theta in opening])
+    series = replace(fit.series, opening=opening, contact=contact)
+    return replace(fit, series=series)
+
+
+def test_support_ends_where_data_end() -> None:
+    fit = swept_like(Truth())
+    recipe = paper()
+    scene = recipe.scene.model_copy(update={"render_friction": False, "contact_mm": (15.0, 60.0)})
+    section = scene_torque(recipe.model_copy(update={"scene": scene}), [fit])
+    grid = section.grid
+    assert grid is not None
+    shape = (len(grid.opening), len(grid.opening_rate), len(grid.contact))
+    supported = np.array(grid.supported).reshape(shape)
+    touching = np.array(grid.touching).reshape(shape)
+    opening = np.array(grid.opening, dtype=float)
+    rates = np.array(grid.opening_rate, dtype=float)
+    near = np.abs(np.log(-rates[rates < 0] / 0.25)) < np.log(2.0)
+    closing = np.flatnonzero(rates < 0)[near]
+    inside, outside = opening < 0.5, opening > 0.6
+    lowest = supported[:, closing, 0]
+    assert lowest[inside].all()
+    assert not (lowest & touching[:, closing, 0])[outside].any()
+    assert not (supported & touching)[:, rates > 0].any()
+
+
+def test_a_scene_without_a_model_says_how_to_have_one() -> None:
+    recipe = paper()
+    assert "scissorcal capture cut" in scene_torque(recipe, [friction_fit()]).missing
+    assert "scissorcal fit friction" in scene_torque(recipe, [known_cut(Truth())]).missing
+    lost = [without_numbers(known_friction(Truth())), without_numbers(known_cut(Truth()))]
+    assert "no usable numbers" in scene_torque(recipe, lost).missing
+
+
+def test_the_response_is_the_law_with_other_rungs_beside_it() -> None:
+    truth = Truth()
+    fit = swept_like(truth)
+    values = {"response_force": 0.6, "response_exponent": 2.0, "fracture_energy": 0.5}
+    rungs = (
+        {"name": "power, smooth", "chosen": True, "equivalent": True},
+        {
+            "name": "exponential, smooth",
+            "equivalent": True,
+            "key": {"response": "exponential"},
+            "values": values,
+        },
+        {"name": "spline, smooth", "equivalent": True},
+    )
+    curve = trace_response(replace(fit, rungs=rungs))
+    x = np.array(curve.indentation, dtype=float)
+    expected = np.array([truth.response(delta) for delta in x])
+    assert np.allclose(np.array(curve.force, dtype=float), expected, rtol=0.02, atol=1e-6)
+    (line,) = curve.lines
+    grown = 0.6 * np.expm1(2.0 * x / truth.reference) / np.expm1(2.0)
+    assert np.allclose(np.array(line.force, dtype=float), grown, rtol=1e-4)
+    assert curve.not_drawn == ("spline, smooth",)
+    assert curve.support_high is not None
+    assert x[-1] == pytest.approx(1.25 * curve.support_high, rel=1e-4)
+    assert "no usable numbers" in trace_response(without_numbers(fit)).missing
+
+
+def test_the_friction_map_is_the_law() -> None:
+    truth = Truth()
+    fit = known_friction(truth)
+    found = map_friction(fit)
+    assert found is not None
+    rate = np.repeat(np.array(found.rate, dtype=float), len(found.opening))
+    level = np.where(rate > 0, truth.coulomb_pos, truth.coulomb_neg) + truth.viscous * abs(rate)
+    assert np.allclose(np.array(found.friction, dtype=float), level, rtol=0.01)
+    assert np.all(np.array(found.sd, dtype=float) < 0.02 * level)
+    assert map_friction(known_cut(truth)) is None
+    assert map_friction(linear_fit()) is not None
+
+
+def test_a_cut_without_its_model_is_still_composed() -> None:
+    lost = without_numbers(known_cut(Truth()))
+    section = compose_fit(lost, "cut", Evidence()).section
+    assert section.edge_force is not None
+    assert section.edge_force.missing
+
+
+def _contact(truth: Truth, opening: float) -> float:
+    """Where the crack stands, by bisection: J_c h = 2 g tan(psi)."""
+    low, high = 1e-3, 0.2
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if truth.cut(opening, middle)[1] > truth.fracture_energy:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _with_strokes(fit: FitResult, count: int) -> FitResult:
+    """The fit with one sample of each stroke, enough to name them."""
+    series = fit.series
+    some = np.linspace(0, len(series.stroke) - 1, count).astype(int)
+    held = {name: getattr(series, name)[some] for name in series.__dataclass_fields__}
+    held["stroke"] = np.arange(count)
+    held["opening_rate"] = np.where(np.arange(count) % 2 == 0, -0.3, 0.3)
+    return replace(fit, series=replace(series, **held), held_out=())
