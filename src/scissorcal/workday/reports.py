@@ -108,8 +108,9 @@ class _Told:
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        holders = (*self.fits.values(), *self.checks.values(), *self.sheets)
-        return tuple(verdict for holder in holders for verdict in holder.verdicts)
+        found = [verdict for fit in self.fits.values() for verdict in fit.verdicts]
+        found += [verdict for check in self.checks.values() for verdict in check.verdicts]
+        return (*found, *(verdict for sheet in self.sheets for verdict in sheet.verdicts))
 
 
 def _gather(workspace: Workspace) -> _Told:
