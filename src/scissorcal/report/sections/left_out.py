@@ -87,6 +87,8 @@ def _cost(row: RungRow, chosen: RungRow | None) -> str:
         return "It was compared, but without figures."
     better = row.held_out_rms is not None and row.held_out_rms < (chosen.held_out_rms or 0.0)
     reason = " That gain is too small to feel, or not steady over strokes." if better else ""
+    if row.equivalent:
+        reason = " These data cannot tell it from the best rung; the cheapest of those is used."
     return f"Against {chosen.name}, {' and '.join(words)}.{reason}"
 
 

@@ -18,6 +18,8 @@ MOST_DOTS = 70
 STRONG = 0.8
 """Correlation from which two parameters are said to trade against each other."""
 BINS = 24
+WIDE = 20.0
+"""A range whose ends differ by this factor is drawn over a logarithmic axis."""
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -225,16 +227,30 @@ def _draw_prior(fit: FitResult, anchor: str) -> Svg:
         prior, after = fit.prior_draws[:, i], fit.draws[:, i]
         low, high = np.quantile(np.concatenate([prior, after]), [0.02, 0.98])
         low, high = min(low, after.min()), max(high, after.max())
+        wide = low > 0 and high > WIDE * low
         edges = np.linspace(low, high if high > low else low + 1.0, 2 * BINS)
+        if wide:
+            edges = np.geomspace(low, high, 2 * BINS)
+            one.set_xscale("log")
         for values, colour, dashes in ((prior, VERMILLION, "--"), (after, BLUE, "-")):
             heights = np.histogram(values, edges)[0].astype(np.float64)
             top = max(float(heights.max()), 1.0)
             x = np.repeat(edges, 2)[1:-1]
             one.plot(x, np.repeat(heights / top, 2), color=colour, lw=1.3, ls=dashes)
         one.set_yticks([])
-        one.locator_params(axis="x", nbins=3)
+        if wide:
+            one.minorticks_off()
+            one.set_xticks(
+                ticks := [float(low * (high / low) ** share) for share in (0.1, 0.5, 0.9)],
+                labels=[short(tick, 1) for tick in ticks],
+            )
+        else:
+            one.locator_params(axis="x", nbins=3)
         one.tick_params(labelsize=6.5, length=2)
         one.set_title(parameter.name.replace("_", " "), fontsize=7.5, color=INK, pad=2)
         one.set_xlabel(unit_text(parameter.unit), fontsize=6.5, color=MUTED, labelpad=1)
-    caption = "Dashed is the prior, full the posterior, each scaled to its own height."
+    caption = (
+        "Dashed is the prior, full the posterior, each scaled to its own height; axes with a wide "
+        "range are logarithmic."
+    )
     return finish(figure, f"{anchor}-f", "Prior and posterior of each parameter", caption)
