@@ -193,7 +193,7 @@ def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[st
     except InputError as error:
         return {"refused": str(error)}
     middle = time.perf_counter()
-    fit: BladeFit = fit_blade([photo.measured], None, effort=effort, rng=rng)
+    fit: BladeFit = fit_blade([*photo.measured], None, effort=effort, rng=rng)
     end = time.perf_counter()
     stations = CHECKED * setting.shape.length_m
     truth, angle = true_edge(setting.shape, stations)
@@ -212,7 +212,7 @@ def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[st
         "alpha_mrad": float(1e3 * np.sqrt(np.mean(wrong**2))),
         "z_edge": (miss / offsets.std(axis=0)).tolist(),
         "z_alpha": (wrong / tapers.std(axis=0)).tolist(),
-        "length_um": float(1e6 * (photo.measured.length - setting.shape.length_m)),
+        "length_um": float(1e6 * (photo.measured[0].length - setting.shape.length_m)),
         "family": fit.family,
         "nicks": len(nicks),
         "nicks_found": found,

@@ -19,7 +19,9 @@ GRAIN_SHARE = 0.5
 """Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
 
 _MOST_POINTS = 3000
-_LEAST_GOOD = 0.6
+_SHADOW_SEARCH = 0.05
+_LEAST_GOOD = {"edge": 0.6, "back": 0.3}
+_LEAST_IN_SHADOW = 0.4
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
 
 
@@ -67,15 +69,18 @@ class BladeMeasurement:
     axis_px: Array
 
 
-def measure_blade(light: Light, view: View, parts: BladeParts, source: str) -> BladeMeasurement:
+def measure_blade(
+    light: Light, view: View, parts: BladeParts, source: str, *, search: float = 0.035
+) -> BladeMeasurement:
     """Measure a blade whose parts are roughly known, in the photograph's own pixels.
 
     Nothing is resampled: borders are crossed in the picture and their places taken to the sheet.
     What each source of error does to the edge is found by moving that source and measuring again.
+    ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
-    edge = _border(light, view, parts, parts.edge, FIRST, LAST, source, "edge")
-    back = _border(light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back")
+    edge = _border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
+    back = _border(light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search)
     hole = _hole(light, view, parts)
     scene = _Scene(view, parts, edge, back, hole)
     place = scene.place()
@@ -288,6 +293,7 @@ def _border(
     last: float,
     source: str,
     what: str,
+    search: float,
 ) -> BorderPoints:
     """Cross one side of a blade in the picture, about once every pixel."""
     frame = parts.frame(side)
@@ -301,14 +307,12 @@ def _border(
     per_unit = count / max(s[-1] - s[0], 1e-12)
     offsets = np.interp(stations, s, e)
     outward = np.sign(np.median(e))
-    for soft, reach_share in ((2.0, 0.035), (1.5, 0.012)):
+    shadowed = what == "edge" and search > _SHADOW_SEARCH
+    for soft, far in ((1.2 if shadowed else 2.0, search), (1.5, 0.012)):
         points, normals = _with_normals(view, parts, stations, offsets, outward)
-        reach = float(np.clip(reach_share * parts.length * per_unit, 6.0, 80.0))
-        shift = _median_filtered(steepest(light, points, normals, reach, soft), 31)
+        reach = float(np.clip(far * parts.length * per_unit, 6.0, 80.0))
+        shift = steepest(light, points, normals, reach, soft, innermost=shadowed and far == search)
         offsets = offsets + outward * shift / per_unit
-        offsets = _median_filtered(offsets - np.interp(stations, s, e), 9) + np.interp(
-            stations, s, e
-        )
     points, normals = _with_normals(view, parts, stations, offsets, outward)
     found = crossings(light, points, normals, 6.0)
     blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
@@ -318,7 +322,7 @@ def _border(
     good = found.good & _alike(found)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
-    if share < _LEAST_GOOD:
+    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD[what]):
         raise InputError(
             f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
             "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "

@@ -10,6 +10,8 @@ Light = NDArray[np.float32]
 
 STEP_PX = 0.5
 _STEPS = 12
+_SHIFT_COST = 0.05
+_SHADOW_SHARE, _INWARD = 0.35, 0.25
 _NARROWEST, _NOISE_FLOOR = 0.35, 1e-3
 
 
@@ -48,17 +50,49 @@ def sampled(light: Light, points: Array, normals: Array, reach: float, step: flo
     return np.asarray(taken, dtype=np.float64)
 
 
-def steepest(light: Light, points: Array, normals: Array, reach: float, soft: float) -> Array:
-    """Offset (n,) in pixels to the steepest rise of light outward within ``reach``.
+def steepest(
+    light: Light, points: Array, normals: Array, reach: float, soft: float, *, innermost: bool
+) -> Array:
+    """Offsets (n,) in pixels to the line along which light rises outward most steeply.
 
-    Light is smoothed by ``soft`` pixels first. Of borders alike the nearer one is taken.
+    Light is smoothed by ``soft`` pixels first. The line is the best one of all that lie within
+    ``reach`` and shift by no more than a pixel from one point to the next (Viterbi's algorithm):
+    glare and dirt may interrupt a border, but do not carry it away. A thing's shadow lies outside
+    it, and may have the stronger border: with ``innermost``, of lines that are steep enough (a
+    share of the steepest, by the logarithm of light) the one further in is taken.
     """
     from scipy.ndimage import gaussian_filter1d
 
     profile = sampled(light, points, normals, reach, 1.0)
+    if innermost:
+        profile = np.log(np.maximum(profile, 1e-2))
     rise = gaussian_filter1d(profile, soft, axis=1, order=1, mode="nearest")
+    top = max(float(np.quantile(rise.max(axis=1), 0.75)), 1e-6)
     u = np.arange(profile.shape[1]) - profile.shape[1] // 2
-    return np.asarray(u[np.argmax(rise * (1.0 - 0.3 * np.abs(u) / (reach + 1.0)), axis=1)])
+    if innermost:
+        gain = np.clip(rise / (_SHADOW_SHARE * top), -0.2, 1.0) - _INWARD * u / (reach + 1)
+    else:
+        gain = np.clip(rise / top, -0.2, 1.2) * (1.0 - 0.3 * np.abs(u) / (reach + 1))
+    return np.asarray(u[_best_path(gain)], dtype=np.float64)
+
+
+def _best_path(gain: Array) -> NDArray[np.int64]:
+    """Columns (n,) of the path down ``gain`` (n, m) with the largest sum, steps of at most one."""
+    rows, columns = gain.shape
+    came = np.zeros((rows, columns), dtype=np.int64)
+    total = gain[0].copy()
+    index = np.arange(columns)
+    for row in range(1, rows):
+        padded = np.pad(total, 1, constant_values=-np.inf)
+        choices = np.stack([padded[:-2] - _SHIFT_COST, total, padded[2:] - _SHIFT_COST])
+        taken = choices.argmax(axis=0)
+        came[row] = index + taken - 1
+        total = choices[taken, index] + gain[row]
+    path = np.empty(rows, dtype=np.int64)
+    path[-1] = int(np.argmax(total))
+    for row in range(rows - 1, 0, -1):
+        path[row - 1] = came[row, path[row]]
+    return path
 
 
 def crossings(light: Light, points: Array, normals: Array, reach: float) -> Crossings:
