@@ -5,7 +5,7 @@ from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import infer
 from scissorcal.inference.information import likelihood_information
-from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
+from scissorcal.inference.optimise import Cluster, Optimum, find_optimum, scattered_starts
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
@@ -31,5 +31,6 @@ __all__ = [
     "log_density",
     "natural_step",
     "robust_covariance_of_scores",
+    "scattered_starts",
     "tails_of",
 ]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def load_walks(
 
 def _read(path: Path) -> list[Walk]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             steps, thin = (int(count) for count in file["counts"])
             positions = file["positions"]
             return [
@@ -92,7 +93,7 @@ def _read(path: Path) -> list[Walk]:
                     strict=True,
                 )
             ]
-    except (OSError, ValueError, KeyError, EOFError, IndexError) as error:
+    except (OSError, ValueError, KeyError, EOFError, IndexError, BadZipFile) as error:
         raise ValueError(
             f"{path}: not a readable checkpoint ({error}); move it away, or name another file, to "
             "start afresh."

@@ -196,11 +196,10 @@ class _Run:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count) - 2)
             if rounds > 0:
-                mixed = sample_by_mixture(
+                sampled = sample_by_mixture(
                     target, sampled, self.proposal, 2 * self.count, self.rng, rounds
                 )
-                said += f", {mixed.k_hat:.2f} with an adapted mixture"
-                sampled = mixed if mixed.trusted or not sampled.trusted else sampled
+                said += f", {sampled.k_hat:.2f} with an adapted mixture"
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)

@@ -1,5 +1,6 @@
 """Multistart search for the posterior's optima, with an honest word on how it ended."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,9 @@ Array = NDArray[np.float64]
 
 WORST = 1e300
 """Stands for a log-posterior of -inf: finite, because BOBYQA calls a NaN or an infinity solved."""
+
+HUGE = 1e100
+"""Slopes beyond this are those of an overflow, and say nothing."""
 
 SAME_HEIGHT = 0.5
 """Two points whose log-posteriors differ by less than this count as equally high."""
@@ -102,10 +106,24 @@ def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
         sentence=sentence,
         agreeing=agreeing,
         starts=len(ended),
-        evaluations=sum(climb.evaluations for climb in ended),
+        evaluations=sum(climb.evaluations for climb in ended) + 4 * len(best.point),
         status=status,
         optima=optima,
     )
+
+
+def scattered_starts(problem: Problem, count: int) -> Array:
+    """The problem's starts and ``count`` more around the first one, (k + count, p).
+
+    They are spread as a normal of the prior's width by a Sobol sequence, the same every time, for
+    posteriors whose optimum hides behind a plateau or a lower one.
+    """
+    from scipy.stats import norm, qmc
+
+    size = problem.starts.shape[1]
+    uniform = qmc.Sobol(size, scramble=False).random_base2(int(np.ceil(np.log2(count + 1))))
+    away = norm.ppf(uniform[1 : count + 1]) * problem.prior_sd
+    return np.vstack([problem.starts, _inside(problem, problem.starts[0] + away)])
 
 
 def move_optimum(optimum: Optimum, point: Array, value: float) -> Optimum:
@@ -121,7 +139,6 @@ def move_optimum(optimum: Optimum, point: Array, value: float) -> Optimum:
 
 @dataclass(frozen=True)
 class _Climb:
-    start: Array
     point: Array
     value: float
     gained: float
@@ -133,7 +150,7 @@ def _begin(problem: Problem, start: Array) -> _Climb:
     point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
     value = problem.log_posterior(point)
     root = _rounding(problem, point) if np.isfinite(value) else np.diag(problem.prior_sd)
-    return _Climb(point, point, value, np.inf, root, 1 + 2 * len(point))
+    return _Climb(point, value, np.inf, root, 1 + 2 * len(point))
 
 
 def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
@@ -148,7 +165,7 @@ def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
         if gained >= SETTLED:
             root = _rounding(problem, point)
             evaluations += 2 * len(point)
-    return _Climb(climb.start, point, value, gained, root, evaluations)
+    return _Climb(point, value, gained, root, evaluations)
 
 
 def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[Array, float, int]:
@@ -189,7 +206,8 @@ def _rounding(problem: Problem, point: Array) -> Array:
     columns = [
         0.5 * (terms(point + reach) - terms(point - reach)) / 1e-4 for reach in np.diag(step)
     ]
-    scaled = np.nan_to_num(np.stack(columns, axis=-1), nan=0.0, posinf=0.0, neginf=0.0)
+    scaled = np.stack(columns, axis=-1)
+    scaled = np.where(np.abs(scaled) < HUGE, scaled, 0.0)
     information = scaled.T @ scaled + np.eye(len(point))
     values, vectors = np.linalg.eigh(information)
     return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))
@@ -228,33 +246,31 @@ def _status(problem: Problem, best: _Climb) -> tuple[SearchStatus, str]:
     at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
     if np.any(at_bound):
         return SearchStatus.AT_BOUNDS, named(problem.names, at_bound)
-    if best.gained >= SETTLED:
+    settled = best.gained < SETTLED
+    width = np.sqrt(np.diag(best.root @ best.root.T))
+    around = _beside(problem.log_posterior, problem, best.point, (1e-3 if settled else 2.0) * width)
+    if np.any(edges := np.asarray(np.any(~np.isfinite(around), axis=1))):
+        return SearchStatus.NOT_FINITE, named(problem.names, edges)
+    if not settled:
         return SearchStatus.ROUNDS_USED_UP, ""
-    likelihood = problem.log_likelihood(best.point)
-    reaches = np.diag(0.1 * scale)
-    beside = np.array(
-        [
-            [
-                problem.log_likelihood(_inside(problem, best.point + sign * reach))
-                for sign in (-1, 1)
-            ]
-            for reach in reaches
-        ]
-    )
-    unmoved = np.abs(best.point - best.start) <= 1e-9 * scale
-    silent = np.all(np.abs(beside - likelihood) <= 1e-9 * (1 + abs(likelihood)), axis=1)
-    if np.any(unmoved & silent):
-        return SearchStatus.AT_START, named(problem.names, unmoved & silent)
-    near = np.diag(best.root @ best.root.T) ** 0.5 * 1e-3
-    broken = np.array(
-        [
-            not all(np.isfinite(problem.log_posterior(best.point + s * reach)) for s in (-1, 1))
-            for reach in np.diag(near)
-        ]
-    )
-    if np.any(broken):
-        return SearchStatus.NOT_FINITE, named(problem.names, broken)
+    height = problem.log_likelihood(best.point)
+    away = np.abs(_beside(problem.log_likelihood, problem, best.point, 0.1 * scale) - height)
+    silent = np.all(away <= 1e-9 * (1 + abs(height)), axis=1)
+    if np.any(silent):
+        return SearchStatus.AT_START, named(problem.names, silent)
     return SearchStatus.SETTLED, ""
+
+
+def _beside(
+    function: Callable[[Array], float], problem: Problem, point: Array, reach: Array
+) -> Array:
+    """Values on both sides of a point along each parameter, within the bounds, (p, 2)."""
+    return np.array(
+        [
+            [function(_inside(problem, point + sign * step)) for sign in (-1, 1)]
+            for step in np.diag(reach)
+        ]
+    )
 
 
 def _inside(problem: Problem, point: Array) -> Array:

@@ -25,8 +25,8 @@ class SearchStatus(Enum):
         "data, or widen the bounds if the value is plausible."
     )
     AT_START = (
-        "A parameter stands where the search began because the data do not respond to it: record "
-        "what excites it, or choose a rung without it."
+        "A parameter stands where its start or its prior put it because the data do not respond to "
+        "it: record what excites it, or choose a rung without it."
     )
     NOT_FINITE = (
         "The log-posterior is not a finite number right beside the optimum, so the optimum may lie "

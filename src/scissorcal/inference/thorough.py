@@ -141,8 +141,10 @@ def _judged(walks: list[Walk]) -> Chains:
     ensembles, stored, walkers, size = kept.shape
     tau = thin * _autocorrelation_time(kept)
     before = thin * _autocorrelation_time(kept[:, : int(0.8 * stored)])
-    r_hat = np.array([_r_hat(kept[..., index].reshape(ensembles, -1)) for index in range(size)])
     moved = np.isfinite(tau)
+    r_hat = np.full(size, np.nan)
+    for index in np.flatnonzero(moved):
+        r_hat[index] = _r_hat(kept[..., index].reshape(ensembles, -1))
     longest = float(np.max(tau)) if np.all(moved) else np.inf
     still = np.ptp(kept, axis=1).max(axis=-1) == 0
     long = thin * stored > LONG * longest and not np.any(still)

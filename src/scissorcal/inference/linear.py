@@ -1,0 +1,173 @@
+"""What is linear and normal is integrated in closed form, and drawn back afterwards."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.inference.infer import infer
+from scissorcal.inference.posterior import Effort, Posterior
+from scissorcal.inference.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearProblem:
+    """Measurements that are linear in some parameters once the others are known.
+
+    measured (n,) = offset + design @ beta + noise, with ``design_at`` (theta) giving offset (n,)
+    and design (n, q), ``log_sd_at`` (theta) the logarithm of the noise's standard deviation, a
+    number or (n,), and beta normal with ``linear_mean`` (q,) and ``linear_covariance`` (q, q).
+    ``names``, ``log_prior``, ``prior_sd``, ``starts``, ``lower`` and ``upper`` are those of the
+    nonlinear parameters theta (p,), as in :class:`Problem`.
+
+    The noise must be independent and normal given the parameters. Noise with memory is made so by
+    passing ``measured``, the offset and the design through the whitening filter first; a
+    likelihood that is to be stretched for autocorrelation is not of this kind, and neither is a
+    linear parameter whose prior is not normal (a log-normal one, say).
+    """
+
+    names: tuple[str, ...]
+    linear_names: tuple[str, ...]
+    measured: Array
+    design_at: Callable[[Array], tuple[Array, Array]]
+    log_sd_at: Callable[[Array], Array | float]
+    linear_mean: Array
+    linear_covariance: Array
+    log_prior: Callable[[Array], float]
+    prior_sd: Array
+    starts: Array
+    lower: Array
+    upper: Array
+
+
+def infer_linear(
+    problem: LinearProblem,
+    effort: Effort,
+    rng: np.random.Generator,
+    *,
+    count: int = 2000,
+) -> Posterior:
+    """Infer the nonlinear parameters alone, then draw the linear ones given each draw of those.
+
+    The result is over all parameters, the nonlinear ones first; its ``covariance`` is that of the
+    draws, its ``optimum`` and diagnostics are those of the nonlinear ones, which is all that was
+    searched and sampled. Where no parameter is nonlinear, pass the noise's size as one.
+    """
+    found = infer(marginalised(problem), effort, rng, count=count)
+    draws = with_linear(problem, found.draws, rng)
+    added = np.full(len(problem.linear_names), np.nan)
+    return replace(
+        found,
+        names=(*problem.names, *problem.linear_names),
+        draws=draws,
+        covariance=np.cov(draws, rowvar=False),
+        inflation=np.ones(draws.shape[1]),
+        r_hat=np.concatenate([found.r_hat, added]),
+        tau=np.concatenate([found.tau, added]),
+    )
+
+
+def marginalised(problem: LinearProblem) -> Problem:
+    """The posterior of the nonlinear parameters, its linear ones integrated out.
+
+    With b the mean of beta given theta and the data, p(y | theta) = p(y | b) p(b) / p(b | y), all
+    three normal (Lindley and Smith 1972, doi:10.1111/j.2517-6161.1972.tb00885.x). The first factor
+    gives one term to each observation, so that residuals and information are what they are in
+    other problems; the others are one number and stand with the prior.
+    """
+    halved = _Conditional(problem)
+
+    def log_prior(theta: Array) -> float:
+        prior = float(problem.log_prior(theta))
+        return prior + halved.at(theta).log_volume if np.isfinite(prior) else -np.inf
+
+    def standardised(theta: Array) -> tuple[Array, Array]:
+        given = halved.at(theta)
+        return given.residuals, given.log_sd
+
+    def terms(theta: Array) -> Array:
+        given = halved.at(theta)
+        return np.asarray(-0.5 * given.residuals**2 - given.log_sd)
+
+    return Problem(
+        names=problem.names,
+        log_prior=log_prior,
+        log_likelihood_terms=terms,
+        series=np.zeros(len(problem.measured), dtype=np.int64),
+        prior_sd=problem.prior_sd,
+        starts=problem.starts,
+        lower=problem.lower,
+        upper=problem.upper,
+        standardised=standardised,
+        independent=True,
+    )
+
+
+def with_linear(problem: LinearProblem, draws: Array, rng: np.random.Generator) -> Array:
+    """Draws of the nonlinear parameters (k, p) with a draw of the linear ones each, (k, p + q)."""
+    halved = _Conditional(problem)
+    normal = rng.standard_normal((len(draws), len(problem.linear_names)))
+    linear = [halved.at(theta).draw(z) for theta, z in zip(draws, normal, strict=True)]
+    return np.column_stack([draws, np.stack(linear)])
+
+
+@dataclass(frozen=True)
+class _Given:
+    """The linear parameters given the others, in coordinates z in which the prior is standard.
+
+    ``residuals`` (n,) are those at the conditional mean over ``log_sd``'s exponential.
+    """
+
+    mean: Array
+    precision_root: Array
+    root: Array
+    offset: Array
+    residuals: Array
+    log_sd: Array
+
+    @property
+    def log_volume(self) -> float:
+        """log p(b) - log p(b | y), up to a constant."""
+        return float(-0.5 * self.mean @ self.mean - np.log(np.diag(self.precision_root)).sum())
+
+    def draw(self, normal: Array) -> Array:
+        z = self.mean + np.linalg.solve(self.precision_root.T, normal)
+        return np.asarray(self.offset + self.root @ z)
+
+
+class _Conditional:
+    """Works out the conditional of the linear parameters, once for each theta in a row."""
+
+    def __init__(self, problem: LinearProblem) -> None:
+        self.problem = problem
+        self.root: Array = np.asarray(np.linalg.cholesky(problem.linear_covariance))
+        self.last: tuple[bytes, _Given] | None = None
+
+    def at(self, theta: Array) -> _Given:
+        key = np.asarray(theta, dtype=np.float64).tobytes()
+        if self.last is None or self.last[0] != key:
+            self.last = (key, self._worked_out(theta))
+        return self.last[1]
+
+    def _worked_out(self, theta: Array) -> _Given:
+        problem = self.problem
+        offset, design = problem.design_at(theta)
+        log_sd = np.broadcast_to(problem.log_sd_at(theta), problem.measured.shape).astype(float)
+        shrink = np.exp(-log_sd)
+        away = (problem.measured - offset - design @ problem.linear_mean) * shrink
+        columns = shrink[:, None] * (design @ self.root)
+        if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(away))):
+            size = len(problem.linear_mean)
+            nowhere = np.full(size, np.nan)
+            return _Given(
+                nowhere, np.eye(size), self.root, problem.linear_mean, away * np.nan, log_sd
+            )
+        precision_root = np.linalg.cholesky(np.eye(columns.shape[1]) + columns.T @ columns)
+        half = np.linalg.solve(precision_root, columns.T @ away)
+        mean = np.linalg.solve(precision_root.T, half)
+        return _Given(
+            mean, precision_root, self.root, problem.linear_mean, away - columns @ mean, log_sd
+        )

@@ -1,0 +1,92 @@
+"""Regressions and posteriors with published answers."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from scissorcal.inference import find_optimum, infer, scattered_starts
+from tests.inference import reference
+
+Array = NDArray[np.float64]
+
+HIDDEN = {("BoxBOD", 1): 0, ("MGH09", 1): 8}
+"""Starts from which the search needs the logarithms of the (positive) parameters, and how many
+scattered starts beside: there plain coordinates lead to a plateau or a valley without end."""
+
+needs_nist = pytest.mark.skipif(
+    not reference.NIST.is_dir(), reason="the NIST StRD data sets are not beside the project"
+)
+needs_posteriordb = pytest.mark.skipif(
+    not reference.POSTERIORDB.is_dir(), reason="the posteriordb files are not beside the project"
+)
+
+
+def matching_digits(found: Array, certified: Array) -> float:
+    """Smallest number of matching digits, -log10 of the relative error."""
+    return float(-np.log10(np.maximum(np.abs(found / certified - 1), 1e-11)).min())
+
+
+@needs_nist
+@pytest.mark.parametrize("start", [1, 2])
+@pytest.mark.parametrize("name", sorted(reference.NIST_LAWS))
+def test_certified_values_and_standard_deviations_to_four_digits(name: str, start: int) -> None:
+    """Values are the polished optimum; sds the curvature's, times sqrt(n / (n - p)).
+
+    The optimum's noise variance is RSS / n, the certified one RSS / (n - p): hence the factor.
+    """
+    data = reference.nist(name)
+    problem = reference.nist_problem(name, data, data.starts[start - 1])
+    logarithms = (name, start) in HIDDEN
+    if logarithms:
+        problem = reference.in_logarithms(problem)
+    more = HIDDEN.get((name, start), 0)
+    optimum = find_optimum(problem, scattered_starts(problem, more) if more else None)
+    found = infer(problem, "draft", np.random.default_rng(0), optimum=optimum)
+    values = found.optimum.point[:-1]
+    sds = np.sqrt(np.diag(found.covariance))[:-1]
+    if logarithms:
+        values = np.exp(values)
+        sds = sds * values
+    n, p = len(data.y), len(data.values)
+    assert found.optimum.success
+    assert found.null == ()
+    assert matching_digits(values, data.values) > 4.0
+    assert matching_digits(sds * np.sqrt(n / (n - p)), data.sds) > 4.0
+
+
+@needs_nist
+def test_a_plateau_is_not_taken_for_an_answer() -> None:
+    """From BoxBOD's first start plain coordinates end where b2 no longer matters; that is said."""
+    data = reference.nist("BoxBOD")
+    problem = reference.nist_problem("BoxBOD", data, data.starts[0])
+    found = infer(problem, "draft", np.random.default_rng(0))
+    assert any("b2" in direction for direction in found.null)
+
+
+@needs_posteriordb
+@pytest.mark.parametrize(
+    ("case", "effort"),
+    [
+        ("sblri", "standard"),
+        ("kidiq", "standard"),
+        ("kidiq", "thorough"),
+        pytest.param("sblri", "thorough", marks=pytest.mark.slow),
+    ],
+)
+def test_reference_posteriors_with_their_dependence(case: str, effort: str) -> None:
+    """Means within 0.1 sd, sds within 3 %, correlations within 0.05 of 10,000 reference draws.
+
+    The ensembles' 7,000 independent draws and the reference's leave 1.1 % on an sd and 0.015 on a
+    correlation: the limits are 2.7 and 3.3 times that, for at most 15 of them.
+    """
+    problem, reference_draws = reference.sblri() if case == "sblri" else reference.kidiq()
+    found = infer(problem, effort, np.random.default_rng(1), count=20_000)
+    draws = np.column_stack([found.draws[:, :-1], np.exp(found.draws[:, -1])])
+    sd = reference_draws.std(axis=0)
+    away = (draws.mean(axis=0) - reference_draws.mean(axis=0)) / sd
+    assert found.status.trusted
+    assert found.effort_reached == effort
+    assert np.abs(away).max() < 0.1
+    assert np.abs(draws.std(axis=0) / sd - 1).max() < 0.03
+    apart = np.corrcoef(draws, rowvar=False) - np.corrcoef(reference_draws, rowvar=False)
+    assert np.abs(apart).max() < 0.05
