@@ -50,7 +50,7 @@ def test_the_ladder_does_not_climb_higher_than_the_data(recording):
     found = fit_friction((recording,), FitFriction(), effort="draft", rng=np.random.default_rng(3))
     assert found.rung.startswith("coulomb + viscous")
     assert [row["name"] for row in found.rungs if row["chosen"]] == [found.rung]
-    assert len(found.rungs) == 8
+    assert len(found.rungs) == 10
 
 
 def test_draft_says_that_its_intervals_are_unchecked(recording):

@@ -77,7 +77,7 @@ def condition(
     pieces: list[Bins] = []
     stroke_offset = 0
     for index, recording in enumerate(recordings):
-        for low, high in _pieces(recording):
+        for low, high in pieces_of(recording):
             pieces.append(
                 _bin_piece(
                     recording,
@@ -105,7 +105,8 @@ def condition(
     )
 
 
-def _pieces(recording: Recording) -> list[tuple[int, int]]:
+def pieces_of(recording: Recording) -> list[tuple[int, int]]:
+    """Stretches without a gap that are long enough for a rate, as (first, one past the last)."""
     time = recording.device_time_s
     if len(time) < 2:
         return []
@@ -132,12 +133,12 @@ def _bin_piece(
     time = recording.device_time_s[low:high]
     rate_Hz = (len(time) - 1) / (time[-1] - time[0])
     position = np.asarray(samples["opening"], dtype=np.float64)
-    smooth = _low_pass(position, cutoff_Hz, rate_Hz)
-    drive = _low_pass(recording.drive_effort[low:high], cutoff_Hz, rate_Hz)
+    smooth = low_pass(position, cutoff_Hz, rate_Hz)
+    drive = low_pass(recording.drive_effort[low:high], cutoff_Hz, rate_Hz)
     rate = _central(smooth, rate_Hz)
-    gentle = smooth if gentle_Hz == cutoff_Hz else _low_pass(position, gentle_Hz, rate_Hz)
+    gentle = smooth if gentle_Hz == cutoff_Hz else low_pass(position, gentle_Hz, rate_Hz)
     acceleration = _central(_central(gentle, rate_Hz), rate_Hz)
-    floor = _rate_floor(position, cutoff_Hz, rate_Hz)
+    floor = rate_floor(position, cutoff_Hz, rate_Hz)
     width = max(1, round(BIN_S * rate_Hz))
     count = (len(time) - 2 * EDGE_SAMPLES) // width
     kept = slice(EDGE_SAMPLES, EDGE_SAMPLES + count * width)
@@ -161,7 +162,7 @@ def _bin_piece(
         series=np.full(count, number),
         recording=np.full(count, index),
         stroke=np.where(stroke[middle] >= 0, stroke[middle] + stroke_offset, -1),
-        sheet=_sheets(recording)[low:high][middle],
+        sheet=sheets_of(recording)[low:high][middle],
         bin_s=width / rate_Hz,
         rate_floor=floor,
     )
@@ -196,7 +197,8 @@ def _away_from_rests(certain: NDArray[np.bool_], rate: Array) -> NDArray[np.bool
     return kept
 
 
-def _low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
+def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
+    """Low-pass forwards and backwards (4th-order Butterworth), so that nothing is late."""
     from scipy.signal import butter, filtfilt
 
     numerator, denominator = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2))
@@ -207,7 +209,7 @@ def _central(values: Array, rate_Hz: float) -> Array:
     return np.asarray(np.gradient(values) * rate_Hz)
 
 
-def _rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
+def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
     """Three standard deviations of the rate that the encoder's steps alone would give."""
     steps = np.abs(np.diff(position))
     moved = steps[steps > 0]
@@ -219,7 +221,7 @@ def _rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
     return float(3 * noise)
 
 
-def _sheets(recording: Recording) -> Integers:
+def sheets_of(recording: Recording) -> Integers:
     """Sheet in place at each sample: a stroke's own, held until the next stroke names another."""
     stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
     of_stroke = np.array([s.sheet for s in recording.strokes] + [-1], dtype=np.int64)

@@ -270,8 +270,9 @@ def _propose(
     unit = term.unit(joint.position_unit, joint.effort_unit)
     adopted = [str(name) for name in chosen.rung.key.get("adopt", ())]
     adopted += [table.terms[i].name for i in accepted]
-    line = f"fit.friction.adopt = {json.dumps(adopted)}" if what == "friction" else ""
-    how = f"adopt it by {line}" if line else "no rung of a cut has it yet"
+    adoptable = what == "friction" and term.adoptable
+    line = f"fit.friction.adopt = {json.dumps(adopted)}" if adoptable else ""
+    how = f"adopt it by {line}" if line else f"no rung of a {what} fit has it yet"
     sentence = (
         f"{chosen.rung.name} leaves {coefficient:.3g} {unit} times {term.name} ({term.meaning}) "
         f"unexplained: found in {inclusion:.0%} of the resamples of strokes, and it lowers the "

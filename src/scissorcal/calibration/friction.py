@@ -7,19 +7,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.conditioning import Bins, condition
-from scissorcal.calibration.friction_experiment import NUISANCE, FrictionExperiment, design
+from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.friction_experiment import FrictionExperiment, design
+from scissorcal.calibration.friction_layout import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.windows import Windows, weigh
 from scissorcal.errors import InputError
 from scissorcal.inference import infer, tails_of
+from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 
 Progress = Callable[[float, str], None]
 
-LAWS = ("coulomb", "coulomb+viscous", "stribeck", "stribeck+angle")
+LAWS = (
+    "coulomb",
+    "coulomb+viscous",
+    "stribeck",
+    "stribeck+angle",
+    "stribeck+angle+load",
+    "stribeck+angle+presliding",
+    "stribeck+angle+load+presliding",
+)
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
 place of normal noise; milder tails are left to the widening by the scores."""
@@ -39,7 +50,8 @@ def fit_friction(
     """Identify friction, inertia and offset from recordings of empty motion.
 
     drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
-    + viscous, + Stribeck, + angle, each symmetric or not. An asymmetric law has no offset of its
+    + viscous, + Stribeck, + angle, + load (where one was measured), + presliding, each symmetric or
+    not. An asymmetric law has no offset of its
     own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
     alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
     the handles, and an offset of a sensor is not. The rung that unseen strokes
@@ -50,11 +62,13 @@ def fit_friction(
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
-    every = condition(recordings, settings.cutoff_Hz)
-    bins = every.where(every.moving)
-    _refuse_poor_motion(bins, every, recordings, joint)
+    every = weigh(recordings, settings.cutoff_Hz)
+    windows = every.where(every.bins.moving)
+    bins = windows.bins
+    _refuse_poor_motion(bins, every.bins, recordings, joint)
+    _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
-    ladder = _ladder(bins, strokes, settings, joint)
+    ladder = _ladder(windows, strokes, settings, joint)
     climbed: list[Climbed] = []
     for index, candidate in enumerate(ladder):
         tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
@@ -99,10 +113,11 @@ def friction_experiment(
     ``fit.structure``.
     """
     joint = recordings[0].joint
-    every = condition(recordings, settings.cutoff_Hz)
-    bins = every.where(every.moving)
+    every = weigh(recordings, settings.cutoff_Hz)
+    windows = every.where(every.bins.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
-    found = design(bins, _strokes(bins), law, symmetric, joint)
+    adopt = tuple(fit.structure.get("adopt", ()))
+    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
 
 
@@ -157,6 +172,29 @@ def _refuse_poor_motion(
         )
 
 
+def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
+    """Refuse what cannot be fitted to these recordings: loads where none was measured, angles."""
+    named = "" if settings.rung == "auto" else settings.rung
+    wanted = [f'fit.friction.rung = "{named}"'] if LawParts.of(named).load else []
+    wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
+    if wanted and windows.load is None:
+        raise InputError(
+            f"{wanted[0]} needs the load that the joint bears, and these recordings have none: "
+            "record sweeps in which motor and handle work against each other (motor_torque and "
+            "handle_force, with handle_radius), or choose a rung without load."
+        )
+    angles = [name for name in settings.adopt if TERMS[name].rotary]
+    if angles and joint.kind == "linear":
+        raise InputError(f'The term "{angles[0]}" is of an angle; this joint is a linear one.')
+    known = {"sign", "1", *(("rate",) if "viscous" in named or "stribeck" in named else ())}
+    known |= {"load", "load*sign"} if LawParts.of(named).load else set()
+    for name in settings.adopt:
+        if name in known or settings.adopt.count(name) > 1:
+            raise InputError(
+                f'fit.friction.adopt names "{name}", which the law has already: remove it.'
+            )
+
+
 def _strokes(bins: Bins) -> NDArray[np.int64]:
     """Planned strokes where the recording has them, else runs of one direction."""
     if np.all(bins.stroke >= 0) and len(np.unique(bins.stroke)) > 1:
@@ -168,13 +206,22 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 
 
 def _ladder(
-    bins: Bins, strokes: NDArray[np.int64], settings: FitFriction, joint: Joint
+    windows: Windows, strokes: NDArray[np.int64], settings: FitFriction, joint: Joint
 ) -> list[FrictionExperiment]:
-    laws = LAWS if settings.rung == "auto" else (settings.rung,)
+    laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
     return [
-        design(bins, strokes, law, symmetric, joint)
+        design(windows, strokes, law, symmetric, joint, settings.adopt)
         for law in laws
         for symmetric in both[settings.symmetry]
     ]
+
+
+def _laws(windows: Windows) -> tuple[str, ...]:
+    """Laws to be compared, cheapest first: those of the load only where one was measured."""
+    return (
+        LAWS
+        if windows.load is not None
+        else tuple(law for law in LAWS if not LawParts.of(law).load)
+    )

@@ -2,35 +2,36 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.friction_basis import FrictionBasis
+from scissorcal.calibration.friction_layout import NUISANCE, LawParts, friction_layout
 from scissorcal.calibration.ladder import Likelihood, Rung
-from scissorcal.calibration.layout import Layout, Parameter
-from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.windows import Windows
+from scissorcal.model import FrictionLaw
+from scissorcal.model.terms import TERMS
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-NUISANCE = ("noise",)
-WIDE = 2.8
-"""Prior standard deviation of a logarithm: 90 % within a factor of 100 of its centre."""
 
 
 @dataclass(frozen=True)
 class FrictionExperiment:
     """One friction law over one set of motions (see :class:`~.experiment.Experiment`).
 
-    ``bins`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's discrete
-    choices: ``law``, ``symmetric`` and ``angle_center``. ``tails`` are the degrees of freedom of
-    the noise.
+    ``windows`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's
+    discrete choices: ``law``, ``symmetric``, ``angle_center`` and ``adopt``, the names of adopted
+    terms. ``tails`` are the degrees of freedom of the noise.
     """
 
-    bins: Bins
+    windows: Windows
     strokes: Integers
     key: Mapping[str, Any]
     layout: Layout
@@ -38,6 +39,15 @@ class FrictionExperiment:
     tails: float = np.inf
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the basis out of a pickle: it is made again sooner than it is sent."""
+        return {name: value for name, value in self.__dict__.items() if name != "basis"}
+
+    @property
+    def bins(self) -> Bins:
+        """Weighted means over each window (n,)."""
+        return self.windows.bins
 
     @property
     def observed(self) -> Array:
@@ -52,16 +62,28 @@ class FrictionExperiment:
     @property
     def name(self) -> str:
         """The law in words."""
-        words = str(self.key["law"]).replace("+", " + ")
-        return words + (", symmetric" if self.key["symmetric"] else ", asymmetric")
+        words = [*str(self.key["law"]).split("+"), *self.key["adopt"]]
+        return " + ".join(words) + (", symmetric" if self.key["symmetric"] else ", asymmetric")
+
+    @cached_property
+    def basis(self) -> FrictionBasis:
+        """Friction over these windows for any parameters of the law."""
+        parts, adopt = LawParts.of(str(self.key["law"])), tuple(self.key["adopt"])
+        center = float(self.key["angle_center"])
+        return FrictionBasis(self.windows, center, angle=parts.angle, terms=adopt)
 
     def mean(self, u: Array) -> Array:
         """Drive that inertia, friction and offset ask for (n,), at unconstrained ``u`` (p,)."""
-        values = self.layout.natural(u)
-        law = friction_law(values, float(self.key["angle_center"]))
-        offset = values.get("offset", np.asarray(0.0))
-        friction = friction_torque(law, self.bins.opening, self.bins.rate)
-        return np.asarray(values["inertia"] * self.bins.acceleration + offset + friction)
+        return self.mean_at(self.layout.natural(u))
+
+    def mean_at(self, values: Mapping[str, Array]) -> Array:
+        """Drive (n,) that parameters by name ask for; those that are missing are zero.
+
+        A drive that is measured late by ``delay`` is what it should be less delay times slope.
+        """
+        drive = self.basis(values) + values["inertia"] * self.bins.acceleration
+        late = values.get("delay", np.asarray(0.0))
+        return np.asarray(drive + values.get("offset", np.asarray(0.0)) - late * self.windows.slope)
 
     def simulate(self, u: Array, rng: np.random.Generator) -> Array:
         """Give the mean (n,): a friction law has no irregularities of its own."""
@@ -101,19 +123,18 @@ class FrictionExperiment:
             "coulomb": max(coulomb, 1e-2 * effort),
             "viscous": max(viscous, 1e-2 * effort / float(np.sqrt(np.mean(bins.rate**2)))),
             "stribeck": 0.1 * effort,
-            "angle_slope": 0.0,
-            "angle_curvature": 0.0,
             "noise": 0.1 * effort,
         }
+        scales = [name for name in ("stribeck_rate", "presliding_length") if name in layout.names]
         rows = []
-        for factor in (0.4, 1.5) if "stribeck" in layout.names else (1.0,):
+        for factor in (0.4, 1.5) if scales else (1.0,):
             point = []
             for parameter in layout.parameters:
                 stem = parameter.name.removesuffix("_pos").removesuffix("_neg")
-                if stem == "stribeck_rate":
-                    point.append(parameter.mean + np.log(factor))
-                else:
+                if stem in begin:
                     point.append(float(parameter.unconstrained(np.asarray(begin[stem]))))
+                else:
+                    point.append(parameter.mean + (np.log(factor) if stem in scales else 0.0))
             u = np.array(point)
             u[-1] = np.log(max(float(np.std(measured - self.mean(u))), 1e-6 * effort))
             rows.append(u)
@@ -121,79 +142,45 @@ class FrictionExperiment:
 
 
 def design(
-    bins: Bins, strokes: Integers, law: str, symmetric: bool, joint: Joint
+    windows: Windows,
+    strokes: Integers,
+    law: str,
+    symmetric: bool,
+    joint: Joint,
+    adopt: tuple[str, ...] = (),
 ) -> FrictionExperiment:
-    """One law over bins, with priors of the data's own size."""
-    center = float(np.round(np.mean([bins.opening.min(), bins.opening.max()]), 3))
-    key = {"law": law, "symmetric": symmetric, "angle_center": center}
-    return FrictionExperiment(bins, strokes, key, _layout(bins, law, symmetric, joint), joint)
+    """One law over windows, with priors of the data's own size."""
+    opening = windows.bins.opening
+    center = float(np.round(np.mean([opening.min(), opening.max()]), 3))
+    key = {"law": law, "symmetric": symmetric, "angle_center": center, "adopt": list(adopt)}
+    layout = friction_layout(windows, law, symmetric, joint, adopt)
+    return FrictionExperiment(windows, strokes, key, layout, joint)
 
 
 def friction_law(values: dict[str, Array], angle_center: float) -> FrictionLaw:
     """Friction law from a fit's parameters by name; those a rung lacks are zero.
 
-    ``values`` may hold scalars or arrays that broadcast (posterior draws).
+    ``values`` may hold scalars or arrays that broadcast (posterior draws); names of
+    :data:`scissorcal.model.terms.TERMS` among them are adopted terms.
     """
+    terms = tuple(name for name in values if name in TERMS)
+    zero = np.asarray(0.0)
     coulomb = values.get("coulomb")
-    viscous = values.get("viscous", np.asarray(0.0))
+    viscous = values.get("viscous", zero)
     return FrictionLaw(
         coulomb_pos=values["coulomb_pos"] if coulomb is None else coulomb,
         coulomb_neg=values["coulomb_neg"] if coulomb is None else coulomb,
         viscous_pos=values.get("viscous_pos", viscous),
         viscous_neg=values.get("viscous_neg", viscous),
-        stribeck=values.get("stribeck", np.asarray(0.0)),
+        stribeck=values.get("stribeck", zero),
         stribeck_rate=values.get("stribeck_rate", np.asarray(1.0)),
-        angle_slope=values.get("angle_slope", np.asarray(0.0)),
-        angle_curvature=values.get("angle_curvature", np.asarray(0.0)),
+        angle_slope=values.get("angle_slope", zero),
+        angle_curvature=values.get("angle_curvature", zero),
         angle_center=angle_center,
+        load_share=values.get("load_share", zero),
+        load_gain=values.get("load_gain", zero),
+        presliding_share=values.get("presliding_share", zero),
+        presliding_length=values.get("presliding_length", np.asarray(1.0)),
+        terms=terms,
+        coefficients=tuple(values[name] for name in terms),
     )
-
-
-def _layout(bins: Bins, law: str, symmetric: bool, joint: Joint) -> Layout:
-    effort, rate = float(np.std(bins.drive)), float(np.sqrt(np.mean(bins.rate**2)))
-    acceleration = float(np.sqrt(np.mean(bins.acceleration**2)))
-    span = float(np.ptp(bins.opening))
-    unit, rate_unit = joint.effort_unit, f"{joint.position_unit}/s"
-
-    def level(name: str, unit: str, centre: float, meaning: str) -> Parameter:
-        return Parameter(name, unit, "log", float(np.log(centre)), WIDE, meaning)
-
-    rows = [
-        level("inertia", joint.inertia_unit, effort / acceleration, "inertia of the moving joint")
-    ]
-    if symmetric:
-        rows.append(Parameter("offset", unit, "identity", 0.0, effort, "constant offset"))
-    sides = (("", ""),) if symmetric else (("_pos", ", positive rate"), ("_neg", ", negative rate"))
-    for suffix, words in sides:
-        rows.append(level("coulomb" + suffix, unit, effort, "Coulomb friction" + words))
-    if law != "coulomb":
-        viscous_unit = f"{unit} s/{joint.position_unit}"
-        for suffix, words in sides:
-            rows.append(
-                level("viscous" + suffix, viscous_unit, effort / rate, "viscous friction" + words)
-            )
-    if law.startswith("stribeck"):
-        slow = float(np.quantile(np.abs(bins.rate), 0.25))
-        rows.append(level("stribeck", unit, 0.3 * effort, "static minus Coulomb friction"))
-        rows.append(
-            Parameter("stribeck_rate", rate_unit, "log", float(np.log(slow)), 1.0, "Stribeck speed")
-        )
-    if law.endswith("+angle"):
-        position = joint.position_unit
-        rows.append(
-            Parameter(
-                "angle_slope", f"1/{position}", "identity", 0.0, 1 / span, "change with angle"
-            )
-        )
-        rows.append(
-            Parameter(
-                "angle_curvature",
-                f"1/{position}^2",
-                "identity",
-                0.0,
-                2 / span**2,
-                "curvature of the change with angle",
-            )
-        )
-    rows.append(level("noise", unit, 0.1 * effort, "standard deviation of what is left"))
-    return Layout(tuple(rows))

@@ -5,7 +5,7 @@ import json
 
 from scissorcal.recording.recording import Recording
 
-ALGORITHM = 1
+ALGORITHM = 2
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 

@@ -10,7 +10,7 @@ from scissorcal.model.cutting import (
     settled_contact,
 )
 from scissorcal.model.edge import Edge, EdgeBelief, EdgeView, draw_edges, edge_height
-from scissorcal.model.friction import FrictionLaw, friction_torque
+from scissorcal.model.friction import FrictionLaw, friction_torque, presliding_state
 from scissorcal.model.response import Response
 from scissorcal.model.stance import (
     Settled,
@@ -41,6 +41,7 @@ __all__ = [
     "friction_torque",
     "held_torque",
     "mean_share",
+    "presliding_state",
     "ripple_moments",
     "ripple_spread",
     "settle",

@@ -42,6 +42,11 @@ class Term:
     rotary: bool = False
 
     @property
+    def adoptable(self) -> bool:
+        """Whether a friction law can have it: what belongs to the acceleration is no friction."""
+        return not self.name.startswith("acceleration")
+
+    @property
     def needs_load(self) -> bool:
         return self.effort != 0
 

@@ -24,6 +24,7 @@ from scissorcal.package.compile import (
     scene_box,
 )
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
+from scissorcal.package.friction_tables import left_out
 from scissorcal.package.manifest import (
     FORMAT,
     Bound,
@@ -98,6 +99,10 @@ def build_package(
     )
     bound = _bound(model, compiled, ranges, recipe, tolerance)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
+    if record.friction and model.friction:
+        said = (*record.friction.warnings, *left_out(model.friction, bound.scene_torque_Nm))
+        told = record.friction.model_copy(update={"warnings": said})
+        record = record.model_copy(update={"friction": told})
     manifest = _hashed(
         Manifest(
             format="scissorcal-package/1",
@@ -210,7 +215,11 @@ def _provenance(recipe: Recipe, cut: FitResult, friction: FitResult | None) -> P
         else FrictionRecord(
             **_record(friction),
             structure=FrictionStructure(
-                **{key: friction.structure[key] for key in FrictionStructure.model_fields}
+                **{
+                    key: friction.structure[key]
+                    for key in FrictionStructure.model_fields
+                    if key in friction.structure
+                }
             ),
         ),
     )

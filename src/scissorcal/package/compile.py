@@ -9,15 +9,9 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
-from scissorcal.model import (
-    FrictionLaw,
-    edge_height,
-    friction_torque,
-    ripple_moments,
-    settled_contact,
-)
-from scissorcal.model.friction import angle_factor
+from scissorcal.model import edge_height, ripple_moments, settled_contact
 from scissorcal.package.exact import ExactModel
+from scissorcal.package.friction_tables import friction_tables
 from scissorcal.package.grid import Box, Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import fit_table
@@ -98,7 +92,7 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
             energy_J_per_m=float(cutting.fracture_energy), kappa=float(cutting.kappa)
         )
     if model.friction is not None:
-        laws |= _friction_laws(model.friction, recipe)
+        laws |= friction_tables(model.friction, recipe)
         slowest = recipe.scene.opening_rate_rad_per_s[0]
         friction = Friction(rate_eps_rad_per_s=max(SLOWEST_EPS, slowest))
     if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
@@ -269,47 +263,3 @@ def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
 
     low, high = recipe.scene.opening_rad
     return {"law": law, "derivative": derivative, "low": low, "high": high}
-
-
-def _friction_laws(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any]]:
-    """Level of friction against speed for both directions, and the factor over the opening."""
-    fastest = recipe.scene.opening_rate_rad_per_s[1]
-    low, high = recipe.scene.opening_rad
-    factors = angle_factor(law, np.linspace(low, high, 201))
-    if factors.min() <= 0:
-        where = np.degrees(np.linspace(low, high, 201)[int(np.argmin(factors))])
-        raise InputError(
-            f"The friction fit says that friction drives the motion at {where:.0f} degrees of "
-            "opening, which no friction does: capture friction over the whole of "
-            "scene.opening_deg, or choose a rung without angle in fit.friction.rung."
-        )
-    laws: dict[str, dict[str, Any]] = {}
-    for name, sign in (("friction_opening", 1.0), ("friction_closing", -1.0)):
-        viscous = float(np.asarray(law.viscous_pos if sign > 0 else law.viscous_neg))
-        laws[name] = {
-            "law": lambda speed, sign=sign: _level(law, sign, speed),
-            "derivative": lambda speed, viscous=viscous: _level_slope(law, viscous, speed),
-            "low": 0.0,
-            "high": fastest,
-        }
-    laws["friction_angle"] = {
-        "law": lambda opening: angle_factor(law, opening),
-        "derivative": lambda opening: (
-            law.angle_slope + 2.0 * law.angle_curvature * (opening - law.angle_center)
-        ),
-        "low": low,
-        "high": high,
-    }
-    return laws
-
-
-def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:
-    """Friction's magnitude at the law's centre; at rest its limit from that side."""
-    moving = np.maximum(speed, np.finfo(np.float64).tiny)
-    return np.abs(friction_torque(law, law.angle_center, sign * moving))
-
-
-def _level_slope(law: FrictionLaw, viscous: float, speed: Array) -> Array:
-    relative = speed / law.stribeck_rate
-    fall = 2.0 * law.stribeck * relative / law.stribeck_rate * np.exp(-(relative**2))
-    return np.asarray(viscous - fall)

@@ -6,9 +6,10 @@ import hashlib
 import json
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
 from scissorcal.package.review import Digest, Review
+from scissorcal.recipe.schema import FrictionRung, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
 
@@ -153,15 +154,16 @@ class CutStructure(Section):
 class FrictionStructure(Section):
     """The discrete choices of a friction fit."""
 
-    law: Literal["coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"]
+    law: FrictionRung
     symmetric: bool
     angle_center: Finite
+    adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
 
 
 class Parameter(Section):
     """A fitted parameter: ``value`` is what the tables were compiled at, the rest its posterior."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z_]{1,40}$")]
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_^*|()]{1,40}$")]
     unit: Annotated[str, Field(max_length=40)]
     value: Finite
     mean: Finite
