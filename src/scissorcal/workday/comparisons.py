@@ -49,7 +49,8 @@ def load_side(path: Path) -> "Side":
                 f"{path} has no {RECIPE_FILE}, so it is no workspace: name a workspace, a "
                 "report.json or a fit (.nc)."
             )
-        return _side_of_workspace(Workspace(path.absolute()), str(path))
+        source = str(path) if path.name not in ("", "..") else path.resolve().name
+        return _side_of_workspace(Workspace(path.absolute()), source)
     if not path.is_file():
         raise MissingError(
             f"{path} does not exist: name a workspace, a report.json or a fit (.nc)."

@@ -72,11 +72,27 @@ def make_plan(workspace: Workspace) -> Plan:
         captured = next(step for step in steps if step.name == f"capture {what}")
         steps.append(_fit_step(workspace, recipe, what, item.why, captured, fits))
     fitted = all(step.status == "done" for step in steps)
+    if fitted and not all(_is_verified(workspace, fit) for fit in fits.values()):
+        notes.append(
+            "Not checked yet whether the fits can be trusted; 'scissorcal verify' does so, and the "
+            "report shows it."
+        )
     report = _report_step(workspace, recipe, fits, fitted)
     steps += [report, _review_step(workspace, recipe, fits, report, notes)]
     if needs.tables:
         steps.append(_package_step(workspace, recipe, fits, fitted))
     return Plan(recipe.name, tuple(steps), needs.tables, needs.left_out, tuple(notes))
+
+
+def _is_verified(workspace: Workspace, fit: "FitResult") -> bool:
+    """Whether there is a trust check of this very fit."""
+    from scissorcal.calibration.verify import load_verify
+
+    path = workspace.verify_path(fit.what)
+    try:
+        return path.is_file() and load_verify(path).fit_hash == fit.inputs_hash
+    except InputError:
+        return False
 
 
 def _capture_step(
@@ -174,7 +190,7 @@ def _review_step(
             notes.append(f"The signature is void ({state.review.words}): {state.why}.")
         return Step(name, "stale", void, why, command)
     if state.review is None:
-        return Step(name, "missing", "nobody has signed the report", why, command)
+        return Step(name, "missing", "not signed yet", why, command)
     if report.status != "done":
         return Step(name, "stale", f"the report is {report.status}", why, command)
     if state.review.decision == "reject":
