@@ -19,6 +19,7 @@ from scissorcal.calibration.verify import VerifyResult, load_verify, save_verify
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.fits import fit_workspace
+from scissorcal.workday.plan import make_plan
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.records import RecordFile
 from scissorcal.workday.verify import VerifySettings, verify_workspace
@@ -147,6 +148,18 @@ def test_what_must_come_first_is_named(tmp_path: Path, fitted: Workspace) -> Non
         verify_workspace(quick_workspace(tmp_path / "empty"))
     with pytest.raises(MissingError, match="There is no fit of cut yet"):
         verify_workspace(fitted, ("cut",))
+
+
+def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
+    workspace = quick_workspace(tmp_path / "paper")
+    recipe = workspace.recipe_path.read_text(encoding="utf-8")
+    workspace.recipe_path.write_text(recipe.replace("[rig]", '[rig]\njoint = "linear"'), "utf-8")
+    record_friction(workspace, recipe_toml="")
+    assert not any("verify" in note for note in make_plan(workspace).notes)
+    fit_workspace(workspace, ("friction",))
+    assert any("'scissorcal verify'" in note for note in make_plan(workspace).notes)
+    verify_workspace(workspace, (), VerifySettings(checks=("prior",)), workers=1)
+    assert not any("verify" in note for note in make_plan(workspace).notes)
 
 
 def test_one_run_at_a_time(cleared: Workspace) -> None:

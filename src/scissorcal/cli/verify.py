@@ -96,10 +96,19 @@ def verify(
     \b
     Example:
       $ scissorcal verify friction
-      friction: coulomb + viscous, asymmetric (standard), 200 simulated fits
-      quantity          50 %        90 %         width  shift  uniform
-      inertia          52.0 %      90.5 %         0.98   0.03     0.71
+      friction: coulomb + viscous, symmetric (standard)
+    \b
+      200 fits to simulated data (truths: a normal distribution around the posterior, ...
+      quantity    in 50 %  in 90 %  width  shift     p
+      inertia       52.0%    90.5%   0.98   0.03  0.71
       ...
+      two halves: whole strokes of a kind, alternating by speed
+      parameter  unit        one half  the other        sd     z
+      inertia    kg m^2     9.492e-05  0.0001172  2.93e-05   0.8
+      ...
+    \b
+    Width is the factor by which intervals are too narrow (above 1) or too wide, shift how far they
+    lie beside the truth, p the probability of such ranks where they are right.
     """
     from scissorcal.workday.verify import VerifySettings, verify_workspace
 
