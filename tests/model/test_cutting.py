@@ -15,7 +15,6 @@ from scissorcal.model import (
     cut_torque_along,
     edge_height,
     ripple_moments,
-    ripple_spread,
     settled_contact,
 )
 from scissorcal.model.cutting import torque_at
@@ -133,21 +132,6 @@ def test_ripple_moments_match_a_sampled_cycle(kappa, exponent, peak):
     assert float(moments.mean_share) == pytest.approx(force.mean() / peak, rel=1e-6)
     if kappa > 0.5:
         assert float(moments.sd_share) == pytest.approx(force.std() / peak, rel=0.03)
-
-
-def test_averaging_leaves_of_the_sawtooth_what_it_should():
-    law = cutting(kappa=0.75)
-    rng = np.random.default_rng(3)
-    theta, rate, window = 0.5, 0.1, 0.002
-    contact = settled_contact(law, theta)
-    spread = ripple_spread(law, np.array([theta]), np.array([-rate]), np.array([contact]), window)
-    view = edge_height(law.edge, contact, theta / 2)
-    peak = 0.5 / (2 * view.slope)
-    period = ripple_moments(law, peak).stroke_m / (rate * view.lever / 2)
-    start = rng.random(20000)
-    inside = (start[:, None] + np.linspace(0, 1, 200)[None, :] * window / period) % 1.0
-    saw = (0.75 + 0.25 * inside) * peak * view.lever
-    assert float(spread.advancing[0]) == pytest.approx(saw.mean(axis=1).std(), rel=0.03)
 
 
 @given(

@@ -6,7 +6,6 @@ from scissorcal.model.cutting import (
     cut_torque_along,
     mean_share,
     ripple_moments,
-    ripple_spread,
     settled_contact,
 )
 from scissorcal.model.edge import Edge, EdgeBelief, EdgeView, draw_edges, edge_height
@@ -43,7 +42,6 @@ __all__ = [
     "mean_share",
     "presliding_state",
     "ripple_moments",
-    "ripple_spread",
     "settle",
     "settled_contact",
     "take_stance",

@@ -155,56 +155,6 @@ def ripple_moments(cutting: Cutting, peak_force: ArrayLike) -> RippleMoments:
     return RippleMoments(share, spread, np.where(smooth, 0.0, length))
 
 
-@dataclass(frozen=True)
-class RippleSpread:
-    """How far a rippling fracture takes torque from its average; all (N,).
-
-    ``advancing`` (N m) is the standard deviation while the crack advances, after averaging over a
-    window. ``cycle_m`` is how far the crack runs in one cycle, ``torque_per_metre`` (N) what a
-    crack that rests a metre nearer would add.
-    """
-
-    advancing: Array
-    cycle_m: Array
-    torque_per_metre: Array
-
-
-def ripple_spread(
-    cutting: Cutting, opening: Array, rate: Array, contact: Array, window_s: float
-) -> RippleSpread:
-    """Spread of torque about its average where fracture ripples.
-
-    While the crack advances, the force climbs between its runs as a saw-tooth. A moving average
-    over r periods leaves of a saw-tooth's variance the share rho^2 (1 - rho)^2 / r^2 with rho = r
-    mod 1, by the autocovariance of its Fourier series; beyond one period its mean over rho,
-    1 / (30 r^2), is taken, since the speed is never steady enough for the zeros between. r is the
-    window times the rate at which the edge sinks in, over what one cycle takes. While the crack
-    rests, nobody knows in which phase it stopped: its place is uncertain by one cycle's length.
-    """
-    reached = np.where(np.isfinite(contact), contact, 0.0)
-    view = edge_height(cutting.edge, reached, opening / cutting.moving_blades)
-    cuts = view.slope > STEEPEST_START
-    slope = np.where(cuts, view.slope, 1.0)
-    peak = np.asarray(cutting.fracture_energy) / (cutting.moving_blades * slope)
-    moments = ripple_moments(cutting, peak)
-    lever = np.where(cuts, np.abs(view.lever), 0.0)
-    sinking = np.abs(rate) * lever / cutting.moving_blades
-    periods = np.maximum(window_s * sinking / np.maximum(moments.stroke_m, 1e-15), 1e-9)
-    kept = np.sqrt(
-        np.maximum(1.0 - periods, 0.0) ** 2 + np.minimum(periods, 1.0 / periods) ** 2 / 30.0
-    )
-    indentation = cutting.upper_face_m - view.height
-    borne = np.minimum(indentation, cutting.response.indentation_at(peak))
-    stiffness = np.minimum(
-        cutting.response.stiffness_at(borne), peak / np.maximum(moments.stroke_m, 1e-15)
-    )
-    return RippleSpread(
-        advancing=lever * moments.sd_share * peak * kept,
-        cycle_m=moments.stroke_m / slope,
-        torque_per_metre=lever * stiffness * slope,
-    )
-
-
 def mean_share(cutting: Cutting, peak: ArrayLike) -> Array:
     """Mean force over a fracture cycle as a share of its peak (N), see :func:`ripple_moments`.
 
