@@ -26,7 +26,7 @@ BULGE_SD_M = 1e-3
 
 LEAST_SD_PX = 0.01
 _STEPS = 100
-_SETTLED = 1e-9
+_SETTLED = 1e-7
 
 
 @dataclass(frozen=True)

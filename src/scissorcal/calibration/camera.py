@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.bundle import Bundle, SeenBoard
+from scissorcal.calibration.bundle import Bundle, SeenBoard, fit_bundle
 from scissorcal.calibration.camera_checks import (
     FEWEST_VIEWS,
     OUTLYING,
@@ -15,7 +15,7 @@ from scissorcal.calibration.camera_checks import (
     refuse_undetermined,
 )
 from scissorcal.calibration.camera_result import CameraFit, ViewError
-from scissorcal.calibration.camera_rungs import Rung, climb
+from scissorcal.calibration.camera_rungs import RUNGS, Rung, climb
 from scissorcal.calibration.camera_uncertainty import (
     camera_covariance,
     camera_of,
@@ -69,7 +69,9 @@ def fit_camera(
     start = guess(width, height)
     refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
-    rungs = climb(views, np.append(start, [0.0, 0.0]), tell)
+    first = fit_bundle(views, RUNGS[0][1], np.append(start, [0.0, 0.0]))
+    refuse_undetermined(first, width, height)
+    rungs = climb(views, first.shared, tell)
     (chosen,) = (rung for rung in rungs if rung.chosen)
     bundle = chosen.bundle
     refuse_undetermined(bundle, width, height)

@@ -17,6 +17,7 @@ BLURRED_PX = 2.5
 """A picture none of whose edges is sharper than this (standard deviation) counts as blurred."""
 
 _LEAST_SIDE_PX = 200
+_HANDY_PX = 1000
 _OTHERS = ("DICT_4X4_250", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL")
 _APRIL = ("DICT_APRILTAG_36h11",)
 
@@ -27,9 +28,9 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
     Another target of ours, markers of another dictionary, too few corners, a picture too small or
     too blurred, or nothing.
     """
-    grey = photo.grey
+    grey = _handy(photo.grey)
     name = photo.source
-    if min(grey.shape) < _LEAST_SIDE_PX:
+    if min(photo.width, photo.height) < _LEAST_SIDE_PX:
         return (
             f"{name} has only {photo.width} x {photo.height} pixels, too few to measure by: take "
             "photographs of 640 x 480 at least."
@@ -37,7 +38,7 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
     other = _other_target(grey, board)
     if other and not found:
         return f"{name} shows {other}, not the {board.name}: {_use(board)}."
-    blur = sharpest_edge_px(grey)
+    blur = sharpest_edge_px(photo.grey)
     if blur > BLURRED_PX:
         return (
             f"{name} is too blurred: its sharpest edges are {2.56 * blur:.0f} px wide. Focus on "
@@ -76,6 +77,17 @@ def sharpest_edge_px(grey: Picture) -> float:
         return float("inf")
     total = float(high - low) / (np.sqrt(2.0 * np.pi) * steepest)
     return float(np.sqrt(max(total**2 - 1.0, 0.0)))
+
+
+def _handy(grey: Picture) -> Picture:
+    """A picture small enough to look through for many things."""
+    import cv2
+
+    zoom = _HANDY_PX / max(grey.shape)
+    if zoom >= 1.0:
+        return grey
+    size = (round(grey.shape[1] * zoom), round(grey.shape[0] * zoom))
+    return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _other_target(grey: Picture, board: Board) -> str | None:
