@@ -10,6 +10,7 @@ from scissorcal.calibration.plate_checks import plate_verdicts
 from scissorcal.calibration.plate_result import Halves, PlateFit, PlateView
 from scissorcal.errors import MissingError, VerdictError
 from scissorcal.vision.board_pose import BoardPose, Corners, locate_board
+from scissorcal.vision.boards import PRINT_SCALE_SD
 from scissorcal.vision.camera import Camera
 from scissorcal.vision.detect import Detection
 from scissorcal.vision.pose import Pose, difference
@@ -17,7 +18,7 @@ from scissorcal.vision.rig_frame import RigPose
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 1
+ALGORITHM = 2
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -56,7 +57,7 @@ def fit_plate(
     target = photos[0].detection.board.name
     corners = _together(photos)
     try:
-        whole = locate_board(corners, camera)
+        whole = locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
         alone = [
             locate_board(corners.where(corners.frame == i), camera) for i in range(len(photos))
         ]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.vision.board_pose import Corners, locate_board, project_pose
-from scissorcal.vision.boards import BLADE_MAT, MAT_FIELD_M, MarkerBoard
+from scissorcal.vision.boards import BLADE_MAT, MAT_FIELD_M, PRINT_SCALE_SD, MarkerBoard
 from scissorcal.vision.camera import PARAMETERS, Camera
 from scissorcal.vision.detect import find_board
 from scissorcal.vision.photo import Photo
@@ -16,8 +16,6 @@ from scissorcal.vision.photo import Photo
 Array = NDArray[np.float64]
 
 LEAST_MARKERS = 6
-PRINT_SCALE_SD = 1e-3
-"""How far printers are off along either axis, as a share: a good laser printer's."""
 
 _CORNER_SD_PX = 0.03
 _FIXED_POINT_STEPS = 30

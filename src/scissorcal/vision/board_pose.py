@@ -17,6 +17,10 @@ LEAST_SD_PX = 0.02
 FAR_OFF = 6.0
 """Corners farther off than this many robust standard deviations are left out."""
 
+TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
+"""What corners are usually found to, and how many residuals that counts for: four corners of a
+marker leave only two to judge by."""
+
 FEWEST = 4
 ROUNDS = 100
 
@@ -61,15 +65,16 @@ class BoardPose:
     residuals_px: Array
 
 
-def locate_board(corners: Corners, camera: Camera) -> BoardPose:
+def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> BoardPose:
     """Find a flat target's pose, and the second one that may explain the picture as well.
 
     Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
     are refined on all corners, those far off left out; the better one is the pose. Its covariance
     has three parts: errors that corners have anew in every frame, errors that a corner keeps
-    from frame to frame (both estimated from the residuals), and what is unknown of the camera.
+    from frame to frame (both estimated from the residuals), and what is unknown of the camera and
+    of the print: ``print_sd`` is how far the printer's scale may be off along either axis, a share.
 
-    Raises ValueError with fewer than four corners, or corners along one line.
+    Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
     """
     if len(np.unique(corners.corner)) < FEWEST:
         raise ValueError(f"only {len(np.unique(corners.corner))} corners were seen; 4 are needed")
@@ -77,17 +82,21 @@ def locate_board(corners: Corners, camera: Camera) -> BoardPose:
     if np.linalg.svd(flat, compute_uv=False)[-1] < 1e-6 * np.linalg.norm(flat):
         raise ValueError("the corners that were seen lie along one line")
     used = np.all(np.isfinite(camera.rays(corners.pixels)), axis=1)
-    begun = _both(corners.where(used), camera)
-    refined = [_refine(start, corners, camera, used) for start in begun]
-    used = _near(refined[0], refined[0].residuals) & used
-    refined = sorted(
-        (_refine(found.pose, corners, camera, used) for found in refined),
-        key=lambda found: found.square,
-    )
-    best = refined[0]
-    noise, kept = _components(best.residuals, corners, used)
+    if len(np.unique(corners.corner[used])) < FEWEST:
+        raise ValueError("the corners that were seen lie where the camera's fit does not hold")
+    try:
+        begun = _both(corners.where(used), camera)
+        refined = [_refine(start, corners, camera, used) for start in begun]
+        used = _near(min(refined, key=_square).residuals, used)
+        refined = sorted(
+            (_refine(found.pose, corners, camera, used) for found in refined), key=_square
+        )
+        best = refined[0]
+        noise, kept = _components(best.residuals, corners, used)
+        covariance = _covariance(best, corners, camera, used, (noise, kept), print_sd)
+    except np.linalg.LinAlgError:
+        raise ValueError("the corners that were seen do not determine a pose") from None
     sd = float(np.sqrt(noise + kept))
-    covariance = _covariance(best, corners, camera, used, noise, kept)
     other = refined[1] if len(refined) > 1 and _apart(refined[0], refined[1]) else None
     frames = len(np.unique(corners.frame[used]))
     gap = (other.square - best.square) / (noise + kept * frames) if other else np.inf
@@ -146,6 +155,16 @@ def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, 
     return np.asarray(corners.pixels - pixels.reshape(-1, 2)), np.asarray(slope[:, :15])
 
 
+def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
+    """Slopes (2 n, 2) of pixels by the print's scale along x and y, from those of `project_pose`.
+
+    A point moves in the picture as the target would with it when shifted along the same axis.
+    """
+    turned = Pose.from_rotation_vector(pose[:3], np.zeros(3)).matrix
+    shifts = (slope[:, 3:6] @ turned[:, k] * np.repeat(corners.points[:, k], 2) for k in (0, 1))
+    return np.stack(list(shifts), axis=1)
+
+
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
     """Levenberg-Marquardt on the reprojection error of the corners used."""
     both = np.repeat(used, 2)
@@ -173,10 +192,14 @@ def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.boo
     return _Refined(pose, residuals, slope, square)
 
 
-def _near(found: _Refined, residuals: Array) -> NDArray[np.bool_]:
+def _square(found: _Refined) -> float:
+    return found.square
+
+
+def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     distance = np.sqrt(np.sum(residuals**2, axis=1))
-    robust = float(np.median(distance)) / 1.1774
-    return np.asarray(distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0))
+    robust = float(np.median(distance[used])) / 1.1774
+    return np.asarray(used & (distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0)))
 
 
 def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> tuple[float, float]:
@@ -188,7 +211,9 @@ def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> 
     spare = 2 * len(seen) - 6
     least = LEAST_SD_PX**2
     if frames == 1:
-        return max(float(np.sum(seen**2)) / max(spare, 1), least), 0.0
+        usual = TYPICAL_WEIGHT * TYPICAL_SD_PX**2
+        found = (usual + float(np.sum(seen**2))) / (TYPICAL_WEIGHT + spare)
+        return max(found, least), 0.0
     mean = np.stack([np.bincount(place, seen[:, k]) / count for k in (0, 1)], axis=1)
     within = float(np.sum((seen - mean[place]) ** 2)) / max(2 * (len(seen) - len(labels)), 1)
     between = float(np.sum(count * np.sum(mean**2, axis=1))) / max(2 * len(labels) - 6, 1)
@@ -201,9 +226,10 @@ def _covariance(
     corners: Corners,
     camera: Camera,
     used: NDArray[np.bool_],
-    noise: float,
-    kept: float,
+    variances: tuple[float, float],
+    print_sd: float,
 ) -> Array:
+    noise, kept = variances
     slope = best.slope[np.repeat(used, 2)]
     by_pose = slope[:, :6]
     inverse = np.linalg.inv(by_pose.T @ by_pose)
@@ -218,6 +244,8 @@ def _covariance(
         by_camera = slope[:, 6:15]
         drawn = by_pose.T @ by_camera
         spread = spread + drawn @ camera.covariance[: len(PARAMETERS), : len(PARAMETERS)] @ drawn.T
+    stretched = by_pose.T @ print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
+    spread = spread + print_sd**2 * stretched @ stretched.T
     turn = np.eye(6)
     turn[:3, :3] = left_jacobian(best.pose[:3])
     return np.asarray(turn @ inverse @ spread @ inverse @ turn.T)

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 
 DICTIONARY = "DICT_5X5_250"
 
+PRINT_SCALE_SD = 1e-3
+"""How far printers are off along either axis, as a share: a good laser printer's."""
+
 
 @dataclass(frozen=True)
 class CharucoBoard:

@@ -57,7 +57,9 @@ def _side_lines(linear: NDArray[np.float32], corners: Array, module: float) -> t
     along = end - start
     length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
     outward = np.stack([along[..., 1], -along[..., 0]], axis=2) / length[..., None]
-    reach = np.clip(0.85 * module * length, _LEAST_REACH_PX, _MOST_REACH_PX)
+    across = 0.5 * (np.roll(along, -1, axis=1) - np.roll(along, 1, axis=1))
+    width = np.abs(np.sum(across * outward, axis=2))
+    reach = np.clip(0.85 * module * width, _LEAST_REACH_PX, _MOST_REACH_PX)
     places = start[:, :, None] + _ALONG[None, None, :, None] * along[:, :, None]
     shift = _half_way(linear, places, outward, reach)
     edge = places + shift[..., None] * outward[:, :, None]

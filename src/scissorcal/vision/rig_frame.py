@@ -5,7 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.board_pose import LEAST_SD_PX, Corners, locate_board, project_pose
+from scissorcal.vision.board_pose import (
+    LEAST_SD_PX,
+    Corners,
+    locate_board,
+    print_slopes,
+    project_pose,
+)
+from scissorcal.vision.boards import PRINT_SCALE_SD
 from scissorcal.vision.camera import Camera
 from scissorcal.vision.pose import Pose, left_jacobian
 
@@ -53,6 +60,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
     squares on all corners, both poses unknown at once. Advances tell the x axis, turns tell the
     pivot's axis and place; with one of them only, part of the frame stays open and is named.
+    The covariance holds what is unknown of the camera and of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
@@ -71,9 +79,12 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
     inverse = np.linalg.inv(normal / noise + prior)
     spread = normal / noise
+    alike = np.zeros((11, 11))
+    alike[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
     if camera.covariance is not None:
-        drawn = slopes / noise
-        spread = spread + drawn @ camera.covariance @ drawn.T
+        alike[:9, :9] = camera.covariance
+    drawn = slopes / noise
+    spread = spread + drawn @ alike @ drawn.T
     turn = np.eye(len(point))
     turn[:3, :3] = left_jacobian(point[:3])
     covariance = turn @ inverse @ (spread + prior) @ inverse @ turn.T
@@ -155,7 +166,8 @@ def _search(
     used: tuple[NDArray[np.bool_], ...],
     start: Array,
 ) -> tuple[Array, float, Array, Array]:
-    """Levenberg-Marquardt: point, sum of squares, normal matrix (11, 11), slopes by camera."""
+    """Levenberg-Marquardt: point, sum of squares, normal matrix (11, 11), slopes (11, 11) by
+    what all pictures share: the camera's parameters and the print's scales."""
     point, damping = start, 1e-3
     square, pull, normal, slopes = _sums(point, views, camera, middle_m, used)
     for _ in range(ROUNDS):
@@ -183,14 +195,16 @@ def _sums(
     used: tuple[NDArray[np.bool_], ...],
 ) -> tuple[float, Array, Array, Array]:
     square, size = 0.0, len(point)
-    pull, normal, slopes = np.zeros(size), np.zeros((size, size)), np.zeros((size, 9))
+    pull, normal, slopes = np.zeros(size), np.zeros((size, size)), np.zeros((size, 11))
     for view, mask in zip(views, used, strict=True):
 
         def seen(p: Array, view: CardView = view) -> Array:
             rig, card = _poses(p, middle_m)
             return _vector(rig.after(_motion(view)).after(card))
 
-        away, slope = project_pose(seen(point), view.corners, camera)
+        stand = seen(point)
+        away, slope = project_pose(stand, view.corners, camera)
+        alike = np.hstack([slope[:, 6:15], print_slopes(stand, slope, view.corners)])
         both = np.repeat(mask, 2)
         chain = np.stack(
             [(seen(point + e) - seen(point - e)) / (2 * STEP) for e in STEP * np.eye(size)], axis=1
@@ -199,7 +213,7 @@ def _sums(
         square += float(left @ left)
         pull += by_point.T @ left
         normal += by_point.T @ by_point
-        slopes += by_point.T @ slope[both, 6:15]
+        slopes += by_point.T @ alike[both]
     return square, pull, normal, slopes
 
 
