@@ -1,0 +1,209 @@
+"""Targets, photographs of a board, the camera's fit and its files, on the command line."""
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from scissorcal.vision.boards import BLADE_MAT, CAMERA_BOARD
+from scissorcal.vision.sim import Lens, Looks, Pose, as_jpeg, render, target_layers
+from tests.cli.conftest import Cli
+
+EYE = Lens(620.0, (324.0, 236.0), 640, 480, (-0.1, 0.02, 0.0, 0.0, 0.0))
+LOOKS = Looks(softness_px=0.6, noise=0.008)
+SLANTS = [(0.0, 0.0), (0.6, 0.0), (0.6, 1.6), (0.6, 3.1), (0.6, 4.7), (0.4, 0.8), (0.5, 2.4)]
+
+
+def rendered(pose: Pose, board: object = CAMERA_BOARD, seed: int = 0) -> np.ndarray:
+    return render(target_layers(board, pose), EYE, LOOKS, np.random.default_rng(seed))  # type: ignore[arg-type]
+
+
+def looking(tilt: float, azimuth: float, number: int, distance_m: float = 0.32) -> Pose:
+    aside = (0.117 + 0.04 * ((number % 3) - 1), 0.091 + 0.03 * ((number % 2) - 0.5))
+    return Pose.looking_at(aside, distance_m, tilt=tilt, azimuth=azimuth, turn=0.1 * number)
+
+
+@pytest.fixture(scope="module")
+def album(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven photographs of the camera board, four of it square-on, one of the mat, one blank."""
+    folder = tmp_path_factory.mktemp("album")
+    pictures = {
+        f"board-{number}.jpg": rendered(looking(*slant, number), seed=number)
+        for number, slant in enumerate(SLANTS)
+    }
+    for number in range(4):
+        pictures[f"flat-{number}.jpg"] = rendered(
+            looking(0.0, 0.0, number, 0.3 + 0.02 * number), seed=number
+        )
+    pictures["mat.jpg"] = rendered(Pose.looking_at((0.128, 0.089), 0.4), BLADE_MAT)
+    pictures["nothing.jpg"] = np.full((480, 640, 3), 120, np.uint8)
+    for name, picture in pictures.items():
+        (folder / name).write_bytes(as_jpeg(picture, 92))
+    return folder
+
+
+def boards(album: Path) -> list[Path]:
+    return sorted(album.glob("board-*.jpg"))
+
+
+def left_in(workspace: Path) -> list[str]:
+    return sorted(
+        str(path.relative_to(workspace)) for path in workspace.rglob("*") if path.is_file()
+    )
+
+
+def test_targets_are_written_and_named(cli: Cli, tmp_path: Path) -> None:
+    said = cli("target", "--output", tmp_path / "print", "--paper", "Letter")
+    assert said.code == 0
+    assert "Print at 100 %" in said.out
+    assert len(list((tmp_path / "print").glob("target-*-Letter.pdf"))) == 3
+    (tmp_path / "file").write_text("")
+    said = cli("target", "blade", "--output", tmp_path / "file" / "below", "--json")
+    assert said.code == 2
+    assert not said.envelope["ok"]
+
+
+def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Path) -> None:
+    said = cli("capture", "camera", "--image", *boards(album), album / "mat.jpg")
+    assert said.code == 0
+    assert "7 photographs of the camera board, 1 left out" in said.out
+    assert "mat.jpg shows the blade mat, not the camera board" in said.err
+    assert "places" in said.err
+    (folder,) = (workspace / "captures").iterdir()
+    index = json.loads((folder / "capture.json").read_text())
+    assert index["format"] == "scissorcal-photographs/1"
+    stored = folder / index["photographs"][0]["file"]
+    assert stored.read_bytes() == boards(album)[0].read_bytes()
+
+    said = cli("fit", "camera", "--json")
+    result = said.envelope["result"]
+    camera = result["camera"]
+    sd = np.sqrt(camera["covariance"][0][0])
+    assert abs(camera["fx"] - 620.0) < 4.0 * sd < 20.0
+    assert said.code == (3 if any(v["status"] == "fail" for v in said.envelope["verdicts"]) else 0)
+    assert [Path(file).suffix for file in said.envelope["files"]] == [".json"] + [".png"] * 5
+    assert all(Path(file).is_file() for file in said.envelope["files"])
+
+    again = cli("fit", "camera")
+    assert "nothing changed since the last fit" in again.out
+    assert again.code == said.code
+
+    for name, style in (("a.yml", "opencv"), ("a.yaml", "ros")):
+        assert cli("export", "fits/camera.json", name, "--style", style).code == 0
+        assert cli("export", "fits/camera.json", name, "--style", style).code == 2
+    before = (workspace / "fits" / "camera.json").read_bytes()
+    assert cli("import", "a.yaml").code == 2
+    assert (workspace / "fits" / "camera.json").read_bytes() == before
+
+    # A photograph more, and the fit is done anew; the same one again is left out.
+    assert cli("capture", "camera", "-i", album / "flat-0.jpg").code == 0
+    said = cli("capture", "camera", "-i", album / "flat-0.jpg")
+    assert said.code == 2
+    assert "was taken in before" in said.err
+    said = cli("fit", "camera")
+    assert "8 photographs" in said.out
+    assert len(list((workspace / "fits" / "camera").glob("*.png"))) == 5
+
+
+def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) -> None:
+    (workspace / "kalibr.yaml").write_text(
+        "cam0:\n  camera_model: pinhole\n  intrinsics: [461.6, 460.3, 362.7, 248.1]\n"
+        "  distortion_model: radtan\n  distortion_coeffs: [-0.27, 0.06, 0.0009, 0.00003]\n"
+        "  resolution: [752, 480]\n"
+    )
+    said = cli("import", "kalibr.yaml", "--json")
+    assert said.code == 0
+    assert said.envelope["result"]["style"] == "Kalibr"
+    assert said.envelope["verdicts"][0]["status"] == "not_evaluated"
+    assert "Brought in from kalibr.yaml" in cli("fit", "camera").out
+
+
+@pytest.mark.parametrize(
+    ("names", "words", "code"),
+    [
+        (["nothing.jpg"], "nothing.jpg is too blurred", 2),
+        (["mat.jpg"], "shows the blade mat, not the camera board", 2),
+        (["none.jpg"], "is not there", 2),
+    ],
+)
+def test_nothing_is_kept_where_nothing_can_be_used(
+    cli: Cli, workspace: Path, album: Path, names: list[str], words: str, code: int
+) -> None:
+    before = left_in(workspace)
+    said = cli("capture", "camera", "--image", *(album / name for name in names))
+    assert said.code == code
+    assert words in said.err
+    assert "Nothing was kept" in said.err
+    assert left_in(workspace) == before
+
+
+@pytest.mark.parametrize(
+    ("pattern", "words", "code"),
+    [
+        ("board-0.jpg", "One photograph alone", 5),
+        ("flat-*.jpg", "focal length is not determined", 3),
+        (None, "There is no photograph", 5),
+    ],
+)
+def test_a_fit_that_cannot_be_is_refused_and_writes_nothing(
+    cli: Cli, workspace: Path, album: Path, pattern: str | None, words: str, code: int
+) -> None:
+    if pattern:
+        assert cli("capture", "camera", "-i", *sorted(album.glob(pattern))).code == 0
+    before = left_in(workspace)
+    said = cli("fit", "camera")
+    assert said.code == code
+    assert words in said.err
+    assert left_in(workspace) == before
+
+
+def test_photographs_of_other_sizes_turns_and_boards_are_left_out(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    first = boards(album)[0]
+    small = tmp_path / "small.png"
+    turned = tmp_path / "turned.jpg"
+    with Image.open(boards(album)[1]) as opened:
+        opened.resize((480, 360)).save(small)
+        exif = Image.Exif()
+        exif[0x0112] = 3
+        opened.save(turned, exif=exif, quality=92)
+    copy = tmp_path / "copy.jpg"
+    shutil.copy(first, copy)
+    said = cli("capture", "camera", "-i", first, small, turned, copy)
+    assert said.code == 0
+    assert "480 x 360" in said.err
+    assert "turned by its EXIF data" in said.err
+    assert "given twice" in said.err
+    said = cli("capture", "camera", "--board", "chessboard:9x6:25", "-i", boards(album)[2])
+    assert said.code == 2
+    assert "a fit takes one board" in said.err
+
+
+def test_pictures_are_picked_from_a_video(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    video = tmp_path / "board.avi"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (640, 480))
+    for path in boards(album)[:3]:
+        for _ in range(3):
+            writer.write(cv2.imread(str(path)))
+    writer.release()
+    said = cli("capture", "camera", "--camera", video)
+    assert said.code == 0
+    assert "3 photographs" in said.out
+    assert cli("capture", "camera", "--camera", tmp_path / "none.avi").code == 2
+    assert cli("capture", "camera").code == 2
+
+
+def test_a_damaged_index_says_what_to_remove(cli: Cli, workspace: Path, album: Path) -> None:
+    assert cli("capture", "camera", "-i", *boards(album)[:2]).code == 0
+    (index,) = (workspace / "captures").glob("*/capture.json")
+    index.write_text(index.read_text()[:300])
+    said = cli("fit", "camera")
+    assert said.code == 2
+    assert "capture its photographs again" in said.err
