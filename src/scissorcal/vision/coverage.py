@@ -1,6 +1,5 @@
 """Which places, sizes and slants a board has been seen in, and what is still wanted."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
