@@ -54,10 +54,12 @@ def _text(outcome: "CameraOutcome") -> str:
     if outcome.cached:
         head = f"camera: nothing changed since the last fit; {fit.rung} is as it was"
     lines = [head, camera_table(fit)]
-    lines.append(
-        f"corners are found to {fit.noise_px:.2f} px; errors of one photograph go together, so "
-        f"intervals are {fit.stretch:.1f} times as wide as single corners would have them"
+    together = (
+        f"those of one photograph go together: intervals are {fit.stretch:.1f} times as wide for it"
+        if fit.stretch > 1.05
+        else "independently of one another"
     )
+    lines.append(f"corners are found to {fit.noise_px:.2f} px, {together}")
     bulge = max(fit.bulge_mm, key=abs)
     lines.append(f"the board's middle stands {abs(bulge):.2f} mm out of its plane")
     worst = sorted(fit.views, key=lambda view: -view.rms_px)[:_WORST]

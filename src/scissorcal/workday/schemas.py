@@ -16,9 +16,11 @@ from scissorcal.recipe.library import schemas_dir
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
+    "camera.schema.json": "scissorcal.calibration.camera_storage:CameraDocument",
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
+    "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
