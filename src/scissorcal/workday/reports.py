@@ -86,7 +86,11 @@ def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitR
     if reported != recipe:
         return "it shows another recipe than there is now"
     checked = {section["what"]: section.get("trust_check") for section in facts.get("fits", [])}
-    for what, check in _trust_checks(workspace, fits).items():
+    try:
+        checks = _trust_checks(workspace, fits)
+    except InputError:
+        return "a trust check beside its fits cannot be read"
+    for what, check in checks.items():
         if (checked.get(what) or {}).get("seed") != check.seed:
             return f"the trust check of {what} was made since"
     return ""
