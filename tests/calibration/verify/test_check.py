@@ -13,6 +13,7 @@ from scissorcal.calibration.verify import Study, VerifyResult, assess, make_stud
 from scissorcal.calibration.verify.generating import (
     Generating,
     generating_prior,
+    refit_prior,
     residual_noise,
     simulate,
 )
@@ -112,6 +113,10 @@ def test_a_local_prior_is_as_wide_as_stated_and_never_wider_than_the_recipes():
     drawn = np.stack([found.draw(rng) for _ in range(4000)])
     assert drawn.mean(axis=0) == pytest.approx(TRUTH, abs=0.2)
     assert drawn.std(axis=0) == pytest.approx([0.03, 0.06, 0.09, 2.0], rel=0.1)
+    mean, precision = refit_prior(experiment, found)
+    assert mean == pytest.approx([*found.mean[:3], LAYOUT.mean[3]])
+    refit_sd = np.sqrt(np.diag(np.linalg.inv(precision)))
+    assert refit_sd == pytest.approx([0.03, 0.06, 0.09, 2.0], rel=0.02)
     whole = generating_prior(experiment, draws, "recipe", 3.0)
     assert whole.mean == pytest.approx(LAYOUT.mean)
     assert np.diag(whole.precision) == pytest.approx(1 / LAYOUT.sd**2)

@@ -12,6 +12,9 @@ from scissorcal.inference import ArNoise, fit_ar
 Array = NDArray[np.float64]
 
 REPLICATES = 20
+NOISE_SIZES = ("noise", "slow_noise")
+"""Parameters that only say how loud the noise is, in the terms of the likelihood."""
+
 QUIET = 0.05
 """A model's own irregularity, as a share of the residuals' variance, that counts as none."""
 
@@ -72,6 +75,24 @@ def generating_prior(
     values, vectors = np.linalg.eigh(posterior - prior * unit)
     likelihood = (vectors * np.maximum(values, 0.0)) @ vectors.T / unit
     return Generating(kind, spread, draws.mean(axis=0), prior + likelihood / spread**2)
+
+
+def refit_prior(experiment: Experiment, generating: Generating) -> tuple[Array, Array]:
+    """Mean (p,) and precision (p, p) of the prior that simulated data are refitted with.
+
+    That which truths are drawn from, but for the sizes of the noise: what autoregressive noise
+    amounts to in the terms of the likelihood is not known beforehand, so that these keep the
+    recipe's prior. Thousands of bins tell them well, whatever the prior.
+    """
+    if generating.kind == "recipe":
+        return generating.mean, generating.precision
+    own = experiment.rung(experiment.observed)
+    free = np.isin(experiment.layout.names, NOISE_SIZES)
+    covariance = np.linalg.inv(generating.precision)
+    covariance[free, :] = 0.0
+    covariance[:, free] = 0.0
+    covariance += np.diag(np.where(free, experiment.layout.sd**2, 0.0))
+    return np.where(free, own.prior_mean, generating.mean), np.linalg.inv(covariance)
 
 
 def residual_noise(experiment: Experiment, point: Array, rng: np.random.Generator) -> ArNoise:

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.experiment import Experiment
 from scissorcal.calibration.result import Effort
-from scissorcal.calibration.verify.generating import Generating, simulate, unbroken
+from scissorcal.calibration.verify.generating import (
+    Generating,
+    refit_prior,
+    simulate,
+    unbroken,
+)
 from scissorcal.calibration.verify.halves import Split
 from scissorcal.calibration.verify.power import power_sensitivity
 from scissorcal.calibration.verify.uniformity import rank_among
@@ -93,10 +98,11 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
     measured = simulate(experiment, study.noise, generating.mean, truth, rng)
     rung = experiment.rung(measured)
     if generating.kind == "local":
+        mean, precision = refit_prior(experiment, generating)
         rung = replace(
             rung,
-            prior_mean=generating.mean,
-            prior_precision=generating.precision,
+            prior_mean=mean,
+            prior_precision=precision,
             starts=generating.mean[None, :],
         )
     posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
