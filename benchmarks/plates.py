@@ -34,7 +34,10 @@ CAMERA_SD = np.array([1.2, 1.2, 1.2, 1.2, 2e-3, 4e-3, 1e-4, 1e-4, 0.0])
 PRINT_SD = 1e-3
 WIDTH, HEIGHT = 1280, 720
 KINDS = ("square-on", "middling", "middling", "middling", "middling", "grazing")
-FLIP_DEG = 10.0
+FLIP_DEG = 1.0
+"""A pose is flipped where its normal lies nearer to the truth's mirrored at the line of sight than
+to the truth's, as far as these two differ by more than this."""
+
 Z90 = 1.645
 
 
@@ -194,8 +197,14 @@ def errors(matrix: np.ndarray, shift: np.ndarray, view: View) -> dict[str, Any]:
         "deg": degrees,
         "mm": float(1e3 * np.linalg.norm(moved)),
         "across_mm": float(1e3 * np.sqrt(max(moved @ moved - along**2, 0.0))),
-        "flip": degrees > FLIP_DEG,
+        "flip": _flipped(matrix[:, 2], view.truth.rotation[:, 2], place / np.linalg.norm(place)),
     }
+
+
+def _flipped(normal: np.ndarray, truth: np.ndarray, sight: np.ndarray) -> bool:
+    mirrored = 2.0 * (truth @ sight) * sight - truth
+    apart = np.degrees(np.arccos(np.clip(truth @ mirrored, -1.0, 1.0)))
+    return bool(apart > FLIP_DEG and normal @ mirrored > normal @ truth)
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,6 +1,8 @@
-"""Photographs picked from a running camera or a video: a board held still, in a new place."""
+"""Pictures of a running camera or a video, and photographs picked from them."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,44 +16,61 @@ from scissorcal.vision.photo import Photo
 
 Array = NDArray[np.float64]
 
+APART_FRAMES = 5
 STILL_SHARE = 0.002
 NEW_SHARE = 0.05
 """Shares of the picture's width: a board held still moves less from frame to frame than the first,
 one in a new place has moved farther than the second from where it was in every picture kept."""
 
 
+@dataclass(frozen=True)
+class Frame:
+    """One picture of a camera or video. ``time_s`` counts from the first one; ``count`` is how many
+    there will be, None where nobody knows."""
+
+    number: int
+    time_s: float
+    image: Any
+    count: int | None
+
+
 def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[Path]:
-    """Yield frames as PNG files in ``folder``, until there are ``most`` or the video ends.
+    """Yield frames as PNG files in ``folder``, each with the board held still in a new place.
 
-    ``source`` is a camera's number or a video file. Interrupting from the keyboard ends the
-    picking, and what was picked counts. Raises DeviceError or InputError where nothing comes.
+    ``source`` is a camera's number or a video file. Ends after ``most``, with the video, or by an
+    interrupt from the keyboard; what was picked counts. Raises DeviceError or InputError where
+    nothing comes.
     """
-    previous: Detection | None = None
-    kept: list[Detection] = []
-    try:
-        for number, frame in enumerate(_frames(source)):
-            seen = _look(frame, board, f"frame-{number:05d}.png")
-            still = _moved(seen, previous) < STILL_SHARE * frame.shape[1]
-            previous = seen
-            if seen is None or not still:
-                continue
-            if any(_moved(seen, old) < NEW_SHARE * frame.shape[1] for old in kept):
-                continue
-            kept.append(seen)
-            yield _stored(frame, folder / f"frame-{number:05d}.png")
-            if len(kept) >= most:
-                return
-    except KeyboardInterrupt:
-        return
+
+    def new_place(frame: Frame, seen: Detection, kept: list[tuple[int, Detection]]) -> bool:
+        far = NEW_SHARE * frame.image.shape[1]
+        return all(_moved(seen, old) >= far for _, old in kept)
+
+    yield from _picked(source, (board,), folder, most, new_place)
 
 
-def _frames(source: str) -> Iterator[Any]:
+def pick_at_rest(source: str, boards: Sequence[Board], folder: Path, most: int) -> Iterator[Path]:
+    """Yield frames as `pick_frames` does, of one of several boards that stays where it is."""
+
+    def later(frame: Frame, _: Detection, kept: list[tuple[int, Detection]]) -> bool:
+        return not kept or frame.number - kept[-1][0] >= APART_FRAMES
+
+    yield from _picked(source, boards, folder, most, later)
+
+
+def frames_of(source: str) -> Iterator[Frame]:
+    """Read a camera (by its number) or a video file, picture by picture.
+
+    Raises DeviceError where the camera gives none, InputError where the file is no video.
+    """
     import cv2
 
     number = int(source) if source.isdigit() else None
+    if number is None and not Path(source).is_file():
+        raise InputError(f"{source} is not there: name a video file, or a camera by its number.")
     video = cv2.VideoCapture(source if number is None else number)
     try:
-        good, frame = video.read() if video.isOpened() else (False, None)
+        good, image = video.read() if video.isOpened() else (False, None)
         if not good:
             if number is not None:
                 raise DeviceError(
@@ -59,20 +78,54 @@ def _frames(source: str) -> Iterator[Any]:
                     "program uses it, and which number it has."
                 )
             raise InputError(f"{source} is no video that can be read.")
+        rate = float(video.get(cv2.CAP_PROP_FPS)) or 30.0
+        total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+        count = total if number is None and total > 0 else None
+        began, index = time.monotonic(), 0
         while good:
-            yield frame
-            good, frame = video.read()
+            passed = index / rate if number is None else time.monotonic() - began
+            yield Frame(index, passed, image, count)
+            index += 1
+            good, image = video.read()
     finally:
         video.release()
 
 
-def _look(frame: Any, board: Board, name: str) -> Detection | None:
-    height, width = frame.shape[:2]
-    photo = Photo(frame, width, height, 1, (0, 0), 1, "", name)
+def _picked(
+    source: str,
+    boards: Sequence[Board],
+    folder: Path,
+    most: int,
+    wanted: Callable[[Frame, Detection, list[tuple[int, Detection]]], bool],
+) -> Iterator[Path]:
+    previous: Detection | None = None
+    kept: list[tuple[int, Detection]] = []
     try:
-        return find_board(photo, board, explain=False)
-    except InputError:
-        return None
+        for frame in frames_of(source):
+            name = f"frame-{frame.number:05d}.png"
+            seen = look(frame.image, boards, name)
+            still = _moved(seen, previous) < STILL_SHARE * frame.image.shape[1]
+            previous = seen
+            if seen is None or not still or not wanted(frame, seen, kept):
+                continue
+            kept.append((frame.number, seen))
+            yield _stored(frame.image, folder / name)
+            if len(kept) >= most:
+                return
+    except KeyboardInterrupt:
+        return
+
+
+def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
+    """Find the first of several boards that a picture shows, or None."""
+    height, width = image.shape[:2]
+    photo = Photo(image, width, height, 1, (0, 0), 1, "", name)
+    for board in boards:
+        try:
+            return find_board(photo, board, explain=False)
+        except InputError:
+            continue
+    return None
 
 
 def _moved(one: Detection | None, other: Detection | None) -> float:

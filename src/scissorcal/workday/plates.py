@@ -3,7 +3,7 @@
 import csv
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -60,7 +60,7 @@ class PlateOutcome:
 
 def capture_plate(
     workspace: Workspace,
-    paths: Sequence[Path],
+    paths: Iterable[Path],
     tell: Callable[[str], None],
     *,
     stances: Stances | None = None,
@@ -99,7 +99,8 @@ def capture_plate(
             )
             tell(taken[-1])
         if not taken:
-            raise InputError(" ".join(refused[:3]) + " Nothing was kept.")
+            nothing = "No picture showed the plate's target held still."
+            raise InputError(" ".join(refused[:3] or [nothing]) + " Nothing was kept.")
         capture = writer.finish(boards[0])
     return PlateCapture(capture, boards[0].name, tuple(taken), tuple(refused))
 
@@ -156,7 +157,7 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
     photos = [photo for capture in newest for photo in _photos(capture)]
     for capture in newest:
         _refuse_other_camera(capture, camera)
-    rig = _rig(workspace, camera, recipe)
+    rig = workspace_rig(workspace, camera, recipe)
     fit = fit_plate(
         photos, camera, plate_target=plate_target(recipe), rig=rig, inputs_hash=expected
     )
@@ -167,6 +168,18 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
 def plate_path(workspace: Workspace) -> Path:
     """The file of a workspace's plate."""
     return workspace.root / "fits" / "plate.json"
+
+
+def require_plate(workspace: Workspace) -> "PlateFit":
+    """Load a workspace's plate. Raises MissingError where there is none yet."""
+    from scissorcal.calibration.plate_storage import load_plate
+
+    if not plate_path(workspace).is_file():
+        raise MissingError(
+            "There is no pose of the plate yet: run 'scissorcal capture plate --image plate-*.jpg' "
+            "and 'scissorcal fit plate'."
+        )
+    return load_plate(plate_path(workspace))
 
 
 def plate_inputs_hash(workspace: Workspace, recipe: "Recipe") -> str:
@@ -195,6 +208,33 @@ def plate_target(recipe: "Recipe") -> "Pose":
     x, y = (1e-3 * value for value in recipe.plate.place_mm)
     turned = Pose.from_rotation_vector([0.0, 0.0, np.radians(recipe.plate.turn_deg)], [x, y, 0.0])
     return turned.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
+
+
+def workspace_rig(workspace: Workspace, camera: "Camera", recipe: "Recipe") -> "RigPose | None":
+    """Locate the rig from the newest photographs of its card, None where there are none.
+
+    Raises VerdictError where they do not tell where it stands.
+    """
+    from scissorcal.vision.board_pose import Corners
+    from scissorcal.vision.rig_frame import CardView, locate_rig
+
+    captures = photo_captures(workspace, "rig")[-1:]
+    views = []
+    for capture in captures:
+        _refuse_other_camera(capture, camera)
+        for photo in capture.index.photographs:
+            found = detection_of(capture, photo)
+            frame = np.zeros(len(found.ids), dtype=np.int64)
+            corners = Corners(found.pixels, found.points, frame, found.ids)
+            angle = np.radians(photo.opening_deg or 0.0) / recipe.rig.moving_blades
+            views.append(CardView(corners, 1e-3 * (photo.advance_mm or 0.0), float(angle)))
+    if not views:
+        return None
+    middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
+    try:
+        return locate_rig(tuple(views), camera, middle)
+    except ValueError as error:
+        raise VerdictError(f"{captures[0].folder}: {error}.") from None
 
 
 def _found(photo: "Photo", boards: Sequence[MarkedBoard]) -> "Detection":
@@ -235,29 +275,6 @@ def _refuse_other_camera(capture: PhotoCapture, camera: "Camera") -> None:
             )
 
 
-def _rig(workspace: Workspace, camera: "Camera", recipe: "Recipe") -> "RigPose | None":
-    from scissorcal.vision.board_pose import Corners
-    from scissorcal.vision.rig_frame import CardView, locate_rig
-
-    captures = photo_captures(workspace, "rig")[-1:]
-    views = []
-    for capture in captures:
-        _refuse_other_camera(capture, camera)
-        for photo in capture.index.photographs:
-            found = detection_of(capture, photo)
-            frame = np.zeros(len(found.ids), dtype=np.int64)
-            corners = Corners(found.pixels, found.points, frame, found.ids)
-            angle = np.radians(photo.opening_deg or 0.0) / recipe.rig.moving_blades
-            views.append(CardView(corners, 1e-3 * (photo.advance_mm or 0.0), float(angle)))
-    if not views:
-        return None
-    middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
-    try:
-        return locate_rig(tuple(views), camera, middle)
-    except ValueError as error:
-        raise VerdictError(f"{captures[0].folder}: {error}.") from None
-
-
 def _draw(
     captures: Sequence[PhotoCapture],
     fit: "PlateFit",
@@ -287,15 +304,3 @@ def _draw(
 
 def _pictures_of(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(path.with_suffix("").glob("*.png")))
-
-
-def require_plate(workspace: Workspace) -> "PlateFit":
-    """Load a workspace's plate. Raises MissingError where there is none yet."""
-    from scissorcal.calibration.plate_storage import load_plate
-
-    if not plate_path(workspace).is_file():
-        raise MissingError(
-            "There is no pose of the plate yet: run 'scissorcal capture plate --image plate-*.jpg' "
-            "and 'scissorcal fit plate'."
-        )
-    return load_plate(plate_path(workspace))

@@ -1,0 +1,95 @@
+"""A plate and a rig's card before one camera, composed from exact geometry."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.boards import RIG_MARKERS, MarkedBoard
+from scissorcal.vision.sim.lens import Pose
+from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.sim.targets import target_layers
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlateScene:
+    """What stands where. The card rides on a blade; ``rig_card`` is where it is at no advance and
+    blade angle zero. The target lies on the plate's upper face at ``plate_target``."""
+
+    camera_rig: Pose
+    rig_card: Pose
+    rig_plate: Pose
+    plate_target: Pose
+
+    @property
+    def camera_plate(self) -> Pose:
+        """The plate as the camera has it."""
+        return chained(self.camera_rig, self.rig_plate)
+
+    def layers(
+        self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
+    ) -> list[Layer]:
+        """The target on the plate, and the card where the rig's stance brings it."""
+        stance = Pose(_about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        card = chained(self.camera_rig, stance, self.rig_card)
+        lying = chained(self.camera_plate, self.plate_target)
+        return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
+
+
+def plate_scene(
+    rng: np.random.Generator, place_m: tuple[float, float] = (0.0, 0.0), turn: float = 0.0
+) -> PlateScene:
+    """Draw a scene: the camera above and aside, plate and card a little off where they belong.
+
+    ``place_m`` and ``turn`` (rad) are where the pattern's upper left corner lies on the plate, and
+    how its upper edge is turned there.
+    """
+    eye = np.array([0.15, 0.7, 0.75]) + rng.normal(0.0, 0.05, 3)
+    to_rig = _looking(eye / np.linalg.norm(eye))
+    middle = np.array([0.09, 0.03, 0.04])
+    camera_rig = Pose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
+    facing = np.diag([1.0, -1.0, -1.0]) @ _leaned(rng, 0.05)
+    centre = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
+    card = np.array([0.03, 0.06, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
+    # the plate's upper face looks along the rig's y, in which the blades close
+    lying = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ _leaned(rng, 0.02)
+    near_edge = np.array([0.03, 0.0, 0.012]) + rng.normal(0.0, 1.5e-3, 3)
+    pattern = _about(2, turn) @ np.diag([1.0, -1.0, -1.0])
+    return PlateScene(
+        camera_rig,
+        Pose(facing, card - facing @ centre),
+        Pose(lying, near_edge),
+        Pose(pattern, np.array([*place_m, 0.0])),
+    )
+
+
+def chained(*poses: Pose) -> Pose:
+    """One pose after the other, the outermost first."""
+    rotation, shift = np.eye(3), np.zeros(3)
+    for pose in reversed(poses):
+        rotation, shift = pose.rotation @ rotation, pose.rotation @ shift + pose.shift_m
+    return Pose(rotation, shift)
+
+
+def _looking(towards_eye: Array) -> Array:
+    """Rotation into a camera that looks from a direction, its x axis near the rig's."""
+    forward = -towards_eye
+    right = np.array([1.0, 0.0, 0.0]) - forward * forward[0]
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def _leaned(rng: np.random.Generator, size: float) -> Array:
+    angles = rng.normal(0.0, size, 3)
+    return np.asarray(_about(0, angles[0]) @ _about(1, angles[1]) @ _about(2, angles[2]))
+
+
+def _about(axis: int, angle: float) -> Array:
+    turned = np.eye(3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turned[first, first] = turned[second, second] = np.cos(angle)
+    turned[second, first] = np.sin(angle)
+    turned[first, second] = -np.sin(angle)
+    return turned

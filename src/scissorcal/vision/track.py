@@ -1,0 +1,79 @@
+"""The pose of a target from picture to picture, and why it is not known in some of them."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from scissorcal.errors import InputError
+from scissorcal.vision.board_pose import BoardPose, Corners, locate_board
+from scissorcal.vision.boards import PRINT_SCALE_SD, MarkedBoard
+from scissorcal.vision.camera import Camera
+from scissorcal.vision.live import Frame, look
+
+ODDS = 20.0
+"""Below these odds against the second pose that a plane allows, a picture is ambiguous."""
+
+BLANK_LEVELS = 8.0
+"""A picture is blank where 98 % of it lies within fewer grey levels than these."""
+
+State = Literal["seen", "ambiguous", "blank", "no target", "no pose"]
+
+STATES: dict[State, str] = {
+    "seen": "its pose is known",
+    "ambiguous": "two poses explain the picture about alike",
+    "blank": "the picture is of one shade: lens covered, or no light",
+    "no target": "the target is out of the picture, hidden or blurred",
+    "no pose": "what is seen of the target does not determine a pose",
+}
+"""What a picture can come to, and what that means. The last three are drop-outs: no pose."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """One picture: its number and time, what it came to, and the target's pose where it has one."""
+
+    number: int
+    time_s: float
+    state: State
+    board: MarkedBoard | None
+    corners: int
+    found: BoardPose | None
+
+
+def track(
+    frames: Iterable[Frame], boards: Sequence[MarkedBoard], camera: Camera
+) -> Iterator[Tracked]:
+    """Locate a target in every picture, by itself; the first board that is seen is the target.
+
+    Raises InputError where pictures are of another size than the camera was fitted at.
+    """
+    for frame in frames:
+        height, width = frame.image.shape[:2]
+        if (width, height) != (camera.width, camera.height):
+            raise InputError(
+                f"The pictures are {width} x {height} pixels, the camera was fitted at "
+                f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."
+            )
+        seen = look(frame.image, boards, f"picture {frame.number}")
+        if seen is None:
+            state: State = "blank" if _is_blank(frame) else "no target"
+            yield Tracked(frame.number, frame.time_s, state, None, 0, None)
+            continue
+        boards = tuple(board for board in boards if board == seen.board)
+        still = np.zeros(len(seen.ids), dtype=np.int64)
+        corners = Corners(seen.pixels, seen.points, still, seen.ids)
+        try:
+            found = locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+        except ValueError:
+            count = len(seen.ids)
+            yield Tracked(frame.number, frame.time_s, "no pose", boards[0], count, None)
+            continue
+        state = "seen" if found.odds >= ODDS else "ambiguous"
+        yield Tracked(frame.number, frame.time_s, state, boards[0], len(seen.ids), found)
+
+
+def _is_blank(frame: Frame) -> bool:
+    low, high = np.percentile(np.asarray(frame.image)[::4, ::4], [1.0, 99.0])
+    return bool(high - low < BLANK_LEVELS)
