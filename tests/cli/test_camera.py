@@ -78,6 +78,7 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     assert index["format"] == "scissorcal-photographs/1"
     stored = folder / index["photographs"][0]["file"]
     assert stored.read_bytes() == boards(album)[0].read_bytes()
+    assert len(list(folder.glob("*-detected.png"))) == 7
 
     said = cli("fit", "camera", "--json")
     result = said.envelope["result"]

@@ -11,7 +11,7 @@ from scissorcal.vision.photo import Photo, Picture
 
 Array = NDArray[np.float64]
 
-WIDEST_PX = 1400
+WIDEST_PX = 1000
 """Larger photographs are drawn smaller, small ones at most twice as large."""
 
 _GREEN, _RED, _BLUE, _WHITE, _BLACK = (

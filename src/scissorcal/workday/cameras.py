@@ -14,6 +14,7 @@ from scissorcal.verdicts import Verdict
 from scissorcal.vision.boards import CharucoBoard, Chessboard
 from scissorcal.vision.coverage import ViewCoverage, view_words
 from scissorcal.vision.detect import SMALL_PX, Detection, find_board
+from scissorcal.vision.overlay import detection_overlay, write_picture
 from scissorcal.vision.photo import Photo, read_photo
 from scissorcal.workday.photographs import (
     PhotoCapture,
@@ -68,9 +69,10 @@ def capture_camera(
 ) -> CameraCapture:
     """Take photographs of a board into captures/camera-<stamp>/, copied byte for byte.
 
-    ``tell`` hears of each as it is added, and of what is still wanted. A photograph that shows no
-    such board, was taken in before, or is of another size than those before it is left out with
-    its reason. Raises InputError, and keeps nothing, where that leaves none.
+    Beside each a picture shows what was detected in it. ``tell`` hears of each as it is added, and
+    of what is still wanted. A photograph that shows no such board, was taken in before, or is of
+    another size than those before it is left out with its reason. Raises InputError, and keeps
+    nothing, where that leaves none.
     """
     before = photo_captures(workspace, "camera")
     _refuse_other_board(before, board)
@@ -89,7 +91,9 @@ def capture_camera(
                 refused.append(str(error))
                 tell(f"left out: {error}")
                 continue
-            writer.add(path, photo, detection)
+            stored = writer.add(path, photo, detection)
+            drawn = f"{Path(stored.file).stem}-detected.png"
+            write_picture(detection_overlay(photo, detection), writer.part / drawn)
             coverage = coverage.with_view(detection, photo.width, photo.height)
             taken.append(_taken(photo, detection))
             tell(f"{taken[-1].words}\n  {coverage.sentence()}")
@@ -288,7 +292,7 @@ def _draw(
         residual_chart,
         uncertainty_chart,
     )
-    from scissorcal.vision.overlay import residual_overlay, write_picture
+    from scissorcal.vision.overlay import residual_overlay
 
     folder = path.with_suffix("")
     for old in _pictures_of(path):
