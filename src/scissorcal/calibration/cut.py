@@ -13,7 +13,7 @@ from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.cut_experiment import CutExperiment
 from scissorcal.calibration.cut_ladder import climb_cut_ladder, cut_design, cut_designs
 from scissorcal.calibration.cut_motion import CutMotion, cut_motion
-from scissorcal.calibration.hashing import fit_inputs_hash
+from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import choose
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
@@ -87,7 +87,11 @@ def fit_cut(
         recordings=recordings,
         joint=recordings[0].joint,
         inputs_hash=fit_inputs_hash(
-            "cut", recordings, settings_of(recipe), effort, friction.inputs_hash
+            "cut",
+            recordings,
+            settings_of(recipe),
+            effort,
+            cut_upstream(friction.inputs_hash, edge),
         ),
         nuisance=design.nuisance,
         rng=rng,

@@ -3,6 +3,7 @@
 import hashlib
 import json
 
+from scissorcal.model import EdgeBelief
 from scissorcal.recording.recording import Recording
 
 ALGORITHM = 2
@@ -31,3 +32,11 @@ def fit_inputs_hash(
     }
     text = json.dumps(facts, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def cut_upstream(friction_hash: str, edge: EdgeBelief | None) -> str:
+    """What a cut's fit builds on: friction's fit, and the edge where photographs gave it."""
+    if edge is None:
+        return friction_hash
+    facts = [str(edge.edge), list(edge.names), edge.covariance.tolist()]
+    return friction_hash + hashlib.sha256(json.dumps(facts).encode()).hexdigest()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import scissorcal
 from scissorcal.calibration import FitResult
+from scissorcal.calibration.plate_result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package.archive import archive_bytes, member_of, write_archive
 from scissorcal.package.average import AverageTorque
@@ -35,6 +36,7 @@ from scissorcal.package.manifest import (
     Limits,
     Manifest,
     Parameter,
+    PlateRecord,
     Provenance,
     Ranges,
     canonical,
@@ -75,6 +77,7 @@ def build_package(
     *,
     tolerance: float = TOLERANCE,
     review: Review | None = None,
+    plate: PlateFit | None = None,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
@@ -82,13 +85,14 @@ def build_package(
     ``rng`` picks which posterior draws travel along for the band, at most 200; the same fits,
     recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its value.
     ``review`` is the signature under the fits' report; it changes nothing else in the package.
+    ``plate`` is where the plate stands, which travels along as a pose with its covariance.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the
     tables are further from the model than the scene bears.
     """
     cut, friction = _wanted(recipe, friction, cut)
-    record = _provenance(recipe, cut, friction)
+    record = _provenance(recipe, cut, friction, plate)
     draws = pick_draws(cut, friction, rng)
     model = central_model(_centre(cut), _centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)
@@ -114,6 +118,7 @@ def build_package(
             bound=bound,
             provenance=record,
             members=tuple(member_of(file, array) for file, array in arrays.items()),
+            plate=_plate_record(plate) if plate else None,
             review=review,
             content_hash=UNHASHED,
         )
@@ -142,7 +147,12 @@ def put_review(package: ModelPackage, review: Review | None, path: Path) -> Mode
     return ModelPackage(manifest, package.arrays, str(path))
 
 
-def package_inputs_hash(recipe: Recipe, friction: FitResult | None, cut: FitResult | None) -> str:
+def package_inputs_hash(
+    recipe: Recipe,
+    friction: FitResult | None,
+    cut: FitResult | None,
+    plate: PlateFit | None = None,
+) -> str:
     """Hash of all that a package depends on: equal to its manifest's, there is nothing to build."""
     if not recipe.scene.render_friction:
         friction = None
@@ -152,6 +162,8 @@ def package_inputs_hash(recipe: Recipe, friction: FitResult | None, cut: FitResu
         "recipe": json.loads(recipe.model_dump_json()),
         "fits": [fit.inputs_hash if fit else None for fit in (cut, friction)],
     }
+    if plate:
+        facts["plate"] = plate.inputs_hash
     return hashlib.sha256(canonical(facts)).hexdigest()
 
 
@@ -199,14 +211,30 @@ def _wanted(
     return cut, friction
 
 
-def _provenance(recipe: Recipe, cut: FitResult, friction: FitResult | None) -> Provenance:
+def _plate_record(plate: PlateFit) -> PlateRecord:
+    """The plate's pose in the rig's frame, or before the camera where that is all there is."""
+    pose = plate.rig_plate or plate.camera_plate
+    rows = np.zeros((6, 6)) if pose.covariance is None else pose.covariance
+    return PlateRecord(
+        frame="rig" if plate.rig_plate else "camera",
+        quaternion=pose.quaternion,
+        translation_m=pose.translation_m,
+        covariance=tuple(tuple(float(value) for value in row) for row in rows),
+        target=plate.target,
+        inputs_hash=plate.inputs_hash,
+    )
+
+
+def _provenance(
+    recipe: Recipe, cut: FitResult, friction: FitResult | None, plate: PlateFit | None
+) -> Provenance:
     text = canonical(json.loads(recipe.model_dump_json()))
     keys = CutStructure.model_fields.keys()
     return Provenance(
         scissorcal_version=scissorcal.__version__,
         recipe=text.decode("utf-8"),
         recipe_sha256=hashlib.sha256(text).hexdigest(),
-        inputs_hash=package_inputs_hash(recipe, friction, cut),
+        inputs_hash=package_inputs_hash(recipe, friction, cut, plate),
         cut=CutRecord(
             **_record(cut), structure=CutStructure(**{key: cut.structure[key] for key in keys})
         ),

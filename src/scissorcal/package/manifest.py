@@ -211,6 +211,21 @@ class Provenance(Section):
     friction: FrictionRecord | None
 
 
+class PlateRecord(Section):
+    """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
+
+    ``quaternion`` is (w, x, y, z), ``covariance`` (6, 6) over a rotation vector in the outer frame
+    (rad), then the translation (m).
+    """
+
+    frame: Literal["rig", "camera"]
+    quaternion: tuple[float, float, float, float]
+    translation_m: tuple[float, float, float]
+    covariance: tuple[tuple[float, ...], ...]
+    target: str
+    inputs_hash: str
+
+
 class Manifest(Section):
     """The whole manifest, ``manifest.json`` in the archive.
 
@@ -228,6 +243,7 @@ class Manifest(Section):
     bound: Bound
     provenance: Provenance
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
+    plate: PlateRecord | None = None
     review: Review | None
     content_hash: Digest
 

@@ -8,6 +8,7 @@ from scissorcal.recipe.schema import Recipe
 
 CaptureKind = Literal["friction", "cut"]
 FitKind = Literal["friction", "cut"]
+GeometryKind = Literal["camera", "blade", "plate"]
 TableKind = Literal["edge", "response", "fracture", "friction"]
 
 
@@ -23,19 +24,26 @@ class Requirement:
 class Requirements:
     """Everything that follows from a scene, in the order in which it is done.
 
-    ``left_out`` names what is neither asked for, nor fitted, nor shipped.
+    ``captures`` are of the rig, ``photographs`` of its geometry; ``geometry`` is fitted to the
+    latter, ``fits`` to the former. ``left_out`` names what is neither asked for, nor fitted, nor
+    shipped.
     """
 
     captures: tuple[Requirement, ...]
     fits: tuple[Requirement, ...]
     tables: tuple[Requirement, ...]
     left_out: tuple[Requirement, ...]
+    photographs: tuple[Requirement, ...] = ()
+    geometry: tuple[Requirement, ...] = ()
 
     def needs_capture(self, name: CaptureKind) -> bool:
         return any(item.name == name for item in self.captures)
 
     def needs_fit(self, name: FitKind) -> bool:
         return any(item.name == name for item in self.fits)
+
+    def needs_geometry(self, name: GeometryKind) -> bool:
+        return any(item.name == name for item in self.geometry)
 
     def needs_table(self, name: TableKind) -> bool:
         return any(item.name == name for item in self.tables)
@@ -52,7 +60,7 @@ def requirements(recipe: Recipe) -> Requirements:
 
     >>> from scissorcal.recipe.library import builtin_recipe
     >>> needs = requirements(builtin_recipe("press-only"))
-    >>> [item.name for item in needs.tables], [item.name for item in needs.left_out]
+    >>> [item.name for item in needs.tables], [item.name for item in needs.left_out][:2]
     (['edge', 'response', 'friction'], ['fracture', 'translation force'])
     """
     if recipe.rig.joint == "linear":
@@ -83,6 +91,11 @@ def requirements(recipe: Recipe) -> Requirements:
         left_out.append(
             Requirement("translation force", 'scene.render does not name "translation_force"')
         )
+    geometry = _geometry(recipe)
+    if not any(item.name == "blade" for item in geometry):
+        left_out.append(Requirement("blade photographs", 'rig.edge.source = "recipe"'))
+    if not any(item.name == "plate" for item in geometry):
+        left_out.append(Requirement("plate pose", 'scene.plate_pose = "known"'))
     return Requirements(
         captures=(
             Requirement("friction", why_friction),
@@ -94,7 +107,25 @@ def requirements(recipe: Recipe) -> Requirements:
         ),
         tables=tuple(tables),
         left_out=tuple(left_out),
+        photographs=geometry,
+        geometry=geometry,
     )
+
+
+def _geometry(recipe: Recipe) -> tuple[Requirement, ...]:
+    """What photographs are wanted of, in the order in which they are fitted."""
+    blade = recipe.rig.edge.source == "photographs"
+    plate = recipe.scene.plate_pose == "estimated"
+    wanted = []
+    if blade or plate:
+        wanted.append(Requirement("camera", "photographs are measured through it"))
+    if blade:
+        why = 'the edge is taken from photographs (rig.edge.source = "photographs")'
+        wanted.append(Requirement("blade", why))
+    if plate:
+        why = 'where the plate stands is estimated (scene.plate_pose = "estimated")'
+        wanted.append(Requirement("plate", why))
+    return tuple(wanted)
 
 
 def _linear_joint() -> Requirements:

@@ -93,9 +93,11 @@ class Edge(Section):
     """The cutting edge e(s) of one blade in its own frame, until photographs give it.
 
     ``line``: e = offset + s tan(taper). ``arc``: the same plus curvature s^2 / 2. ``offset_sd_mm``
-    and ``taper_sd_deg`` say how well both are known; 0 holds them as they are.
+    and ``taper_sd_deg`` say how well both are known; 0 holds them as they are. With ``source =
+    "photographs"`` the fit of the blade takes their place, and these only plan the captures.
     """
 
+    source: Literal["recipe", "photographs"] = "recipe"
     family: Literal["line", "arc"] = "line"
     offset_mm: Finite
     taper_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)]

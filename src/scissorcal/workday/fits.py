@@ -109,7 +109,7 @@ def is_current(
 
     ``friction`` is the friction fit as it is now, which a fit of a cut builds on.
     """
-    upstream = friction.inputs_hash if friction and fit.what == "cut" else ""
+    upstream = _upstream(workspace, recipe, friction) if fit.what == "cut" else ""
     return fit.inputs_hash == expected_hash(workspace, recipe, fit.what, fit.effort, upstream)
 
 
@@ -125,6 +125,18 @@ def expected_hash(
     return fit_inputs_hash(what, recordings, settings, effort, upstream)
 
 
+def _upstream(workspace: Workspace, recipe: Recipe, friction: "FitResult | None") -> str:
+    """What a fit of a cut builds on now; what is missing gives a hash that no fit has."""
+    from scissorcal.calibration.hashing import cut_upstream
+    from scissorcal.workday.geometry import edge_belief
+
+    try:
+        edge = edge_belief(workspace, recipe)
+    except MissingError:
+        return "no fit of the blade"
+    return cut_upstream(friction.inputs_hash if friction else "", edge)
+
+
 def _fit(
     workspace: Workspace,
     recipe: Recipe,
@@ -137,6 +149,8 @@ def _fit(
     import numpy as np
 
     from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
+    from scissorcal.calibration.hashing import cut_upstream
+    from scissorcal.workday.geometry import edge_belief
 
     chosen: Effort = effort or recipe.fit.effort
     progress(0.0, f"{what}: reading recordings")
@@ -150,7 +164,8 @@ def _fit(
             "fit of a cut needs friction of the rig that cuts."
         )
     path = workspace.fit_path(what)
-    upstream = friction.inputs_hash if friction else ""
+    edge = edge_belief(workspace, recipe) if friction else None
+    upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
     if path.is_file() and not force:
         stored = load_fit(path)
         if stored.inputs_hash == expected_hash(workspace, recipe, what, chosen, upstream):
@@ -162,7 +177,13 @@ def _fit(
         )
     else:
         result = fit_cut(
-            usable.recordings, recipe, friction, effort=chosen, rng=rng, progress=progress
+            usable.recordings,
+            recipe,
+            friction,
+            effort=chosen,
+            rng=rng,
+            progress=progress,
+            edge=edge,
         )
     save_fit(result, path)
     return FitOutcome(what, result, path, cached=False)

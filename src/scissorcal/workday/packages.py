@@ -8,6 +8,7 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.requirements import requirements
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.fits import current_fits
+from scissorcal.workday.geometry import expected_package_hash, scene_plate
 from scissorcal.workday.reviews import ReviewState, review_state
 from scissorcal.workday.workspace import Workspace
 
@@ -40,7 +41,6 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
         build_package,
         check_package,
         open_package,
-        package_inputs_hash,
         put_review,
     )
 
@@ -52,6 +52,7 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
         )
     fits = current_fits(workspace, recipe)
     friction, cut = fits.get("friction"), fits.get("cut")
+    plate = scene_plate(workspace, recipe)
     path = workspace.package_path(recipe)
     state = review_state(workspace, recipe, fits)
     if path.is_file() and not force:
@@ -59,7 +60,7 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
             package = open_package(path)
         except InputError:
             package = None
-        expected = package_inputs_hash(recipe, friction, cut)
+        expected = expected_package_hash(workspace, recipe, fits)
         if package and package.manifest.provenance.inputs_hash == expected:
             cached = package.manifest.review == state.valid
             if not cached:
@@ -67,7 +68,13 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
             warnings = _void(state) + package.warnings
             return Built(path, package.manifest, check_package(path), warnings, cached)
     summary = build_package(
-        recipe, friction, cut, path, np.random.default_rng(seed), review=state.valid
+        recipe,
+        friction,
+        cut,
+        path,
+        np.random.default_rng(seed),
+        review=state.valid,
+        plate=plate,
     )
     warnings = _void(state) + summary.warnings
     return Built(path, summary.manifest, summary.verdicts, warnings, cached=False)

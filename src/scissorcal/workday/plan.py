@@ -5,10 +5,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.requirements import CaptureKind, Requirement, requirements
+from scissorcal.recipe.requirements import (
+    CaptureKind,
+    GeometryKind,
+    Requirement,
+    requirements,
+)
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
 from scissorcal.workday.fits import is_current
+from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.recordings import UnreadableError, usable_recordings
 from scissorcal.workday.reports import why_stale
 from scissorcal.workday.reviews import review_state
@@ -66,6 +72,10 @@ def make_plan(workspace: Workspace) -> Plan:
     for item in needs.captures:
         kind: CaptureKind = "friction" if item.name == "friction" else "cut"
         steps.append(_capture_step(workspace, recipe, kind, item.why, notes))
+    steps += [_photograph_step(workspace, item) for item in needs.photographs]
+    for item in needs.geometry:
+        captured = next(step for step in steps if step.name == f"capture {item.name}")
+        steps.append(_geometry_step(workspace, recipe, item, captured))
     fits: dict[FitKind, FitResult] = {}
     for item in needs.fits:
         what: FitKind = "friction" if item.name == "friction" else "cut"
@@ -82,6 +92,39 @@ def make_plan(workspace: Workspace) -> Plan:
     if needs.tables:
         steps.append(_package_step(workspace, recipe, fits, fitted))
     return Plan(recipe.name, tuple(steps), needs.tables, needs.left_out, tuple(notes))
+
+
+def _photograph_step(workspace: Workspace, item: Requirement) -> Step:
+    from scissorcal.workday.geometry import photograph_state
+
+    command = f"scissorcal capture {item.name} --image {_PHOTOGRAPHS[item.name]}"
+    name = f"capture {item.name}"
+    try:
+        found = photograph_state(workspace, _geometry(item.name))
+    except InputError as error:
+        return Step(name, "stale", str(error), item.why, command)
+    files = tuple(workspace.relative(path) for path in found.files)
+    return Step(name, found.status, found.state, item.why, command, files)
+
+
+def _geometry_step(workspace: Workspace, recipe: Recipe, item: Requirement, captured: Step) -> Step:
+    from scissorcal.workday.geometry import fit_state
+
+    name, command = f"fit {item.name}", f"scissorcal fit {item.name}"
+    found = fit_state(workspace, recipe, _geometry(item.name))
+    if captured.status != "done" and found.status != "missing":
+        state = f"its photographs are {captured.status}"
+        return Step(name, "stale", state, item.why, command)
+    files = tuple(workspace.relative(path) for path in found.files)
+    return Step(name, found.status, found.state, item.why, command, files)
+
+
+def _geometry(name: str) -> GeometryKind:
+    kinds: dict[str, GeometryKind] = {"camera": "camera", "blade": "blade", "plate": "plate"}
+    return kinds[name]
+
+
+_PHOTOGRAPHS = {"camera": "board-*.jpg", "blade": "blade-*.jpg", "plate": "plate-*.jpg"}
 
 
 def _is_verified(workspace: Workspace, fit: "FitResult") -> bool:
@@ -204,7 +247,7 @@ def _review_step(
 def _package_step(
     workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]", fitted: bool
 ) -> Step:
-    from scissorcal.package import open_package, package_inputs_hash
+    from scissorcal.package import open_package
 
     name, why, command = "package build", "what the loop renders", "scissorcal package build"
     path = workspace.package_path(recipe)
@@ -214,7 +257,7 @@ def _package_step(
         manifest = open_package(path).manifest
     except InputError:
         return Step(name, "stale", f"{workspace.relative(path)} is damaged", why, command)
-    expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
+    expected = expected_package_hash(workspace, recipe, fits)
     if not fitted or manifest.provenance.inputs_hash != expected:
         return Step(name, "stale", "built from other fits or another recipe", why, command)
     if manifest.review != review_state(workspace, recipe, fits).valid:

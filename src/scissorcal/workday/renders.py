@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.fits import current_fits
+from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.rigs import open_rig
 from scissorcal.workday.workspace import Workspace
 
@@ -87,7 +88,7 @@ def package_has_fallen_behind(workspace: Workspace) -> bool:
 
     False where there is none that can be opened, which rendering it then says.
     """
-    from scissorcal.package import open_package, package_inputs_hash
+    from scissorcal.package import open_package
 
     recipe = workspace.recipe()
     try:
@@ -98,5 +99,5 @@ def package_has_fallen_behind(workspace: Workspace) -> bool:
         fits = current_fits(workspace, recipe)
     except ScissorcalError:
         return True
-    expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
+    expected = expected_package_hash(workspace, recipe, fits)
     return manifest.provenance.inputs_hash != expected

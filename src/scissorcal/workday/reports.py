@@ -13,6 +13,7 @@ from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.fits import current_fits
+from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.recordings import usable_recordings
 from scissorcal.workday.workspace import FitKind, Workspace
 
@@ -128,7 +129,7 @@ def _package_sheets(
     workspace: Workspace, recipe: Recipe, fits: "dict[FitKind, FitResult]"
 ) -> "list[FactSheet]":
     """What the workspace's package promises, where there is one that can be opened."""
-    from scissorcal.package import REVIEW_CHECK, check_package, open_package, package_inputs_hash
+    from scissorcal.package import REVIEW_CHECK, check_package, open_package
     from scissorcal.report import sheet_from_mapping
 
     path = workspace.package_path(recipe)
@@ -145,7 +146,7 @@ def _package_sheets(
         "ranges": {key: list(value) for key, value in manifest.ranges.model_dump().items()},
     }
     notes = []
-    expected = package_inputs_hash(recipe, fits.get("friction"), fits.get("cut"))
+    expected = expected_package_hash(workspace, recipe, fits)
     if manifest.provenance.inputs_hash != expected:
         notes.append(
             "It was built from other fits or another recipe than this report shows: run "
