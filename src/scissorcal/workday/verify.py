@@ -113,11 +113,14 @@ def _experiment(
     """The design of a fit, and the sheet that each of its strokes went through."""
     from scissorcal.calibration.cut import cut_experiment
     from scissorcal.calibration.friction import friction_experiment
+    from scissorcal.workday.geometry import edge_belief
 
     recordings = usable_recordings(workspace, recipe, kind).recordings
     if kind == "friction":
         return friction_experiment(recordings, recipe.fit.friction, fits["friction"]), {}
-    return cut_experiment(recordings, recipe, fits["friction"], fits["cut"]), _sheets(recordings)
+    edge = edge_belief(workspace, recipe)
+    design = cut_experiment(recordings, recipe, fits["friction"], fits["cut"], edge)
+    return design, _sheets(recordings)
 
 
 def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
