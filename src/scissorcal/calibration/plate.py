@@ -1,14 +1,14 @@
 """Where the plate stands: its target in photographs of a camera at rest, in the rig's frame too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.plate_checks import plate_verdicts
 from scissorcal.calibration.plate_result import Halves, PlateFit, PlateView
-from scissorcal.errors import MissingError, VerdictError
+from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.vision.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.boards import PRINT_SCALE_SD
 from scissorcal.vision.camera import Camera
@@ -18,7 +18,7 @@ from scissorcal.vision.rig_frame import RigPose
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 2
+ALGORITHM = 4
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -47,7 +47,8 @@ def fit_plate(
     photograph that shows them elsewhere is noticed by its own pose. Both poses that a plane allows
     are refined and kept. ``rig`` takes the pose into the rig's frame.
 
-    Raises MissingError without a photograph, VerdictError where the corners determine no pose.
+    Raises MissingError without a photograph, InputError where photographs show different targets,
+    VerdictError where the corners determine no pose.
     """
     if not photos:
         raise MissingError(
@@ -55,19 +56,18 @@ def fit_plate(
             "it to the plate, and take some with 'scissorcal capture plate --image plate-*.jpg'."
         )
     target = photos[0].detection.board.name
+    for photo in photos:
+        if photo.detection.board != photos[0].detection.board:
+            raise InputError(
+                f"{photo.name} shows the {photo.detection.board.name}, {photos[0].name} the "
+                f"{target}: a plate has one target; leave one of them out."
+            )
     corners = _together(photos)
-    try:
-        whole = locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
-        alone = [
-            locate_board(corners.where(corners.frame == i), camera) for i in range(len(photos))
-        ]
-        halves = _halves(corners, camera)
-    except ValueError as error:
-        names = ", ".join(photo.name for photo in photos)
-        raise VerdictError(
-            f"{names}: {error}, so the plate's pose cannot be told. Have the whole {target} in "
-            "the picture, in good light."
-        ) from None
+    alone = [
+        _located(corners.where(corners.frame == i), camera, photo) for i, photo in enumerate(photos)
+    ]
+    whole = _located(corners, camera, *photos)
+    halves = _halves(corners, camera)
     back = plate_target.inverse()
     views = tuple(
         _view(photo, found, whole, corners.frame == i)
@@ -92,6 +92,17 @@ def fit_plate(
     )
 
 
+def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose:
+    try:
+        return locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+    except ValueError as error:
+        names = ", ".join(photo.name for photo in photos)
+        raise VerdictError(
+            f"{names}: {error}, so the plate's pose cannot be told. Have the whole "
+            f"{photos[0].detection.board.name} in the picture, in good light, or leave it out."
+        ) from None
+
+
 def _together(photos: Sequence[PlatePhoto]) -> Corners:
     found = [photo.detection for photo in photos]
     return Corners(
@@ -103,19 +114,23 @@ def _together(photos: Sequence[PlatePhoto]) -> Corners:
 
 
 def _halves(corners: Corners, camera: Camera) -> Halves | None:
-    """Poses of every other group of four corners apart, of the same camera.
+    """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
 
-    Four corners in a row are a marker's, or neighbours on a chessboard, which err together. What is
-    unknown of the camera moves both alike, and is left out of what they claim.
+    Every other group of four corners (a marker's, or neighbours on a chessboard, which err
+    together) shows errors of single corners; the left and the right half show a bent target and a
+    lens that was fitted badly. What is unknown of the camera and of the print's scale moves both
+    alike, and is left out of what they claim.
     """
-    odd = (corners.corner // 4) % 2 == 1
-    known = Camera(
-        camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion, camera.width, camera.height
-    )
-    if min(len(np.unique(corners.corner[odd])), len(np.unique(corners.corner[~odd]))) < 4:
-        return None
+    known = replace(camera, covariance=None)
+    across = corners.points[:, 0]
+    ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
+    found = [halves for way in ways if (halves := _half_and_half(corners, known, way))]
+    return max(found, key=lambda halves: halves.square, default=None)
+
+
+def _half_and_half(corners: Corners, camera: Camera, way: NDArray[np.bool_]) -> Halves | None:
     try:
-        first, second = (locate_board(corners.where(half), known) for half in (odd, ~odd))
+        first, second = (locate_board(corners.where(half), camera) for half in (way, ~way))
     except ValueError:
         return None
     assert first.pose.covariance is not None
@@ -135,13 +150,13 @@ def _view(
     normal = found.pose.matrix[:, 2]
     to_target = found.pose.apply([photo.detection.points.mean(axis=0)])[0]
     away = difference(found.pose, whole.pose)
-    own = whole.residuals_px[here & whole.used]
+    own = whole.residuals_px[here][found.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
     return PlateView(
         name=photo.name,
         corners=len(photo.detection.ids),
         used=int(np.sum(whole.used[here])),
-        rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))) if len(own) else float("nan"),
+        rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))),
         rms_alone_px=found.rms_px,
         side_px=photo.detection.square_px,
         distance_m=float(np.linalg.norm(to_target)),

@@ -15,6 +15,9 @@ SCOPE = "fit.plate"
 ODDS = 20.0
 """The pose must be this many times likelier than the second one that a plane allows."""
 FALSE_ALARM = 0.001
+"""How often two ways of halving honest corners, together, differ by more than is allowed."""
+LEFT_OVER_PX = 0.3
+"""Corners are found to 0.02 to 0.2 px; where they lie farther off, something is not as assumed."""
 MOVED = 3.0
 """A photograph whose rms under the common pose exceeds its own by this factor shows the plate
 elsewhere."""
@@ -31,6 +34,7 @@ def plate_verdicts(
     return (
         _one_pose(whole),
         _at_rest(views),
+        _residuals(whole),
         _halves(halves),
         _size(views),
         _camera(camera),
@@ -66,10 +70,21 @@ def _at_rest(views: Sequence[PlateView]) -> Verdict:
     return Verdict(SCOPE, "at rest", "fail", ratios[worst], MOVED, why)
 
 
+def _residuals(whole: BoardPose) -> Verdict:
+    why = f"Corners lie {whole.sd_px:.2g} px (sd) from where the pose has them."
+    if whole.sd_px < LEFT_OVER_PX:
+        return Verdict(SCOPE, "residuals", "pass", whole.sd_px, LEFT_OVER_PX, why)
+    why += (
+        " That is more than they are found to: the target may be bent, or the camera's fit may not "
+        "hold here (another focus or zoom?)."
+    )
+    return Verdict(SCOPE, "residuals", "fail", whole.sd_px, LEFT_OVER_PX, why)
+
+
 def _halves(halves: Halves | None) -> Verdict:
     from scipy.stats import chi2
 
-    limit = float(chi2.isf(FALSE_ALARM, 6))
+    limit = float(chi2.isf(0.5 * FALSE_ALARM, 6))
     if halves is None:
         why = "Too few corners were seen to compare two halves of them: show more of the target."
         return Verdict(SCOPE, "halves", "not_evaluated", None, limit, why)
