@@ -115,7 +115,8 @@ def run(case: Case, seed: int) -> None:
         ess = f"{row.effective:.0f}" if known else "-"
         rate = f"{row.effective / row.cpu_s:.0f}" if known else "-"
         print(
-            f"| {row.name} | {row.wall_s:.2f} | {row.cpu_s:.2f} | {row.evaluations} | {ess} | {rate} | "
+            f"| {row.name} | {row.wall_s:.2f} | {row.cpu_s:.2f} | {row.evaluations} | {ess} | "
+            f"{rate} | "
             f"{away:.3f} sd | {ratio:.1%} | {apart:.3f} | {row.remark} |"
         )
 

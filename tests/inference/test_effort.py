@@ -256,7 +256,8 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
     problem = problem_of(normal(CORRELATED), [[1.0, 1.0, 1.0]])
 
     def run(checkpoint: Path | None, target: Problem = problem):
-        return infer(target, "thorough", np.random.default_rng(5), checkpoint=checkpoint)
+        rng = np.random.default_rng(5)
+        return infer(target, "thorough", rng, checkpoint=checkpoint, budget=70_000)
 
     whole = run(None)
     calls = 0
@@ -301,7 +302,7 @@ def test_a_checkpoint_of_another_posterior_is_refused_and_kept(tmp_path: Path) -
 def test_the_generator_alone_decides_what_is_drawn() -> None:
     problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
     first, second, other = (
-        infer(problem, "thorough", np.random.default_rng(seed)) for seed in (7, 7, 8)
+        infer(problem, "thorough", np.random.default_rng(seed), budget=20_000) for seed in (7, 7, 8)
     )
     np.testing.assert_array_equal(first.draws, second.draws)
     assert not np.array_equal(first.draws, other.draws)

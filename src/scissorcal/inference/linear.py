@@ -67,6 +67,7 @@ def infer_linear(
         inflation=np.ones(draws.shape[1]),
         r_hat=np.concatenate([found.r_hat, added]),
         tau=np.concatenate([found.tau, added]),
+        log_posterior=lambda u: _log_joint(problem, u),
     )
 
 
@@ -112,6 +113,20 @@ def with_linear(problem: LinearProblem, draws: Array, rng: np.random.Generator) 
     normal = rng.standard_normal((len(draws), len(problem.linear_names)))
     linear = [halved.at(theta).draw(z) for theta, z in zip(draws, normal, strict=True)]
     return np.column_stack([draws, np.stack(linear)])
+
+
+def _log_joint(problem: LinearProblem, u: Array) -> float:
+    """Log-posterior of all parameters (p + q,), the linear ones not integrated."""
+    theta, beta = u[: len(problem.names)], u[len(problem.names) :]
+    if np.any(theta < problem.lower) or np.any(theta > problem.upper):
+        return -np.inf
+    offset, design = problem.design_at(theta)
+    log_sd = np.broadcast_to(problem.log_sd_at(theta), problem.measured.shape)
+    z = (problem.measured - offset - design @ beta) * np.exp(-log_sd)
+    away = beta - problem.linear_mean
+    prior = away @ np.linalg.solve(problem.linear_covariance, away)
+    total = problem.log_prior(theta) - 0.5 * float(z @ z + prior) - float(log_sd.sum())
+    return total if np.isfinite(total) else -np.inf
 
 
 @dataclass(frozen=True)
