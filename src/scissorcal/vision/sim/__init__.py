@@ -7,7 +7,7 @@ from scissorcal.vision.sim.blades import BladeShape, Nick, blade_layer, scissors
 from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Looks, as_jpeg, random_looks
 from scissorcal.vision.sim.photograph import Glare, Layer, render
-from scissorcal.vision.sim.plate_scene import PlateScene, plate_scene
+from scissorcal.vision.sim.plate_scene import PlateScene, chained, plate_scene
 from scissorcal.vision.sim.targets import target_layers
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Pose",
     "as_jpeg",
     "blade_layer",
+    "chained",
     "plate_scene",
     "random_looks",
     "render",

@@ -1,0 +1,296 @@
+"""Photographs of the plate and of the rig's card, the plate's fit, and its track."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
+from scissorcal.vision.pose import Pose as Found
+from scissorcal.vision.pose import difference
+from scissorcal.vision.sim import Pose, chained
+from scissorcal.workday.sim_photographs import sim_lens
+from scissorcal.workday.sim_plate import (
+    render_card_photographs,
+    render_frames,
+    render_plate_photographs,
+    sim_plate_scene,
+)
+from scissorcal.workday.tracks import read_track
+from tests.cli.conftest import Cli
+
+
+@pytest.fixture(scope="module")
+def recipe() -> Recipe:
+    return builtin_recipe("paper-80gsm")
+
+
+@pytest.fixture(scope="module")
+def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three photographs of a plate, nine of the card with stances.csv, and camera.yml."""
+    folder = tmp_path_factory.mktemp("plates")
+    render_plate_photographs(recipe, folder, 0, count=3)
+    stances = render_card_photographs(recipe, folder, 0)
+    rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
+    (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
+    lens = sim_lens()
+    store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
+    store.write("image_width", lens.width)
+    store.write("image_height", lens.height)
+    (u, v), f = lens.centre_px, lens.focal_px
+    store.write("camera_matrix", np.array([[f, 0.0, u], [0.0, f, v], [0.0, 0.0, 1.0]]))
+    store.write("distortion_coefficients", np.array([lens.distortion]))
+    store.release()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def video(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten pictures at 10 Hz of a plate that slides; the fourth is empty, the eighth black."""
+    path = tmp_path_factory.mktemp("video") / "plate.avi"
+    lens = sim_lens()
+    writer = cv2.VideoWriter(
+        str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (lens.width, lens.height)
+    )
+    for frame in render_frames(recipe, 0, 10):
+        image = frame.image
+        if frame.number == 3:
+            image = np.repeat(
+                np.linspace(60, 180, lens.width, dtype=np.uint8)[None, :, None], lens.height, 0
+            ).repeat(3, 2)
+        writer.write(image)
+    writer.release()
+    return path
+
+
+def plates(album: Path) -> list[Path]:
+    return sorted(album.glob("plate-*.jpg"))
+
+
+def cards(album: Path) -> list[Path]:
+    return sorted(album.glob("rig-*.jpg"))
+
+
+def captured(workspace: Path) -> list[str]:
+    return sorted(path.name for path in (workspace / "captures").glob("*"))
+
+
+def off(pose: dict[str, list[float]], truth: Pose) -> tuple[float, float]:
+    """Degrees and millimetres by which a printed pose is off."""
+    found = Found(tuple(pose["quaternion"]), tuple(pose["translation_m"]))  # type: ignore[arg-type]
+    away = difference(found, Found.from_matrix(truth.rotation, truth.shift_m))
+    return float(np.degrees(np.linalg.norm(away[:3]))), float(1e3 * np.linalg.norm(away[3:]))
+
+
+def test_a_plate_is_captured_fitted_and_known_in_the_rigs_frame(
+    cli: Cli, workspace: Path, album: Path, recipe: Recipe
+) -> None:
+    assert cli("import", album / "camera.yml").code == 0
+    said = cli("capture", "plate", "-i", *plates(album))
+    assert said.code == 0
+    assert "3 photographs of the plate board" in said.out
+    assert "plate-01.jpg: 24 of 24 corners of the plate board" in said.err
+
+    said = cli("fit", "plate", "--json")
+    envelope = said.envelope
+    assert said.code == 0
+    truth = sim_plate_scene(recipe, 0)
+    degrees, millimetres = off(envelope["result"]["camera_plate"], truth.camera_plate)
+    assert degrees < 0.1
+    assert millimetres < 0.3
+    assert envelope["result"]["rig_plate"] is None
+    assert len(envelope["result"]["pictures"]) == 3
+    assert all(Path(path).is_file() for path in envelope["files"])
+    assert cli("fit", "plate").out.startswith("plate: nothing changed")
+
+    said = cli("capture", "plate", "-i", *cards(album), "--stances", album / "stances.csv")
+    assert said.code == 0
+    assert "9 photographs of the rig markers" in said.out
+    envelope = cli("fit", "plate", "--json").envelope
+    assert not envelope["result"]["cached"]
+    degrees, millimetres = off(envelope["result"]["rig_plate"], truth.rig_plate)
+    assert degrees < 0.3
+    assert millimetres < 0.6
+    known = np.array(envelope["result"]["rig_plate"]["covariance"])
+    assert np.degrees(np.sqrt(np.diag(known)[:3].max())) < 0.5
+    assert {v["status"] for v in envelope["verdicts"]} == {"pass", "not_evaluated"}
+
+
+def test_nothing_is_kept_of_what_is_wrong(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    said = cli("capture", "plate", "-i", cards(album)[0], "-i", album / "stances.csv", "--json")
+    assert said.code == 0, "the card's photographs show the plate's target too"
+    empty = tmp_path / "nothing.jpg"
+    cv2.imwrite(str(empty), np.full((600, 800, 3), 120, np.uint8))
+    before = captured(workspace)
+    for words in (
+        ["-i", empty],
+        ["-i", album / "stances.csv"],
+        ["-i", tmp_path / "no-such.jpg"],
+        ["-i", cards(album)[0]],
+    ):
+        said = cli("capture", "plate", *words, "--json")
+        assert said.code == 2, words
+        assert "Nothing was kept." in said.envelope["result"]["error"]
+        assert captured(workspace) == before
+
+
+def test_stances_are_checked_line_by_line(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    table = tmp_path / "stances.csv"
+    for text, words in (
+        ("file,advance_mm\nrig-01.jpg,3\n", "needs a first line"),
+        ("file,advance_mm,opening_deg\nrig-01.jpg,3,wide\n", "line 2"),
+        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no line among the stances"),
+    ):
+        table.write_text(text)
+        said = cli("capture", "plate", "-i", cards(album)[0], "--stances", table)
+        assert said.code == 2
+        assert words in said.err
+    assert captured(workspace) == []
+    said = cli("capture", "plate", "-i", cards(album)[0], "--stances", tmp_path / "none.csv")
+    assert said.code == 2
+    assert "none.csv cannot be read" in said.err
+
+
+def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Path) -> None:
+    cli("import", album / "camera.yml")
+    assert cli("capture", "plate", "-i", *plates(album)).code == 0
+    one = cards(album)[0]
+    assert cli("capture", "plate", "-i", one, "--stances", album / "stances.csv").code == 0
+    said = cli("fit", "plate", "--json")
+    assert said.code == 3
+    assert "the rig stood in one place" in said.envelope["result"]["error"]
+    assert not (workspace / "fits" / "plate.json").exists()
+
+
+def test_what_must_come_first_is_said(cli: Cli, workspace: Path, album: Path) -> None:
+    said = cli("fit", "plate", "--json")
+    assert said.code == 5
+    assert "There is no camera yet" in said.envelope["result"]["error"]
+    assert cli("capture", "track", "--camera", "sim").code == 5
+    cli("import", album / "camera.yml")
+    said = cli("fit", "plate")
+    assert said.code == 5
+    assert "There is no photograph of the plate's target" in said.err
+
+
+def test_photographs_of_another_size_are_refused(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    cli("import", album / "camera.yml")
+    half = tmp_path / "half.png"
+    cv2.imwrite(str(half), cv2.resize(cv2.imread(str(plates(album)[0])), (1000, 750)))
+    assert cli("capture", "plate", "-i", half).code == 0
+    said = cli("fit", "plate")
+    assert said.code == 2
+    assert "has 1000 x 750 pixels, the camera was fitted at 2000 x 1500" in said.err
+
+
+def test_a_video_is_tracked_and_its_drop_outs_named(
+    cli: Cli, workspace: Path, album: Path, video: Path, recipe: Recipe
+) -> None:
+    cli("import", album / "camera.yml")
+    said = cli("capture", "track", "--camera", video, "--json")
+    assert said.code == 0
+    result = said.envelope["result"]
+    assert (result["pictures"], result["poses"], result["drop_outs"]) == (10, 8, 2)
+    assert result["states"] == {
+        "seen": 8, "ambiguous": 0, "blank": 1, "no target": 1, "no pose": 0
+    }  # fmt: skip
+    assert result["longest_gap_s"] == pytest.approx(0.2)
+    assert result["travel_mm"] == pytest.approx(2.7, abs=0.1)
+
+    (path,) = (Path(name) for name in said.envelope["files"])
+    head, rows = read_track(path)
+    assert (head.source, head.frame) == ("plate.avi", "camera")
+    assert [row.state for row in rows].index("no target") == 3
+    assert [row.state for row in rows].index("blank") == 7
+    scene = sim_plate_scene(recipe, 0)
+    for row in rows:
+        if row.pose is None:
+            continue
+        slid = Pose(np.eye(3), np.array([3e-4 * row.number, 0.0, 0.0]))
+        truth = chained(scene.camera_plate, slid)
+        degrees, millimetres = off(row.pose.model_dump(), truth)
+        assert degrees < 0.15
+        assert millimetres < 0.4
+    with path.open("a") as file:
+        file.write('{"number": 10, "time')
+    assert read_track(path)[1] == rows, "a line cut short by a kill is left out"
+
+    said = cli("capture", "track", "--camera", video, "--seconds", "0.35")
+    assert said.code == 0
+    assert "3 poses in 4 pictures" in said.out
+    assert "no target" in said.out
+
+
+def test_photographs_are_taken_from_a_video(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    still = tmp_path / "still.avi"
+    writer = cv2.VideoWriter(str(still), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (2000, 1500))
+    pictures = [cv2.imread(str(path)) for path in plates(album)]
+    for number in range(9):
+        writer.write(pictures[number % 3])
+    writer.release()
+    said = cli("capture", "plate", "--camera", still, "--views", "2")
+    assert said.code == 0, said.err
+    assert "2 photographs of the plate board" in said.out
+
+
+@pytest.mark.parametrize("what", ["plate", "track"])
+def test_no_such_camera_or_video(
+    cli: Cli, workspace: Path, album: Path, what: str, tmp_path: Path
+) -> None:
+    cli("import", album / "camera.yml")
+    said = cli("capture", what, "--camera", "97", "--json")
+    assert said.code == 4
+    assert "Camera 97 gives no picture" in said.envelope["result"]["error"]
+    said = cli("capture", what, "--camera", "gone.mp4")
+    assert said.code == 2
+    assert "gone.mp4 is not there" in said.err
+    said = cli("capture", what, "--camera", album / "stances.csv")
+    assert said.code == 2
+    assert "is no video that can be read" in said.err
+    assert captured(workspace) == []
+
+
+def test_a_video_without_the_target_leaves_nothing(
+    cli: Cli, workspace: Path, album: Path, tmp_path: Path
+) -> None:
+    cli("import", album / "camera.yml")
+    for size, words in (
+        ((2000, 1500), "in 3 the picture is of one shade"),
+        ((640, 480), "The pictures are 640 x 480 pixels"),
+    ):
+        path = tmp_path / f"{size[0]}.avi"
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, size)
+        for _ in range(3):
+            writer.write(np.full((size[1], size[0], 3), 40, np.uint8))
+        writer.release()
+        said = cli("capture", "track", "--camera", path, "--json")
+        assert said.code == 2
+        assert words in said.envelope["result"]["error"]
+    assert captured(workspace) == []
+
+
+def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> None:
+    assert cli("capture", "plate").code == 2
+    assert cli("capture", "plate", "-i", "a.jpg", "--camera", "0").code == 2
+    said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
+    assert said.code == 2
+    assert "Nobody knows where the rig stood" in said.err
+
+
+def test_a_track_is_json_line_by_line(cli: Cli, workspace: Path, album: Path, video: Path) -> None:
+    cli("import", album / "camera.yml")
+    (name,) = cli("capture", "track", "--camera", video, "--json").envelope["files"]
+    lines = [json.loads(line) for line in Path(name).read_text().splitlines()]
+    assert lines[0]["format"] == "scissorcal-track/1"
+    assert [line["number"] for line in lines[1:]] == list(range(10))
