@@ -12,13 +12,16 @@ from scissorcal.calibration.friction_experiment import FrictionExperiment, desig
 from scissorcal.calibration.friction_layout import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
+from scissorcal.calibration.physical import bandwidth_verdict, physical_verdict, start_verdict
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.windows import Windows, weigh
+from scissorcal.calibration.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.windows import Windows, next_cutoff, weigh
 from scissorcal.errors import InputError
-from scissorcal.inference import infer, tails_of
+from scissorcal.inference import Posterior, find_optimum, infer, tails_of
 from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
+from scissorcal.verdicts import Verdict
 
 Progress = Callable[[float, str], None]
 
@@ -62,7 +65,8 @@ def fit_friction(
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
-    every = weigh(recordings, settings.cutoff_Hz)
+    sensors = inspect_sensors(recordings)
+    every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
     windows = every.where(every.bins.moving)
     bins = windows.bins
     _refuse_poor_motion(bins, every.bins, recordings, joint)
@@ -75,10 +79,10 @@ def fit_friction(
         climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes))
     chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
     chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
-    problem = chosen.rung.problem(bins.series)
+    law = next(design for design in ladder if design.name == chosen.rung.name)
     tell(0.6, f"friction: inferring {chosen.rung.name}")
     posterior = infer(
-        problem,
+        chosen.rung.problem(bins.series),
         "draft" if effort == "draft" else "standard",
         rng,
         optimum=chosen.optimum,
@@ -101,6 +105,13 @@ def fit_friction(
         nuisance=NUISANCE,
         rng=rng,
         critic=settings.critic,
+        extra_verdicts=(
+            physical_verdict(law, chosen.optimum.point, chosen.share),
+            start_verdict(law, chosen.optimum.point),
+            _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
+            sensors.verdict,
+        ),
+        extra_notes=(*sensors.notes, *_notes(every, windows, posterior, joint)),
     )
 
 
@@ -113,7 +124,7 @@ def friction_experiment(
     ``fit.structure``.
     """
     joint = recordings[0].joint
-    every = weigh(recordings, settings.cutoff_Hz)
+    every = weigh(recordings, settings.cutoff_Hz, inspect_sensors(recordings).usable)
     windows = every.where(every.bins.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
@@ -140,6 +151,56 @@ def _with_tails(
     again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
     climbed[place] = replace(again, alike=chosen.alike)
     return climbed[place]
+
+
+def _bandwidth(
+    recordings: tuple[Recording, ...],
+    settings: FitFriction,
+    sensors: Sensors,
+    law: FrictionExperiment,
+    chosen: Climbed,
+    posterior: Posterior,
+    effort: Effort,
+) -> Verdict:
+    """Fit the same law once more at a higher cutoff, from where the fit ended."""
+    if effort == "draft":
+        why = "Draft effort does not compare cutoffs; use --effort standard."
+        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+    other_Hz = next_cutoff(law.windows)
+    if other_Hz is None:
+        why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
+        return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
+    every = weigh(recordings, other_Hz, sensors.usable)
+    windows = every.where(every.bins.moving)
+    if len(windows.first) < FEWEST_BINS:
+        why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
+        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+    there = replace(
+        law, windows=windows, strokes=_strokes(windows.bins), tails=chosen.rung.likelihood.tails
+    )
+    here = chosen.optimum.point
+    rung = replace(there.rung(there.observed), starts=here[None, :])
+    optimum = find_optimum(rung.problem(there.series))
+    cutoffs = (settings.cutoff_Hz, other_Hz)
+    return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
+
+
+def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
+    """What was left out near rest, and how late torque was measured."""
+    left = 1.0 - len(windows.first) / len(every.first)
+    notes = [
+        f"{left:.1%} of the time the joint rests, or moves by less than "
+        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
+        "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
+        "it is left out."
+    ]
+    if "delay" in posterior.names:
+        delays = posterior.draws[:, posterior.names.index("delay")]
+        notes.append(
+            f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
+            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms), which the fit takes into account."
+        )
+    return tuple(notes)
 
 
 def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:

@@ -118,6 +118,12 @@ def weigh(
     return joined if _bears_load(joined) else replace(joined, load=None)
 
 
+def next_cutoff(windows: Windows) -> float | None:
+    """Cutoff in Hz of the next shorter windows over the same samples; None where none are."""
+    knot = len(windows.weights) // 3
+    return HALF_AT / (windows.tick_s * (knot - 1)) if knot > 1 else None
+
+
 def _joined(pieces: list[Windows], loaded: bool) -> Windows:
     def together(name: str) -> Array:
         return np.concatenate([getattr(piece, name) for piece in pieces])

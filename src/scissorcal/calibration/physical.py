@@ -1,0 +1,139 @@
+"""Verdicts on a friction law: is it one that a joint can have, and does it hold its ground."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction_experiment import FrictionExperiment
+from scissorcal.calibration.friction_layout import LawParts
+from scissorcal.calibration.layout import Layout
+from scissorcal.verdicts import Status, Verdict
+
+Array = NDArray[np.float64]
+
+SCOPE = "fit.friction"
+CERTAIN = 3.0
+"""Standard deviations by which a level must be negative to be called so."""
+MOVED_LIMIT = 4.0
+"""Posterior standard deviations by which a parameter may move with the cutoff."""
+UNMOVED = 1e-9
+
+CURES = {
+    "inertia": "check the signs of the torque and of the opening, and record a quicker excitation",
+    "coulomb": "the torque pushes with the motion: check its sign; or an offset larger than "
+    "friction hides in an asymmetric law: set fit.friction.symmetry",
+    "viscous": 'friction falls with the speed: let the ladder have Stribeck (rung = "auto"), check '
+    "for a motor that compensates friction, and record faster sweeps",
+    "stribeck": "static friction would be below Coulomb friction: record slower sweeps, or choose "
+    "a rung without Stribeck",
+    "load_share": "friction would fall with the load: check the sign of the handle force",
+}
+
+
+def physical_verdict(experiment: FrictionExperiment, point: Array, share: float) -> Verdict:
+    """Judge whether the data want a level that no joint has: below zero.
+
+    Levels are fitted by their logarithms, which cannot become negative; data that want that
+    leave them at nearly nothing, in silence. One step of least squares from the optimum
+    ``point`` (p,), free of that constraint and of priors, says what they want. Laws without
+    viscous friction are offered it. ``share`` is the share of bins that are independent.
+    """
+    names, wanted, sd = _freed(experiment, point, share)
+    worst, found = 0.0, []
+    for name, value, spread in zip(names, wanted, sd, strict=True):
+        stem = name.removesuffix("_pos").removesuffix("_neg")
+        if stem in CURES and value < -CERTAIN * spread:
+            worst = min(worst, value / spread)
+            found.append((name, stem, value, spread))
+    if not found:
+        why = "No level of friction, nor the inertia, would be negative if it could."
+        return Verdict(SCOPE, "physical", "pass", 0.0, CERTAIN, why)
+    listed = ", ".join(
+        f"{name} = {value:.2g} (sd {spread:.1g})" for name, _, value, spread in found
+    )
+    cures = "; ".join(dict.fromkeys(CURES[stem] for _, stem, _, _ in found))
+    why = f"Freed from the bounds the data want {listed}, which no joint has: {cures}."
+    return Verdict(SCOPE, "physical", "fail", -worst, CERTAIN, why)
+
+
+def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
+    """Judge whether the search moved every parameter from where it began."""
+    layout, starts = experiment.layout, experiment.rung(experiment.observed).starts
+    apart = np.abs(starts - point) / layout.sd
+    stuck = [
+        name for name, far in zip(layout.names, apart.min(axis=0), strict=True) if far < UNMOVED
+    ]
+    value = float(apart.min())
+    if stuck:
+        why = (
+            f"{', '.join(stuck)} ended exactly where the search began, so the data do not move it: "
+            "record motion that depends on it, or choose a rung without it."
+        )
+        return Verdict(SCOPE, "start", "fail", value, UNMOVED, why)
+    why = "Every parameter moved from where the search began."
+    return Verdict(SCOPE, "start", "pass", value, UNMOVED, why)
+
+
+def bandwidth_verdict(
+    layout: Layout, draws: Array, here: Array, there: Array, cutoffs_Hz: tuple[float, float]
+) -> Verdict:
+    """Judge whether the estimate would be another one at another cutoff.
+
+    ``here`` and ``there`` (p,) are the optima at both cutoffs, ``draws`` (k, p) the posterior at
+    the first, all unconstrained. An error that is shared by both cancels; what is left is what the
+    filter does, and it must be small against the width that is claimed.
+    """
+    moved = np.abs(there - here) / draws.std(axis=0, ddof=1)
+    judged = [i for i, name in enumerate(layout.names) if name != "noise"]
+    worst = max(judged, key=lambda i: moved[i])
+    value, name = float(moved[worst]), layout.names[worst]
+    status: Status = "pass" if value <= MOVED_LIMIT else "fail"
+    why = (
+        f"With cutoff_Hz = {cutoffs_Hz[1]:.3g} in the place of {cutoffs_Hz[0]:.3g}, {name} moves "
+        f"by {value:.1f} of its standard deviations, more than any other parameter."
+    )
+    if status == "fail":
+        why += (
+            " So its interval does not say how uncertain it is: the joint moves unevenly faster "
+            "than the encoder can follow, or the law lacks something at that speed. Record "
+            "steadier sweeps, or with a finer encoder, and compare other cutoffs."
+        )
+    return Verdict(SCOPE, "bandwidth", status, value, MOVED_LIMIT, why)
+
+
+def _freed(
+    experiment: FrictionExperiment, point: Array, share: float
+) -> tuple[list[str], Array, Array]:
+    """Names, values and standard deviations of a free least-squares fit near an optimum."""
+    layout = experiment.layout
+    values = {name: float(value) for name, value in layout.natural(point).items()}
+    offered = []
+    if LawParts.of(str(experiment.key["law"])).base == "coulomb":
+        sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
+        offered = [f"viscous{side}" for side in sides]
+    names = [*(name for name in layout.names if name != "noise"), *offered]
+    columns = np.stack([_slope(experiment, values, name) for name in names], axis=1)
+    residuals = experiment.observed - experiment.mean_at(_arrays(values))
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    scaled = columns / np.where(size > 0, size, 1.0)
+    step = np.linalg.lstsq(scaled, residuals, rcond=1e-8)[0]
+    variance = float(np.var(residuals - scaled @ step)) / max(share, 1e-6)
+    covariance = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True) * variance
+    scale = np.where(size > 0, size, np.inf)
+    wanted = np.array([values.get(name, 0.0) for name in names]) + step / scale
+    return names, wanted, np.sqrt(np.diag(covariance)) / scale
+
+
+def _slope(experiment: FrictionExperiment, values: Mapping[str, float], name: str) -> Array:
+    """Derivative of the expected drive (n,) by one parameter in its own unit."""
+    value = values.get(name, 0.0)
+    reach = 1e-3 * abs(value) if value else 1e-3
+    above, below = (
+        experiment.mean_at(_arrays({**values, name: value + step})) for step in (reach, -reach)
+    )
+    return (above - below) / (2 * reach)
+
+
+def _arrays(values: Mapping[str, float]) -> dict[str, Array]:
+    return {name: np.asarray(value) for name, value in values.items()}
