@@ -1,14 +1,14 @@
 """A blade's edge from photographs: a posterior of e(s), alpha(s) and the height over the scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.blade_ladder import EdgeRung, fit_edge_rungs
 from scissorcal.calibration.blade_points import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.blade_result import Band, BladeFit, PhotographRow, RungRow
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
@@ -19,70 +19,13 @@ from scissorcal.vision.blade import BladeMeasurement
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
+ALGORITHM = 1
+"""Raised whenever a fit of the same photographs would give other numbers."""
+
 PLACES = 41
 MOST_SPOILT = 0.15
 MOST_DISAGREEMENT = 3.5
 HEIGHT_DRAWS = 400
-
-
-@dataclass(frozen=True)
-class Band:
-    """A quantity along the blade or over the scene: mean, sd and the 5 % and 95 % points."""
-
-    mean: Array
-    sd: Array
-    q05: Array
-    q95: Array
-
-
-@dataclass(frozen=True)
-class PhotographRow:
-    """What one photograph gave: its points, its blur, and how far it lies from the joint fit."""
-
-    source: str
-    points: int
-    blur_px: float
-    clear_share: float
-    spoilt_share: float
-    length: float
-    away: float
-    away_sd: float
-    seen: str
-
-
-@dataclass(frozen=True)
-class BladeFit:
-    """One blade fitted to all its photographs.
-
-    ``belief`` is what a cut's fit takes as prior; lengths are metres where ``metric``, else blade
-    lengths. ``station`` (n,) are places along the edge with the bands ``offset`` (e) and ``taper``
-    (alpha, rad). ``opening`` (i,) and ``contact`` (j,) span the scene, ``height`` (i, j) is phi
-    there, None without a scale or a recipe. ``length_sd`` is the spread of the length over the
-    photographs; ``pivot_sd`` what the edge moves by for the pivot's sake.
-    """
-
-    name: str
-    belief: EdgeBelief
-    draws: Array
-    rungs: tuple[EdgeRung, ...]
-    chosen: int
-    station: Array
-    offset: Band
-    taper: Band
-    nicks: tuple[FoundNick, ...]
-    photographs: tuple[PhotographRow, ...]
-    length_sd: float
-    pivot_sd: float
-    metric: bool
-    opening: Array
-    contact: Array
-    height: Band | None
-    verdicts: tuple[Verdict, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def family(self) -> str:
-        return self.rungs[self.chosen].family
 
 
 def fit_blade(
@@ -127,8 +70,7 @@ def fit_blade(
         name,
         best.belief,
         best.draws,
-        rungs,
-        chosen,
+        _rung_rows(rungs, chosen),
         station,
         _band(edges.offset_at(station)),
         _band(np.arctan(edges.slope_at(station))),
@@ -144,6 +86,21 @@ def fit_blade(
         _notes(sized, best, metric),
     )
     return replace(fit, verdicts=_verdicts(fit))
+
+
+def _rung_rows(rungs: Sequence[EdgeRung], chosen: int) -> tuple[RungRow, ...]:
+    return tuple(
+        RungRow(
+            rung.family,
+            rung.evidence,
+            index == chosen,
+            rung.noise_factor,
+            rung.roughness_m,
+            rung.roughness_length_m,
+            rung.between_m,
+        )
+        for index, rung in enumerate(rungs)
+    )
 
 
 def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
@@ -301,32 +258,3 @@ def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -
     )
     notes.append(best.status)
     return tuple(notes)
-
-
-def blade_facts(fit: BladeFit) -> dict[str, Any]:
-    """What people and programs read of a fit: plain numbers, units in the names."""
-    unit = "mm" if fit.metric else "per_length"
-    size = 1e3 if fit.metric else 1.0
-    middle = len(fit.station) // 2
-    return {
-        "name": fit.name,
-        "family": fit.family,
-        f"offset_at_middle_{unit}": float(fit.offset.mean[middle]) * size,
-        f"offset_at_middle_sd_{unit}": float(fit.offset.sd[middle]) * size,
-        "taper_at_middle_deg": float(np.degrees(fit.taper.mean[middle])),
-        "taper_at_middle_sd_deg": float(np.degrees(fit.taper.sd[middle])),
-        f"length_{unit}": fit.belief.edge.length_m * size,
-        "rungs": [
-            {"name": rung.family, "evidence": rung.evidence, "chosen": index == fit.chosen}
-            for index, rung in enumerate(fit.rungs)
-        ],
-        "nicks": [
-            {
-                f"station_{unit}": nick.station_m * size,
-                f"width_{unit}": nick.width_m * size,
-                f"depth_{unit}": nick.depth_m * size,
-                "source": nick.source,
-            }
-            for nick in fit.nicks
-        ],
-    }

@@ -11,7 +11,7 @@ from scissorcal.vision.blade import BladeMeasurement
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-MOST_CELLS = 900
+MOST_CELLS = 160
 """Cells over all photographs, so that a fit of many takes no longer than one of few."""
 
 CELLS_OF_ONE = 110
@@ -73,12 +73,12 @@ def edge_cells(measured: BladeMeasurement, cells: int) -> EdgeCells:
             nicks.append(found)
     in_nicks = sum(int(np.sum(_covers(measured.station, nick))) for nick in nicks)
     spoilt = max(float(np.sum(~keep)) - in_nicks, 0.0) / len(keep)
-    return _averaged(measured, keep, max(cells, 30), tuple(nicks), spoilt)
+    return _averaged(measured, keep, max(cells, 12), tuple(nicks), spoilt)
 
 
 def cells_each(photographs: int) -> int:
     """Cells per photograph that keep a joint fit small."""
-    return int(np.clip(MOST_CELLS // max(photographs, 1), 40, CELLS_OF_ONE))
+    return int(np.clip(MOST_CELLS // max(photographs, 1), 24, CELLS_OF_ONE))
 
 
 def _away_from_smooth(measured: BladeMeasurement) -> Array:

@@ -20,7 +20,9 @@ _COMMANDS = {
     "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
     "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
     "camera": ("scissorcal.cli.capture_camera:camera", "Photographs of the printed camera board."),
+    "blade": ("scissorcal.cli.capture_blade:blade", "Photographs of a blade on the printed mat."),
     "plate": ("scissorcal.cli.capture_plate:plate", "Photographs of the plate's target."),
+    "track": ("scissorcal.cli.capture_track:track", "The plate's pose, picture by picture."),
 }
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command("fit")
 @click.argument(
-    "what", type=click.Choice(["friction", "cut", "camera", "plate", "all"]), default="all"
+    "what", type=click.Choice(["friction", "cut", "camera", "blade", "plate", "all"]), default="all"
 )
 @click.option(
     "--effort",
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @workspace_option
 @command
 def fit(
-    what: Literal["friction", "cut", "camera", "plate", "all"],
+    what: Literal["friction", "cut", "camera", "blade", "plate", "all"],
     effort: Literal["draft", "standard"] | None,
     force: bool,
     seed: int,
@@ -58,6 +58,10 @@ def fit(
         from scissorcal.cli.fit_camera import fit_camera
 
         return fit_camera(folder, seed=seed, force=force)
+    if what == "blade":
+        from scissorcal.cli.fit_blade import fit_blade
+
+        return fit_blade(folder, effort=effort, seed=seed, force=force)
     if what == "plate":
         from scissorcal.cli.fit_plate import fit_plate
 

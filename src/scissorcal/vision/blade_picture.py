@@ -159,7 +159,8 @@ class _Canvas:
     def place(self, pixels: Array) -> NDArray[np.int32]:
         """Where pixels of the photograph lie on the canvas, in sixteenths."""
         there = (np.asarray(pixels) - self.origin + 0.5) * self.scale - 0.5
-        return np.rint(np.nan_to_num(there, nan=-1e4) * 2**_FINE).astype(np.int32)
+        sixteenths = np.rint(np.nan_to_num(there, nan=-1e4) * 2**_FINE)
+        return np.asarray(sixteenths, dtype=np.int32)
 
     def line(self, pixels: Array, colour: tuple[int, int, int], *, closed: bool = False) -> None:
         import cv2

@@ -1,6 +1,7 @@
 """Whole scissors in one outline: handles, blades, pivot and opening angle."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ def find_scissors(shape: Silhouette, source: str) -> Scissors:
     reach = float(away[first])
     if len(shape.cut_off) and rings:
         raise InputError(
-            f"{source}: the scissors are cut off by the picture's border: bring all of them into it."
+            f"{source}: the scissors are cut off by the border: bring all of them into the picture."
         )
     crotch = _crotch(shape, first, rings, reach)
     if crotch is None:
@@ -103,7 +104,8 @@ def _notches(outline: Array) -> list[tuple[int, int, int, float]]:
     scale = 1e4 / float(np.ptp(outline, axis=0).max())
     whole = np.rint((outline - outline.min(axis=0)) * scale).astype(np.int32)[:, None, :]
     hull = np.sort(cv2.convexHull(whole, returnPoints=False).ravel())[::-1]
-    defects = cv2.convexityDefects(whole, hull[:, None].astype(np.int32))
+    # None where the outline is convex, which OpenCV's types do not say
+    defects: Any = cv2.convexityDefects(whole, hull[:, None].astype(np.int32))
     if defects is None:
         return []
     return [

@@ -40,6 +40,24 @@ class Photograph(BaseModel):
     pixels: tuple[tuple[float, float], ...] = ()
 
 
+class BladeSetup(BaseModel):
+    """How a blade was laid down for its photographs.
+
+    ``both``: open scissors in place of one blade. ``mat``: on the printed blade mat; without it,
+    ``scale_mm_per_px`` or ``length_mm`` gives the size. ``edge_side``: the mat's rim that the edge
+    faces. ``pivot_px``: the pivot in the picture, where no hole shows it.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    both: bool = False
+    mat: bool = True
+    edge_side: Literal["down", "up"] = "down"
+    scale_mm_per_px: float | None = None
+    length_mm: float | None = None
+    pivot_px: tuple[float, float] | None = None
+
+
 class PhotoIndex(BaseModel):
     """What a folder of photographs says about itself."""
 
@@ -50,6 +68,7 @@ class PhotoIndex(BaseModel):
     board: CharucoBoard | MarkerBoard | Chessboard | None = Field(
         default=None, discriminator="kind"
     )
+    blade: BladeSetup | None = None
     photographs: tuple[Photograph, ...]
 
 
@@ -129,9 +148,15 @@ class PhotoWriter:
         self.photographs.append(photograph)
         return photograph
 
-    def finish(self, board: CharucoBoard | MarkerBoard | Chessboard | None) -> PhotoCapture:
+    def finish(
+        self,
+        board: CharucoBoard | MarkerBoard | Chessboard | None,
+        blade: BladeSetup | None = None,
+    ) -> PhotoCapture:
         """Write the index and let the capture be seen, all at once."""
-        index = PhotoIndex(kind=self.kind, board=board, photographs=tuple(self.photographs))
+        index = PhotoIndex(
+            kind=self.kind, board=board, blade=blade, photographs=tuple(self.photographs)
+        )
         (self.part / INDEX_FILE).write_text(index.model_dump_json(indent=1) + "\n", "utf-8")
         self.part.rename(self.folder)
         return PhotoCapture(self.folder, index)

@@ -1,0 +1,84 @@
+"""What ``scissorcal fit blade`` says."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.output import Answer, table
+from scissorcal.cli.progress import progress
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.blade_result import BladeFit
+    from scissorcal.workday.blades import BladeOutcome
+
+
+def fit_blade(
+    folder: Path | None,
+    *,
+    effort: Literal["draft", "standard", "thorough"] | None,
+    seed: int,
+    force: bool,
+) -> Answer:
+    """Fit a workspace's blade, where its photographs changed, and say what its edge is."""
+    from scissorcal.calibration.blade_result import blade_facts
+    from scissorcal.workday.blades import fit_workspace_blade
+
+    with progress() as tell:
+        outcome = fit_workspace_blade(
+            open_workspace(folder), effort=effort, seed=seed, force=force, progress=tell
+        )
+    result = outcome.result
+    facts = {
+        "cached": outcome.cached,
+        "blades": [blade_facts(fit) for fit in result.blades],
+        "openings": result.openings,
+        "inputs_hash": result.inputs_hash,
+        "pictures": outcome.pictures,
+        "notes": [note for fit in result.blades for note in fit.notes],
+    }
+    files = () if outcome.cached else (outcome.path, *outcome.pictures)
+    return Answer(facts, _text(outcome), result.verdicts, files)
+
+
+def _text(outcome: "BladeOutcome") -> str:
+    lines = ["blade: nothing changed since the last fit"] if outcome.cached else []
+    for fit in outcome.result.blades:
+        lines += [_head(fit), _places(fit), *_nicks(fit), *fit.notes[:-1]]
+    lines += [
+        f"{seen.source}: open by {57.29578 * seen.opening_rad:.2f} deg"
+        for seen in outcome.result.openings
+    ]
+    return "\n".join(lines)
+
+
+def _head(fit: "BladeFit") -> str:
+    count = len(fit.photographs)
+    length = fit.belief.edge.length_m
+    size = f"{1e3 * length:.2f} mm long" if fit.metric else "of unknown size"
+    return f"{fit.name}: {fit.family}, {size}, {count} photograph{'s' if count > 1 else ''}"
+
+
+def _places(fit: "BladeFit") -> str:
+    unit = "mm" if fit.metric else "lengths"
+    size = 1e3 if fit.metric else 1.0
+    head = [f"station {unit}", f"offset {unit}", "sd", "alpha deg", "sd"]
+    rows = [
+        [
+            f"{size * fit.station[index]:.4g}",
+            f"{size * fit.offset.mean[index]:.5g}",
+            f"{size * fit.offset.sd[index]:.2g}",
+            f"{57.29578 * fit.taper.mean[index]:.4f}",
+            f"{57.29578 * fit.taper.sd[index]:.2g}",
+        ]
+        for index in range(0, len(fit.station), 10)
+    ]
+    return table([head, *rows], right=range(5))
+
+
+def _nicks(fit: "BladeFit") -> list[str]:
+    size, unit = (1e3, "mm") if fit.metric else (100.0, "% of the length")
+    return [
+        f"nick {size * nick.station_m:.2f} {unit} from the pivot, {size * nick.width_m:.2f} wide, "
+        f"{size * nick.depth_m:.3f} deep ({nick.source})"
+        for nick in fit.nicks
+    ]
