@@ -38,15 +38,20 @@ def detection_overlay(photo: Photo, detection: Detection) -> Picture:
     return _labelled(canvas, words)
 
 
-def residual_overlay(photo: Photo, pixels: Array, residuals: Array, words: str = "") -> Picture:
+def residual_overlay(
+    photo: Photo, pixels: Array, residuals: Array, words: str = "", axes: Array | None = None
+) -> Picture:
     """Draw what is left between seen and predicted corners as arrows, with a bar for their scale.
 
     Arrows run from where the fit predicts a corner toward where it was seen. All are enlarged so
-    that the middle one is 3 % of the picture's width; those three times as long are red.
+    that the middle one is 3 % of the picture's width; those three times as long are red. ``axes``
+    (4, 2) are where a frame's origin and the ends of its x, y and z axes stand.
     """
     import cv2
 
     canvas, scale = _canvas(photo)
+    if axes is not None and np.all(np.isfinite(axes)):
+        _draw_axes(canvas, [_place(pixel, scale) for pixel in axes])
     length = np.linalg.norm(residuals, axis=1)
     middle = max(float(np.median(length)), 1e-3)
     magnified = _ARROW_SHARE * canvas.shape[1] / middle
@@ -89,6 +94,14 @@ def _canvas(photo: Photo) -> tuple[Picture, float]:
 def _place(pixel: Array, scale: float) -> tuple[int, int]:
     u, v = (np.asarray(pixel) + 0.5) * scale - 0.5
     return round(float(u)), round(float(v))
+
+
+def _draw_axes(canvas: Picture, ends: list[tuple[int, int]]) -> None:
+    import cv2
+
+    for name, colour, end in zip("xyz", (_RED, _GREEN, _BLUE), ends[1:], strict=True):
+        cv2.arrowedLine(canvas, ends[0], end, colour, 2, cv2.LINE_AA, tipLength=0.1)
+        _write(canvas, name, (end[0] + 6, end[1]))
 
 
 def _labelled(canvas: Picture, words: str) -> Picture:

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 Stances = Mapping[str, tuple[float, float]]
 """Where the rig stood in each photograph, by its name: advance in mm, opening in deg."""
 
+AXES_M = 0.03
+"""How long the axes of the plate's frame are drawn."""
+
 _KINDS: tuple[Literal["plate", "rig"], ...] = ("plate", "rig")
 
 
@@ -289,13 +292,14 @@ def _draw(
     for old in _pictures_of(path):
         old.unlink()
     pose = fit.camera_plate.after(plate_target(recipe))
+    axes = camera.project(fit.camera_plate.apply(AXES_M * np.eye(4, 3, -1)))
     drawn = []
     for capture in captures:
         for photograph in capture.index.photographs:
             found = detection_of(capture, photograph)
             photo = read_photo(capture.path(photograph), colour=False)
             left = found.pixels - camera.project(pose.apply(found.points))
-            picture = residual_overlay(photo, found.pixels, left)
+            picture = residual_overlay(photo, found.pixels, left, axes=axes)
             drawn.append(
                 write_picture(picture, path.with_suffix("") / f"{Path(photograph.file).stem}.png")
             )

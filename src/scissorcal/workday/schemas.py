@@ -21,11 +21,13 @@ SOURCES: Mapping[str, str] = {
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
+    "plate.schema.json": "scissorcal.calibration.plate_storage:PlateDocument",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
+    "track.schema.json": "scissorcal.workday.tracks:track_schema",
     "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or

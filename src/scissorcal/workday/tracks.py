@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -134,6 +134,15 @@ def read_track(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
         raise InputError(f"{path} is not a track of scissorcal, or it is damaged: {why}.") from None
 
 
+def track_schema() -> dict[str, Any]:
+    """JSON schema of a track's lines: the first is a head, each other one a row."""
+    from pydantic import TypeAdapter
+
+    schema: dict[str, Any] = TypeAdapter(TrackHead | TrackRow).json_schema()
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, "$id": "track.schema.json", **schema}
+
+
 def summary(path: Path, head: TrackHead, rows: Iterable[TrackRow]) -> TrackSummary:
     """Count a track's drop-outs by what they came from, and say how well its poses are known."""
     rows = tuple(rows)
@@ -169,8 +178,8 @@ def _counted(
             share = frame.time_s / seconds if seconds else 0.0
             done = frame.number / frame.count if frame.count else share
             lost = sum(row.pose is None for row in rows)
-            last = f", now {STATES[rows[-1].state]}" if rows else ""
-            progress(done, f"picture {frame.number}, {lost} without a pose{last}")
+            last = f"{STATES[rows[-1].state]}; " if rows else ""
+            progress(done, f"picture {frame.number}: {last}{lost} drop-outs so far")
         yield frame
 
 
