@@ -196,6 +196,8 @@ def _rows(
                 float(residual.mean()),
                 float(np.hypot(spread, best.between_m)),
                 one.uncertainty,
+                tuple(own.station.tolist()),
+                tuple(residual.tolist()),
             )
         )
     return tuple(rows)

@@ -47,7 +47,8 @@ class PhotographRow:
     """What one photograph gave: its points, its blur, and how far it lies from the joint fit.
 
     ``away`` is its mean residual, ``away_sd`` what that may be by its own pivot, centreline and
-    mapping.
+    mapping. ``station`` and ``residual`` are its points, averaged over short cells, and how far
+    they lie from the joint edge.
     """
 
     source: str
@@ -59,6 +60,8 @@ class PhotographRow:
     away: float
     away_sd: float
     seen: str
+    station: tuple[float, ...] = ()
+    residual: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
