@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "calibration": {"model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},
-    "report": {"model", "calibration", "package", "recipe", "recording"},
+    "report": {"model", "vision", "calibration", "package", "recipe", "recording"},
     "workday": LOWEST | MIDDLE,
     "cli": LOWEST | MIDDLE | {"workday"},
     "<root>": {"package"},
