@@ -107,6 +107,8 @@ class CutExperiment:
             starts=starts,
             prior_mean=np.concatenate([self.material.mean, self.belief.mean, self.friction.mean]),
             prior_precision=precision,
+            blocks=self.strokes,
+            populations=(self.blocks.place > 0).astype(np.int64),
         )
 
     def empty_drive(self, u: Array) -> Array:
