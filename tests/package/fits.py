@@ -1,6 +1,7 @@
 """Synthetic fits: what calibration would hand over, without fitting anything."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -148,4 +149,39 @@ def _result(
         position_unit="rad",
         inputs_hash=f"{what}-{seed}",
         sources=(f"{what}.mcap sha256:{seed:064x}",),
+    )
+
+
+def with_edge(fit: FitResult, edge: dict[str, Any], sds: dict[str, float]) -> FitResult:
+    """A cut that was fitted with ``edge``, whose fields ``sds`` were drawn about their values.
+
+    The best point is a third of a standard deviation away from the edge's own values.
+    """
+    rng = np.random.default_rng(7)
+    rows, columns, centre = [], [], []
+    for name, sd in sds.items():
+        stem, _, index = name.partition("spline_m_")
+        value = edge["spline_m"][int(index)] if index else edge[stem]
+        centre.append(value + sd / 3.0)
+        draws = centre[-1] + sd * rng.standard_normal(len(fit.draws))
+        columns.append(draws)
+        q05, q50, q95 = np.quantile(draws, [0.05, 0.5, 0.95])
+        rows.append(
+            FittedParameter(
+                name=f"edge_{name}",
+                unit="m",
+                mean=float(draws.mean()),
+                sd=float(draws.std()),
+                q05=float(q05),
+                q50=float(q50),
+                q95=float(q95),
+                identifiability=0.9,
+            )
+        )
+    return replace(
+        fit,
+        structure={**fit.structure, "edge": edge},
+        parameters=(*fit.parameters, *rows),
+        draws=np.column_stack([fit.draws, *columns]),
+        map_point=np.concatenate([fit.map_point, centre]),
     )

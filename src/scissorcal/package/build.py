@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,7 @@ from scissorcal.package.manifest import (
 )
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.review import Review
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe.schema import Edge, Recipe
 from scissorcal.verdicts import Verdict, failed
 
 MOST_DRAWS = 200
@@ -189,17 +190,12 @@ def _wanted(
             "'scissorcal fit friction' first, or set scene.render_friction = false."
         )
     structure = cut.structure
-    edge = recipe.rig.edge
     stated = {
         "scene.cut": (structure["fracture"] != "none", recipe.scene.cut),
         "scene.closure": (structure["closure"], recipe.scene.closure),
         "rig.moving": (structure["moving_blades"], recipe.rig.moving_blades),
         "material.thickness_mm": (structure["upper_face_m"], recipe.upper_face_m),
-        "rig.edge.family": (structure["edge"]["family"], edge.family),
-        "rig.edge.offset_mm": (structure["edge"]["offset_m"], edge.offset_mm * 1e-3),
-        "rig.edge.taper_deg": (structure["edge"]["taper_rad"], math.radians(edge.taper_deg)),
-        "rig.edge.length_mm": (structure["edge"]["length_m"], edge.length_mm * 1e-3),
-        "rig.edge.curvature_per_m": (structure["edge"]["curvature_per_m"], edge.curvature_per_m),
+        **_stated_edge(structure["edge"], recipe.rig.edge),
     }
     for key, (fitted, wanted) in stated.items():
         same = math.isclose(fitted, wanted) if isinstance(wanted, float) else fitted == wanted
@@ -209,6 +205,19 @@ def _wanted(
                 "'scissorcal fit' again."
             )
     return cut, friction
+
+
+def _stated_edge(fitted: Mapping[str, Any], edge: Edge) -> dict[str, tuple[Any, Any]]:
+    """The edge of a fit against the recipe's, which says nothing of one that was photographed."""
+    if edge.source == "photographs":
+        return {}
+    return {
+        "rig.edge.family": (fitted["family"], edge.family),
+        "rig.edge.offset_mm": (fitted["offset_m"], edge.offset_mm * 1e-3),
+        "rig.edge.taper_deg": (fitted["taper_rad"], math.radians(edge.taper_deg)),
+        "rig.edge.length_mm": (fitted["length_m"], edge.length_mm * 1e-3),
+        "rig.edge.curvature_per_m": (fitted["curvature_per_m"], edge.curvature_per_m),
+    }
 
 
 def _plate_record(plate: PlateFit) -> PlateRecord:
@@ -229,28 +238,26 @@ def _provenance(
     recipe: Recipe, cut: FitResult, friction: FitResult | None, plate: PlateFit | None
 ) -> Provenance:
     text = canonical(json.loads(recipe.model_dump_json()))
-    keys = CutStructure.model_fields.keys()
     return Provenance(
         scissorcal_version=scissorcal.__version__,
         recipe=text.decode("utf-8"),
         recipe_sha256=hashlib.sha256(text).hexdigest(),
         inputs_hash=package_inputs_hash(recipe, friction, cut, plate),
         cut=CutRecord(
-            **_record(cut), structure=CutStructure(**{key: cut.structure[key] for key in keys})
+            **_record(cut), structure=CutStructure(**_known(cut.structure, CutStructure))
         ),
         friction=None
         if friction is None
         else FrictionRecord(
             **_record(friction),
-            structure=FrictionStructure(
-                **{
-                    key: friction.structure[key]
-                    for key in FrictionStructure.model_fields
-                    if key in friction.structure
-                }
-            ),
+            structure=FrictionStructure(**_known(friction.structure, FrictionStructure)),
         ),
     )
+
+
+def _known(structure: Mapping[str, Any], kind: type[CutStructure | FrictionStructure]) -> Any:
+    """The part of a fit's structure that a manifest has a place for."""
+    return {key: structure[key] for key in kind.model_fields if key in structure}
 
 
 def _record(fit: FitResult) -> dict[str, Any]:

@@ -132,11 +132,25 @@ class Bound(Section):
 
 
 class EdgeStructure(Section):
-    family: Literal["line", "arc"]
+    """The edge that a cut was fitted with, as the recipe or photographs gave it.
+
+    Parameters of the fit that begin with ``edge_`` take the place of what stands here.
+    """
+
+    family: Literal["line", "arc", "cubic", "spline"]
     offset_m: Finite
     taper_rad: Finite
     length_m: Positive
     curvature_per_m: Finite
+    bend_per_m2: Finite = 0.0
+    spline_m: Annotated[tuple[Finite, ...], Strict(False), Field(max_length=64)] = ()
+    spline_start_m: Finite = 0.0
+
+    @model_validator(mode="after")
+    def _spline_has_weights(self) -> EdgeStructure:
+        if (self.family == "spline") != (len(self.spline_m) > 0):
+            raise ValueError('an edge has weights in spline_m where its family is "spline" only')
+        return self
 
 
 class CutStructure(Section):
@@ -184,7 +198,7 @@ class FitRecord(Section):
     effort: Literal["draft", "standard", "thorough"]
     inputs_hash: Annotated[str, Field(max_length=200)]
     sources: tuple[Text, ...]
-    parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=32)]
+    parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=128)]
     warnings: tuple[Text, ...]
 
 

@@ -1,0 +1,76 @@
+"""Edges that photographs gave: every family is compiled, and its uncertainty stands in the band."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import FitResult
+from scissorcal.errors import InputError
+from scissorcal.package import build_package, check_package, open_package
+from scissorcal.recipe.schema import Recipe
+from scissorcal.verdicts import failed
+from tests.package.fits import cut_fit, recipe, with_edge
+
+PLACES = np.array([0.015, 0.022, 0.03])
+EDGES: dict[str, dict[str, Any]] = {
+    "line": {},
+    "arc": {"curvature_per_m": 0.4},
+    "cubic": {"curvature_per_m": 0.4, "bend_per_m2": -8.0},
+    "spline": {"spline_m": [0.0, 2e-5, -3e-5, 4e-5, 1e-5, 0.0], "spline_start_m": 0.01},
+}
+
+
+def photographed() -> Recipe:
+    chosen = recipe(render_friction=False)
+    edge = chosen.rig.edge.model_copy(update={"source": "photographs"})
+    return chosen.model_copy(update={"rig": chosen.rig.model_copy(update={"edge": edge})})
+
+
+def fit_with(family: str, sd: float, **cut: Any) -> FitResult:
+    """A cut whose edge is not the recipe's, with offset and shape among what was drawn."""
+    edge = {"family": family, "offset_m": -0.0083, "taper_rad": 0.03, "length_m": 0.071}
+    edge |= {"curvature_per_m": 0.0, **EDGES[family]}
+    sds = {"offset_m": 1e-4 * sd, "taper_rad": 2e-3 * sd}
+    if family == "cubic":
+        sds["bend_per_m2"] = 0.5 * sd
+    if family == "spline":
+        sds |= {f"spline_m_{i}": 5e-6 * sd for i in range(6)}
+    return with_edge(cut_fit(photographed(), **cut), edge, sds)
+
+
+@pytest.mark.parametrize("family", list(EDGES))
+def test_a_photographed_edge_of_any_family_is_carried(family: str, tmp_path: Path) -> None:
+    fit = fit_with(family, 1.0)
+    summary = build_package(photographed(), None, fit, tmp_path / "p.zip", np.random.default_rng(1))
+    package = open_package(summary.path)
+    assert not [v for v in failed(check_package(summary.path)) if v.check != "review"]
+    assert package.manifest.provenance.cut.structure.edge.family == family
+    names = [parameter.name for parameter in fit.parameters]
+    centre = fit.map_point[names.index("edge_offset_m")]
+    assert package.exact.cutting.edge.offset_m == centre
+    assert centre != fit.structure["edge"]["offset_m"]
+    table = package.arrays["tables/edge.npy"]
+    assert table[1] == pytest.approx(package.exact.cutting.edge.offset_at(table[0]), abs=1e-8)
+
+
+@pytest.mark.parametrize("family", ["line", "spline"])
+def test_what_is_open_of_an_edge_widens_the_band(family: str, tmp_path: Path) -> None:
+    """Draws of the law are the same in both packages; only those of the edge differ."""
+    widths = []
+    for sd in (1e-3, 1.0):
+        path = tmp_path / f"{sd}.zip"
+        fit = fit_with(family, sd, spread=0.001)
+        build_package(photographed(), None, fit, path, np.random.default_rng(1))
+        low, high = open_package(path).band(np.radians(25.0), -0.2, PLACES)
+        widths.append(high - low)
+    assert np.all(widths[1] > 3.0 * widths[0])
+
+
+def test_an_edge_of_a_recipe_is_still_held_to_it(tmp_path: Path) -> None:
+    fit = fit_with("arc", 1.0)
+    with pytest.raises(InputError, match=r"rig\.edge\.family"):
+        build_package(
+            recipe(render_friction=False), None, fit, tmp_path / "p.zip", np.random.default_rng(1)
+        )
