@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,26 +132,34 @@ def _log_joint(problem: LinearProblem, u: Array) -> float:
 
 @dataclass(frozen=True)
 class _Given:
-    """The linear parameters given the others, in coordinates z in which the prior is standard.
+    """The linear parameters given the others: normal in z, where beta = mean + root z.
 
-    ``residuals`` (n,) are those at the conditional mean over ``log_sd``'s exponential.
+    ``z`` (q,) is the conditional mean and ``precision_root`` (q, q) the Cholesky root of its
+    precision, in coordinates in which the prior is standard normal; ``log_sd`` is by observation
+    (n,), ``left`` are measured minus offset (n,).
     """
 
-    mean: Array
+    z: Array
     precision_root: Array
+    beta: Array
     root: Array
-    offset: Array
-    residuals: Array
+    left: Array
+    design: Array
     log_sd: Array
 
     @property
     def log_volume(self) -> float:
         """log p(b) - log p(b | y), up to a constant."""
-        return float(-0.5 * self.mean @ self.mean - np.log(np.diag(self.precision_root)).sum())
+        return float(-0.5 * self.z @ self.z - np.log(np.diag(self.precision_root)).sum())
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Standardised residuals (n,) at the conditional mean."""
+        return np.asarray((self.left - self.design @ self.beta) * np.exp(-self.log_sd))
 
     def draw(self, normal: Array) -> Array:
-        z = self.mean + np.linalg.solve(self.precision_root.T, normal)
-        return np.asarray(self.offset + self.root @ z)
+        """Linear parameters (q,) from standard normal numbers (q,)."""
+        return np.asarray(self.beta + self.root @ np.linalg.solve(self.precision_root.T, normal))
 
 
 class _Conditional:
@@ -168,21 +177,21 @@ class _Conditional:
         return self.last[1]
 
     def _worked_out(self, theta: Array) -> _Given:
-        problem = self.problem
+        problem, root = self.problem, self.root
         offset, design = problem.design_at(theta)
-        log_sd = np.broadcast_to(problem.log_sd_at(theta), problem.measured.shape).astype(float)
-        shrink = np.exp(-log_sd)
-        away = (problem.measured - offset - design @ problem.linear_mean) * shrink
-        columns = shrink[:, None] * (design @ self.root)
-        if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(away))):
-            size = len(problem.linear_mean)
+        log_sd = np.asarray(problem.log_sd_at(theta), dtype=np.float64)
+        weight = np.exp(-2 * log_sd)
+        weighed = design if log_sd.ndim == 0 else design * weight[:, None]
+        factor = float(weight) if log_sd.ndim == 0 else 1.0
+        left = problem.measured - offset
+        gram = np.asarray(factor * (weighed.T @ design), dtype=np.float64)
+        pull = factor * (weighed.T @ left) - gram @ problem.linear_mean
+        size = len(pull)
+        every = np.broadcast_to(log_sd, left.shape)
+        if not (np.all(np.isfinite(gram)) and np.all(np.isfinite(pull))):
             nowhere = np.full(size, np.nan)
-            return _Given(
-                nowhere, np.eye(size), self.root, problem.linear_mean, away * np.nan, log_sd
-            )
-        precision_root = np.linalg.cholesky(np.eye(columns.shape[1]) + columns.T @ columns)
-        half = np.linalg.solve(precision_root, columns.T @ away)
-        mean = np.linalg.solve(precision_root.T, half)
-        return _Given(
-            mean, precision_root, self.root, problem.linear_mean, away - columns @ mean, log_sd
-        )
+            return _Given(nowhere, np.eye(size), nowhere, root, left, design, every)
+        precision_root: Array = np.asarray(np.linalg.cholesky(np.eye(size) + root.T @ gram @ root))
+        z = np.linalg.solve(precision_root.T, np.linalg.solve(precision_root, root.T @ pull))
+        beta = problem.linear_mean + root @ z
+        return _Given(z, precision_root, beta, root, left, design, every)
