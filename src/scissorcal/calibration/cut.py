@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.cut_experiment import CutExperiment
 from scissorcal.calibration.cut_ladder import climb_cut_ladder, cut_design, cut_designs
 from scissorcal.calibration.cut_motion import CutMotion, cut_motion
+from scissorcal.calibration.cut_toughness import with_toughness
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import choose
 from scissorcal.calibration.result import Effort, FitResult
@@ -29,6 +31,8 @@ CUTOFF_HZ = 300.0
 """The latter leaves the ripple to the averaging over bins, whose effect is known exactly."""
 
 DRAWS = 1000
+STANDARD_BUDGET = 20_000
+"""Evaluations of the likelihood, of some milliseconds each, that standard effort may take."""
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
 """Torque counts as contact from this many standard deviations of the empty sweeps' noise."""
@@ -43,6 +47,7 @@ def fit_cut(
     rng: np.random.Generator,
     progress: Progress | None = None,
     edge: EdgeBelief | None = None,
+    checkpoint: Path | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses).
 
@@ -52,7 +57,8 @@ def fit_cut(
     sheet's edge and runs as the model says. A rippling fracture shows as variance: its bins have
     the variance that a saw-tooth between kappa g_c and g_c keeps after averaging over a bin.
 
-    Raises InputError where the blades hardly touched the material.
+    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
+    InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
     belief = edge or edge_of(recipe)
@@ -66,14 +72,16 @@ def fit_cut(
     tell(0.5, f"cut: inferring {chosen.rung.name}")
     posterior = infer(
         chosen.rung.problem(motion.bins.series),
-        "draft" if effort == "draft" else "standard",
+        effort,
         rng,
         count=DRAWS,
         optimum=chosen.optimum,
+        budget=STANDARD_BUDGET if effort == "standard" else None,
+        checkpoint=checkpoint,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
     u = chosen.optimum.point
-    return assemble(
+    fit = assemble(
         what="cut",
         effort=effort,
         posterior=posterior,
@@ -97,6 +105,7 @@ def fit_cut(
         rng=rng,
         critic=recipe.fit.cut.critic,
     )
+    return with_toughness(fit, recipe, rng)
 
 
 def cut_experiment(
@@ -150,7 +159,7 @@ def settings_of(recipe: Recipe) -> str:
     return recipe.model_dump_json(
         include={
             "rig": {"joint", "moving", "handle_radius_mm", "edge"},
-            "material": {"thickness_mm"},
+            "material": {"thickness_mm", "thickness_sd_mm"},
             "scene": {"cut", "closure"},
             "fit": {"cut", "friction"},
         }

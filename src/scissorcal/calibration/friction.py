@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,7 @@ def fit_friction(
     effort: Effort,
     rng: np.random.Generator,
     progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -61,7 +63,8 @@ def fit_friction(
     cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
     for a rotary joint and for a linear one; units follow the recordings' joint.
 
-    Raises InputError where the recordings hold too little motion, and says what is missing.
+    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
+    InputError where the recordings hold too little motion, and says what is missing.
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
@@ -83,8 +86,9 @@ def fit_friction(
     tell(0.6, f"friction: inferring {chosen.rung.name}")
     posterior = infer(
         chosen.rung.problem(bins.series),
-        "draft" if effort == "draft" else "standard",
+        effort,
         rng,
+        checkpoint=checkpoint,
         optimum=chosen.optimum,
         progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
     )
@@ -238,7 +242,7 @@ def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None
     named = "" if settings.rung == "auto" else settings.rung
     wanted = [f'fit.friction.rung = "{named}"'] if LawParts.of(named).load else []
     wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
-    if wanted and windows.load is None:
+    if wanted and not windows.bears_load:
         raise InputError(
             f"{wanted[0]} needs the load that the joint bears, and these recordings have none: "
             "record sweeps in which motor and handle work against each other (motor_torque and "
@@ -281,8 +285,4 @@ def _ladder(
 
 def _laws(windows: Windows) -> tuple[str, ...]:
     """Laws to be compared, cheapest first: those of the load only where one was measured."""
-    return (
-        LAWS
-        if windows.load is not None
-        else tuple(law for law in LAWS if not LawParts.of(law).load)
-    )
+    return LAWS if windows.bears_load else tuple(law for law in LAWS if not LawParts.of(law).load)

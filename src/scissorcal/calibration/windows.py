@@ -66,6 +66,15 @@ class Windows:
         view = sliding_window_view(values, len(self.weights), axis=0)
         return np.asarray(view[self.first] @ self.weights)
 
+    @property
+    def bears_load(self) -> bool:
+        """Whether the passive end bears a load that a friction law can depend on."""
+        if self.load is None:
+            return False
+        load, drive = self.average(self.load), self.bins.drive
+        least = LOADED * float(np.std(drive))
+        return bool(np.std(load) > least and np.std(drive + load) > least)
+
     def where(self, keep: Mask) -> "Windows":
         """Return the windows that ``keep`` (n,) selects, over the same samples."""
         return replace(
@@ -114,8 +123,7 @@ def weigh(
         raise InputError(
             "The recordings have different sampling rates; fit those of one rate together."
         )
-    joined = _joined(pieces, loaded)
-    return joined if _bears_load(joined) else replace(joined, load=None)
+    return _joined(pieces, loaded)
 
 
 def next_cutoff(windows: Windows) -> float | None:
@@ -146,16 +154,6 @@ def _joined(pieces: list[Windows], loaded: bool) -> Windows:
         tick_s=pieces[0].tick_s,
         held=all(piece.held for piece in pieces),
     )
-
-
-def _bears_load(joined: Windows) -> bool:
-    """Whether the passive end bears a load that a friction law can depend on."""
-    if joined.load is None:
-        return False
-    load, drive = joined.average(joined.load), joined.bins.drive
-    motor = drive + load
-    least = LOADED * float(np.std(drive))
-    return bool(np.std(load) > least and np.std(motor) > least)
 
 
 def _weigh_piece(

@@ -26,14 +26,14 @@ _ANSWERS = {True: "yes", False: "no", None: "-"}
 @click.option("--recipe", default="paper-80gsm", show_default=True, help="A built-in recipe.")
 @click.option(
     "--effort",
-    type=click.Choice(["draft", "standard"]),
+    type=click.Choice(["draft", "standard", "thorough"]),
     default=None,
     help="Effort of the fits; the recipe's if not given.",
 )
 @seed_option
 @command
 def demo(
-    folder: Path, recipe: str, effort: Literal["draft", "standard"] | None, seed: int
+    folder: Path, recipe: str, effort: Literal["draft", "standard", "thorough"] | None, seed: int
 ) -> Answer:
     """Run the whole day on a virtual rig: capture, fit, report, package, render.
 

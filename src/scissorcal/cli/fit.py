@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from scissorcal.calibration import FittedParameter
     from scissorcal.workday.fits import FitOutcome
 
+EffortWord = Literal["draft", "standard", "thorough"]
+
 
 @click.command("fit")
 @click.argument(
@@ -21,9 +23,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--effort",
-    type=click.Choice(["draft", "standard"]),
+    type=click.Choice(["draft", "standard", "thorough"]),
     default=None,
-    help="draft: quick, intervals unchecked; standard: checked. The recipe's if not given.",
+    help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of walkers, "
+    "goes on where it was interrupted. The recipe's if not given.",
 )
 @click.option("--force", is_flag=True, help="Fit again even where nothing changed.")
 @seed_option
@@ -31,15 +34,15 @@ if TYPE_CHECKING:
 @command
 def fit(
     what: Literal["friction", "cut", "camera", "blade", "plate", "all"],
-    effort: Literal["draft", "standard"] | None,
+    effort: EffortWord | None,
     force: bool,
     seed: int,
     folder: Path | None,
 ) -> Answer:
-    """Fit friction and the cut, as far as the scene requires them; or the camera.
+    """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
 
-    A fit whose recordings, photographs and settings have not changed is not done again. The
-    camera's fit has one effort.
+    A fit whose recordings, photographs and settings have not changed is not done again. Camera
+    and plate have one effort.
 
     \b
     Example:
@@ -52,8 +55,23 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
-    from scissorcal.workday.fits import fit_workspace
+    if what == "camera" or what == "blade" or what == "plate":
+        return _geometry(what, folder, effort=effort, seed=seed, force=force)
+    if what == "all":
+        from scissorcal.recipe.requirements import requirements
 
+        needed = requirements(open_workspace(folder).recipe()).geometry
+        before = [
+            (item.name, _geometry(item.name, folder, effort=effort, seed=seed, force=force))
+            for item in needed
+        ]
+        return _together(before, _fits((), folder, effort=effort, seed=seed, force=force))
+    return _fits((what,), folder, effort=effort, seed=seed, force=force)
+
+
+def _geometry(
+    what: str, folder: Path | None, *, effort: EffortWord | None, seed: int, force: bool
+) -> Answer:
     if what == "camera":
         from scissorcal.cli.fit_camera import fit_camera
 
@@ -62,15 +80,35 @@ def fit(
         from scissorcal.cli.fit_blade import fit_blade
 
         return fit_blade(folder, effort=effort, seed=seed, force=force)
-    if what == "plate":
-        from scissorcal.cli.fit_plate import fit_plate
+    from scissorcal.cli.fit_plate import fit_plate
 
-        return fit_plate(folder, force=force)
-    workspace = open_workspace(folder)
-    wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
+    return fit_plate(folder, force=force)
+
+
+def _together(before: "list[tuple[str, Answer]]", last: Answer) -> Answer:
+    """One answer of several; what geometry's fits found stands below their names."""
+    answers = [answer for _, answer in before] + [last]
+    return Answer(
+        {**last.result, "geometry": {name: answer.result for name, answer in before}},
+        "\n\n".join(answer.text for answer in answers),
+        verdicts=[verdict for answer in answers for verdict in answer.verdicts],
+        files=[file for answer in answers for file in answer.files],
+    )
+
+
+def _fits(
+    wanted: "tuple[Literal['friction', 'cut'], ...]",
+    folder: Path | None,
+    *,
+    effort: EffortWord | None,
+    seed: int,
+    force: bool,
+) -> Answer:
+    from scissorcal.workday.fits import fit_workspace
+
     with progress() as tell:
         outcomes = fit_workspace(
-            workspace, wanted, effort=effort, seed=seed, force=force, progress=tell
+            open_workspace(folder), wanted, effort=effort, seed=seed, force=force, progress=tell
         )
     fits = [
         {
@@ -95,11 +133,11 @@ def fit(
         "parameters": [
             parameter.as_dict()
             for outcome in outcomes
-            for parameter in outcome.result.parameters
+            for parameter in _reported(outcome)
             if not outcome.result.rejected
         ],
         "not_a_calibration": {
-            outcome.what: [parameter.as_dict() for parameter in outcome.result.parameters]
+            outcome.what: [parameter.as_dict() for parameter in _reported(outcome)]
             for outcome in outcomes
             if outcome.result.rejected
         },
@@ -120,15 +158,19 @@ def _text(outcome: "FitOutcome") -> str:
         head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
     if fitted.rejected:
         reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
-        shown = parameter_table(fitted.parameters).replace("\n", "\n  ")
+        shown = parameter_table(_reported(outcome)).replace("\n", "\n  ")
         return (
             f"{outcome.what}: not a calibration:\n{reasons}\n"
             f"{head}; the search ended with these numbers, which are not to be used:\n  {shown}"
         )
-    said = [head, parameter_table(fitted.parameters), fitted.selection]
+    said = [head, parameter_table(_reported(outcome)), fitted.selection]
     said += [proposal.sentence for proposal in fitted.critic]
     said += [fitted.replay.sentence] if fitted.replay else []
     return "\n".join(line for line in said if line)
+
+
+def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
+    return (*outcome.result.parameters, *outcome.result.derived)
 
 
 def parameter_table(parameters: "tuple[FittedParameter, ...]") -> str:

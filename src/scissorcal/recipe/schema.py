@@ -17,9 +17,15 @@ FORMAT = "scissorcal-recipe/1"
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=1000)]
 Range = Annotated[tuple[Finite, Finite], Strict(False)]
-Speeds = Annotated[tuple[Positive, ...], Strict(False), Field(min_length=1)]
+
+Length_mm = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+"""No blade, handle or contact of scissors is longer than a metre: beyond it a unit went wrong."""
+
+Thickness_mm = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+Speed_rad_per_s = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+Speeds = Annotated[tuple[Speed_rad_per_s, ...], Strict(False), Field(min_length=1, max_length=100)]
 FrictionRung = Literal[
     "coulomb",
     "coulomb+angle",
@@ -81,8 +87,8 @@ class LogNormalPrior(Section):
     ``{ median = 3000, factor_90 = 10 }`` says: between 300 and 30000 with 90 % probability.
     """
 
-    median: Positive
-    factor_90: Annotated[float, Field(gt=1, allow_inf_nan=False)]
+    median: Annotated[float, Field(ge=1e-9, le=1e9, allow_inf_nan=False)]
+    factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
 
     @property
     def log_sd(self) -> float:
@@ -99,12 +105,12 @@ class Edge(Section):
 
     source: Literal["recipe", "photographs"] = "recipe"
     family: Literal["line", "arc"] = "line"
-    offset_mm: Finite
+    offset_mm: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
     taper_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)]
-    curvature_per_m: Finite = 0.0
-    length_mm: Positive
-    offset_sd_mm: NonNegative = 0.0
-    taper_sd_deg: NonNegative = 0.0
+    curvature_per_m: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)] = 0.0
+    length_mm: Length_mm
+    offset_sd_mm: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 0.0
+    taper_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] = 0.0
 
     @model_validator(mode="after")
     def _curvature_needs_arc(self) -> Edge:
@@ -129,7 +135,7 @@ class Rig(Section):
 
     joint: Literal["rotary", "linear"] = "rotary"
     moving: Literal["both", "upper"] = "both"
-    handle_radius_mm: Positive = 60.0
+    handle_radius_mm: Length_mm = 60.0
     edge: Edge
     control: Control = Control()
 
@@ -139,11 +145,25 @@ class Rig(Section):
 
 
 class Material(Section):
-    """The plate that is cut or pressed. Its near edge is the zero of ``advance``."""
+    """The plate that is cut or pressed. Its near edge is the zero of ``advance``.
+
+    ``thickness_sd_mm`` says how well the thickness is known (standard deviation). Where it is
+    given, the fit of a cut states the toughness J_c beside the fracture energy J_c h.
+    """
 
     name: str
-    thickness_mm: Positive
-    sheet_length_mm: Positive = 200.0
+    thickness_mm: Thickness_mm
+    thickness_sd_mm: Annotated[float, Field(ge=0, le=50, allow_inf_nan=False)] | None = None
+    sheet_length_mm: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 200.0
+
+    @model_validator(mode="after")
+    def _thickness_is_known_to_half(self) -> Material:
+        if self.thickness_sd_mm is not None and self.thickness_sd_mm > 0.5 * self.thickness_mm:
+            raise ValueError(
+                f"thickness_sd_mm = {self.thickness_sd_mm:g} is more than half of thickness_mm = "
+                f"{self.thickness_mm:g}: measure the plate better, or leave thickness_sd_mm out"
+            )
+        return self
 
 
 class Scene(Section):
@@ -157,8 +177,8 @@ class Scene(Section):
     opening_deg: Range
     opening_rate_rad_per_s: Range
     contact_mm: Range
-    loop_rate_Hz: Positive = 1000.0
-    tolerance_percent: Positive = 7.0
+    loop_rate_Hz: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 1000.0
+    tolerance_percent: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 7.0
     confidence_percent: Annotated[float, Field(gt=50, lt=100)] = 95.0
 
     @model_validator(mode="after")
@@ -169,6 +189,10 @@ class Scene(Section):
                 raise ValueError(f"{name} must be [low, high] with 0 <= low < high")
         if self.opening_deg[1] > 180:
             raise ValueError("opening_deg must not exceed 180: it is the angle between the blades")
+        if self.opening_rate_rad_per_s[1] > 100:
+            raise ValueError("opening_rate_rad_per_s must not exceed 100: no hand closes faster")
+        if self.contact_mm[1] > 1000:
+            raise ValueError("contact_mm must not exceed 1000: it is a place along the blades")
         return self
 
     @property
@@ -197,11 +221,11 @@ class Plate(Section):
 class Limits(Section):
     """What the loop never exceeds, whatever the model says."""
 
-    torque_Nm: Positive = 1.0
-    torque_slew_Nm_per_s: Positive = 200.0
-    force_N: Positive = 30.0
-    force_slew_N_per_s: Positive = 5000.0
-    engagement_ramp_s: Positive = 0.5
+    torque_Nm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)] = 1.0
+    torque_slew_Nm_per_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)] = 200.0
+    force_N: Annotated[float, Field(gt=0, le=1e5, allow_inf_nan=False)] = 30.0
+    force_slew_N_per_s: Annotated[float, Field(gt=0, le=1e8, allow_inf_nan=False)] = 5000.0
+    engagement_ramp_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] = 0.5
 
 
 class CaptureFriction(Section):
@@ -209,7 +233,7 @@ class CaptureFriction(Section):
 
     speeds_rad_per_s: Speeds = (0.05, 0.12, 0.3, 0.7, 1.5)
     repeats: Count = 2
-    excitation_s: Positive = 10.0
+    excitation_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 10.0
 
 
 class CaptureCut(Section):
@@ -236,7 +260,7 @@ class FitFriction(Section):
     rung: Literal["auto"] | FrictionRung = "auto"
     symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
     adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
-    cutoff_Hz: Positive = 75.0
+    cutoff_Hz: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 75.0
     critic: bool = True
 
 
@@ -245,7 +269,7 @@ class FitCut(Section):
 
     response: Literal["auto", "power", "exponential"] = "auto"
     fracture: Literal["auto", "smooth", "rippled"] = "auto"
-    reference_indentation_mm: Positive = 0.3
+    reference_indentation_mm: Annotated[float, Field(ge=1e-6, le=100, allow_inf_nan=False)] = 0.3
     response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
     response_exponent: LogNormalPrior = LogNormalPrior(median=1.5, factor_90=3.0)
     toughness_J_per_m2: LogNormalPrior | None = None
@@ -253,7 +277,7 @@ class FitCut(Section):
 
 
 class Fit(Section):
-    effort: Literal["draft", "standard"] = "standard"
+    effort: Literal["draft", "standard", "thorough"] = "standard"
     friction: FitFriction = FitFriction()
     cut: FitCut = FitCut()
 

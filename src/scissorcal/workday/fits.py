@@ -166,14 +166,21 @@ def _fit(
     path = workspace.fit_path(what)
     edge = edge_belief(workspace, recipe) if friction else None
     upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
+    expected = expected_hash(workspace, recipe, what, chosen, upstream)
     if path.is_file() and not force:
         stored = load_fit(path)
-        if stored.inputs_hash == expected_hash(workspace, recipe, what, chosen, upstream):
+        if stored.inputs_hash == expected:
             return FitOutcome(what, stored, path, cached=True)
     rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
+    checkpoint = workspace.checkpoint_path(what, expected)
     if friction is None:
         result = fit_friction(
-            usable.recordings, recipe.fit.friction, effort=chosen, rng=rng, progress=progress
+            usable.recordings,
+            recipe.fit.friction,
+            effort=chosen,
+            rng=rng,
+            progress=progress,
+            checkpoint=checkpoint,
         )
     else:
         result = fit_cut(
@@ -184,8 +191,10 @@ def _fit(
             rng=rng,
             progress=progress,
             edge=edge,
+            checkpoint=checkpoint,
         )
     save_fit(result, path)
+    checkpoint.unlink(missing_ok=True)
     return FitOutcome(what, result, path, cached=False)
 
 

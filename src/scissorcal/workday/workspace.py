@@ -79,6 +79,10 @@ class Workspace:
     def verify_partial_path(self, what: FitKind) -> Path:
         return self.root / "fits" / f"{what}.verify.partial.jsonl"
 
+    def checkpoint_path(self, what: FitKind, inputs_hash: str) -> Path:
+        """Where a thorough fit of these inputs keeps how far it got."""
+        return self.root / "fits" / f"{what}-{inputs_hash[:12]}.chains"
+
     def package_path(self, recipe: "Recipe") -> Path:
         return self.root / "package" / f"{recipe.name}.zip"
 
