@@ -81,6 +81,37 @@ def test_builtin_recipes_load(name: str) -> None:
         ),
         (
             "thickness_mm = 0.10",
+            "thickness_mm = 1e300",
+            "material.thickness_mm: 1e+300 must be at most 100.",
+        ),
+        (
+            "thickness_mm = 0.10",
+            "thickness_mm = 0.10\nthickness_sd_mm = 0.2",
+            "material.thickness_sd_mm: thickness_sd_mm = 0.2 is more than half of thickness_mm = "
+            "0.1: measure the plate better, or leave thickness_sd_mm out.",
+        ),
+        (
+            "length_mm = 75.0",
+            "length_mm = 75000.0",
+            "rig.edge.length_mm: 75000.0 must be at most 1000.",
+        ),
+        (
+            "contact_mm = [15.0, 60.0]",
+            "contact_mm = [15.0, 60000.0]",
+            "scene.contact_mm: contact_mm must not exceed 1000: it is a place along the blades.",
+        ),
+        (
+            "force_N = 30.0",
+            "force_N = 1e300",
+            "limits.force_N: 1e+300 must be at most 100000.",
+        ),
+        (
+            "repeats = 2",
+            "repeats = 1000000000",
+            "capture.friction.repeats: 1000000000 must be at most 1000.",
+        ),
+        (
+            "thickness_mm = 0.10",
             'thickness_mm = "0.10"',
             'material.thickness_mm: "0.10" is text, but this must be a number such as 0.1. Write '
             "0.10 without quotes.",

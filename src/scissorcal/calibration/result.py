@@ -159,6 +159,8 @@ class FitResult:
     ``critic`` holds what the critic proposes, ``replay`` the comparison with record-and-replay.
     ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and ``nuisance_draws``
     (draws, nuisance) are the parameters that nobody asked for, row by row with ``draws``.
+    ``derived`` follow from parameters and what the recipe states, with ``derived_draws`` (draws,
+    derived) row by row; no law needs them.
     ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
     ``inputs_hash`` identifies recordings, recipe and settings: equal hashes need no second fit.
     """
@@ -186,6 +188,8 @@ class FitResult:
     prior_draws: NDArray[np.float64] | None = None
     nuisance: tuple[FittedParameter, ...] = ()
     nuisance_draws: NDArray[np.float64] | None = None
+    derived: tuple[FittedParameter, ...] = ()
+    derived_draws: NDArray[np.float64] | None = None
 
     @property
     def rejected(self) -> tuple[Verdict, ...]:

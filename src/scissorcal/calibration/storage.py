@@ -37,7 +37,7 @@ def save_fit(result: FitResult, path: Path) -> None:
 
     Group ``posterior`` has every parameter over (chain, draw) as ArviZ expects it;
     ``prior`` draws of the prior where there are any, ``nuisance_posterior`` the draws of nuisance
-    parameters, ``observed_data`` the band-limited data, ``constant_data`` what belongs to each
+    parameters, ``derived_posterior`` those of what follows from them, ``observed_data`` the band-limited data, ``constant_data`` what belongs to each
     point, ``posterior_predictive`` the mean's 5 % and 95 %. All else stands as JSON in the
     attribute ``scissorcal`` of ``posterior``.
     """
@@ -91,6 +91,8 @@ def _groups(result: FitResult, posterior: "xarray.Dataset") -> dict[str, "xarray
         groups["prior"] = _draws_group(result.parameters, result.prior_draws)
     if result.nuisance_draws is not None and result.nuisance:
         groups["nuisance_posterior"] = _draws_group(result.nuisance, result.nuisance_draws)
+    if result.derived_draws is not None and result.derived:
+        groups["derived_posterior"] = _draws_group(result.derived, result.derived_draws)
     return groups
 
 
@@ -107,6 +109,7 @@ def load_fit(path: Path) -> FitResult:
             _refuse_later(path, str(posterior.attrs.get("format", "of no version")))
         parameters = _rows(FittedParameter, facts["parameters"])
         nuisance = _rows(FittedParameter, facts.get("nuisance", ()))
+        derived = _rows(FittedParameter, facts.get("derived", ()))
         draws = _read_draws(path, "posterior", parameters)
         prior = _read_draws(path, "prior", parameters) if facts.get("has_prior") else None
         others = _read_draws(path, "nuisance_posterior", nuisance) if nuisance else None
@@ -139,6 +142,8 @@ def load_fit(path: Path) -> FitResult:
             prior_draws=prior,
             nuisance=nuisance,
             nuisance_draws=others,
+            derived=derived,
+            derived_draws=_read_draws(path, "derived_posterior", derived) if derived else None,
         )
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise InputError(
@@ -195,6 +200,7 @@ def _facts(result: FitResult) -> dict[str, Any]:
         "replay": _replay_facts(result.replay),
         "has_prior": result.prior_draws is not None,
         "nuisance": [asdict(parameter) for parameter in result.nuisance],
+        "derived": [asdict(parameter) for parameter in result.derived],
     }
 
 

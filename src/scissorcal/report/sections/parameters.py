@@ -27,7 +27,7 @@ class ParameterRow:
 
 
 def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
-    """One row per parameter, in the fit's order."""
+    """One row per parameter, in the fit's order, then what follows from them."""
     return tuple(
         ParameterRow(
             parameter.name,
@@ -41,7 +41,7 @@ def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
             finite(parameter.identifiability),
             identifiability_word(finite(parameter.identifiability)),
         )
-        for parameter in fit.parameters
+        for parameter in (*fit.parameters, *fit.derived)
     )
 
 
