@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from scissorcal.vision.board_pose import Corners, locate_board
 from scissorcal.vision.boards import PLATE_BOARD, PLATE_STRIP, RIG_MARKERS, MarkerBoard
 from scissorcal.vision.camera import Camera
-from scissorcal.vision.pose import Pose, difference, left_jacobian
+from scissorcal.vision.pose import Pose, between, difference, left_jacobian
 from scissorcal.vision.rig_frame import CardView, locate_rig
 
 LENS = (0.05, -0.1, 0.0, 0.0, 0.0)
@@ -69,6 +69,30 @@ def test_covariances_of_inverse_and_product_agree_with_draws():
         sizes = np.sqrt(np.diag(expected.covariance))
         assert np.allclose(seen / np.outer(sizes, sizes),
                            expected.covariance / np.outer(sizes, sizes), atol=0.1)  # fmt: skip
+
+
+def test_what_two_poses_err_alike_cancels_between_them():
+    """Drawn from one joint covariance, the pose between scatters as is said; alike, not at all."""
+    rng = np.random.default_rng(11)
+    root = 1e-3 * rng.standard_normal((12, 12))
+    joint = root @ root.T
+    a = Pose.from_rotation_vector([0.4, -1.0, 0.3], [0.1, 0.2, 0.5], joint[:6, :6])
+    b = Pose.from_rotation_vector([1.2, 0.1, -0.6], [0.0, -0.1, 0.4], joint[6:, 6:])
+    expected = between(a, b, joint[:6, 6:])
+
+    def moved(pose: Pose, step) -> Pose:
+        turned = Rotation.from_rotvec(step[:3]).as_matrix() @ pose.matrix
+        return Pose.from_matrix(turned, np.add(pose.translation_m, step[3:]))
+
+    drawn = []
+    for step in rng.multivariate_normal(np.zeros(12), joint, 4000):
+        found = moved(a, step[:6]).inverse().after(moved(b, step[6:]))
+        drawn.append(difference(found, expected))
+    sizes = np.sqrt(np.diag(expected.covariance))
+    scale = np.outer(sizes, sizes)
+    assert np.allclose(np.cov(drawn, rowvar=False) / scale, expected.covariance / scale, atol=0.1)
+    same = between(a, a, joint[:6, :6])
+    assert np.allclose(same.covariance, 0.0, atol=1e-12)
 
 
 def view(board, tilt_deg: float, rng, frames: int = 1, noise: float = 0.1, camera: Camera = CAMERA):

@@ -18,7 +18,7 @@ from scissorcal.vision.rig_frame import RigPose
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 4
+ALGORITHM = 5
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -74,7 +74,7 @@ def fit_plate(
         for i, (photo, found) in enumerate(zip(photos, alone, strict=True))
     )
     pose = whole.pose.after(back)
-    in_rig = rig.camera_rig.inverse().after(pose) if rig else None
+    in_rig = rig.holds(whole, camera).after(back) if rig else None
     return PlateFit(
         target=target,
         camera_plate=pose,

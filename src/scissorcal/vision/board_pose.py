@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.camera import PARAMETERS, Camera
+from scissorcal.vision.camera import Camera
 from scissorcal.vision.pose import Pose, left_jacobian
 
 Array = NDArray[np.float64]
@@ -52,7 +52,8 @@ class BoardPose:
     of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
     1 where both explain the picture alike. ``rms_px`` and ``sd_px`` are the rms error and the
     standard deviation that corners were found to have; ``used`` (n,) marks the corners that count,
-    ``residuals_px`` (n, 2) are measured minus predicted.
+    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) says how the pose
+    moves with the camera's parameters.
     """
 
     pose: Pose
@@ -63,6 +64,7 @@ class BoardPose:
     sd_px: float
     used: NDArray[np.bool_]
     residuals_px: Array
+    by_camera: Array
 
 
 def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> BoardPose:
@@ -93,7 +95,7 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
         )
         best = refined[0]
         noise, kept = _components(best.residuals, corners, used)
-        covariance = _covariance(best, corners, camera, used, (noise, kept), print_sd)
+        covariance, by_camera = _covariance(best, corners, camera, used, (noise, kept), print_sd)
     except np.linalg.LinAlgError:
         raise ValueError("the corners that were seen do not determine a pose") from None
     sd = float(np.sqrt(noise + kept))
@@ -109,6 +111,7 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
         sd_px=sd,
         used=used,
         residuals_px=best.residuals,
+        by_camera=by_camera,
     )
 
 
@@ -228,7 +231,7 @@ def _covariance(
     used: NDArray[np.bool_],
     variances: tuple[float, float],
     print_sd: float,
-) -> Array:
+) -> tuple[Array, Array]:
     noise, kept = variances
     slope = best.slope[np.repeat(used, 2)]
     by_pose = slope[:, :6]
@@ -240,15 +243,15 @@ def _covariance(
     np.add.at(summed, place, each)
     flat = summed.reshape(-1, 6)
     spread = spread + kept * flat.T @ flat
-    if camera.covariance is not None:
-        by_camera = slope[:, 6:15]
-        drawn = by_pose.T @ by_camera
-        spread = spread + drawn @ camera.covariance[: len(PARAMETERS), : len(PARAMETERS)] @ drawn.T
-    stretched = by_pose.T @ print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
-    spread = spread + print_sd**2 * stretched @ stretched.T
     turn = np.eye(6)
     turn[:3, :3] = left_jacobian(best.pose[:3])
-    return np.asarray(turn @ inverse @ spread @ inverse @ turn.T)
+    by_camera = -turn @ inverse @ by_pose.T @ slope[:, 6:15]
+    stretched = by_pose.T @ print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
+    spread = spread + print_sd**2 * stretched @ stretched.T
+    covariance = turn @ inverse @ spread @ inverse @ turn.T
+    if camera.covariance is not None:
+        covariance = covariance + by_camera @ camera.covariance @ by_camera.T
+    return np.asarray(covariance), np.asarray(by_camera)
 
 
 def _ratio(worse: float, better: float) -> float:

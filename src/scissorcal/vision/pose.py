@@ -83,10 +83,7 @@ class Pose:
         t = np.asarray(self.translation_m)
         covariance = None
         if self.covariance is not None:
-            slope = np.zeros((6, 6))
-            slope[:3, :3] = -turned
-            slope[3:, :3] = -turned @ _cross(t)
-            slope[3:, 3:] = -turned
+            slope = _inverse_slope(self)
             covariance = slope @ self.covariance @ slope.T
         return Pose.from_matrix(turned, -turned @ t, covariance)
 
@@ -97,10 +94,23 @@ class Pose:
         if self.covariance is not None or other.covariance is not None:
             own = np.zeros((6, 6)) if self.covariance is None else self.covariance
             its = np.zeros((6, 6)) if other.covariance is None else other.covariance
-            by_own, by_its = np.eye(6), np.kron(np.eye(2), matrix)
-            by_own[3:, :3] = -_cross(moved - np.asarray(self.translation_m))
+            by_own, by_its = _product_slopes(self, other)
             covariance = by_own @ own @ by_own.T + by_its @ its @ by_its.T
         return Pose.from_matrix(matrix @ other.matrix, moved, covariance)
+
+
+def between(a: Pose, b: Pose, shared: Array) -> Pose:
+    """T_a_b of T_c_a and T_c_b whose errors go together: ``shared`` (6, 6) is their covariance.
+
+    What moves both alike then counts as far as it does not cancel.
+    """
+    back = a.inverse()
+    found = back.after(b)
+    if found.covariance is None:
+        return found
+    by_back, by_b = _product_slopes(back, b)
+    both = by_back @ _inverse_slope(a) @ shared @ by_b.T
+    return Pose(found.quaternion, found.translation_m, found.covariance + both + both.T)
 
 
 def difference(a: Pose, b: Pose) -> Array:
@@ -120,6 +130,23 @@ def left_jacobian(vector: Array) -> Array:
     first = (1.0 - np.cos(angle)) / angle**2
     second = (angle - np.sin(angle)) / angle**3
     return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
+
+
+def _inverse_slope(pose: Pose) -> Array:
+    """How errors of a pose become those of its inverse, (6, 6)."""
+    turned = pose.matrix.T
+    slope = np.zeros((6, 6))
+    slope[:3, :3] = -turned
+    slope[3:, :3] = -turned @ _cross(np.asarray(pose.translation_m))
+    slope[3:, 3:] = -turned
+    return slope
+
+
+def _product_slopes(first: Pose, second: Pose) -> tuple[Array, Array]:
+    """How errors of either pose become those of the first after the second, (6, 6) each."""
+    by_first = np.eye(6)
+    by_first[3:, :3] = -_cross(first.matrix @ np.asarray(second.translation_m))
+    return by_first, np.asarray(np.kron(np.eye(2), first.matrix), dtype=np.float64)
 
 
 def _cross(vector: Array) -> Array:

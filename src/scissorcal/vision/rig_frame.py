@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.vision.board_pose import (
     LEAST_SD_PX,
+    BoardPose,
     Corners,
     locate_board,
     print_slopes,
@@ -14,7 +15,7 @@ from scissorcal.vision.board_pose import (
 )
 from scissorcal.vision.boards import PRINT_SCALE_SD
 from scissorcal.vision.camera import Camera
-from scissorcal.vision.pose import Pose, left_jacobian
+from scissorcal.vision.pose import Pose, between, left_jacobian
 
 Array = NDArray[np.float64]
 
@@ -45,13 +46,23 @@ class RigPose:
 
     The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
     card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
-    +z. ``untold`` names what the motion left open, empty where all is known.
+    +z. ``untold`` names what the motion left open, empty where all is known. ``by_camera`` (6, 9)
+    says how ``camera_rig`` moves with the camera's parameters.
     """
 
     camera_rig: Pose
     rig_card: Pose
     rms_px: float
     untold: tuple[str, ...]
+    by_camera: Array
+
+    def holds(self, board: BoardPose, camera: Camera) -> Pose:
+        """T_rig_target of a target that the same camera sees, whose errors are in both poses."""
+        known = camera.covariance
+        shared = np.zeros((6, 6))
+        if known is not None:
+            shared = self.by_camera @ known @ board.by_camera.T
+        return between(self.camera_rig, board.pose, shared)
 
 
 def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> RigPose:
@@ -96,6 +107,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
         card,
         float(np.sqrt(2.0 * square / count)),
         untold,
+        -(turn @ inverse @ drawn)[:6, :9],
     )
 
 

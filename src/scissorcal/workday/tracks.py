@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
@@ -19,6 +19,7 @@ from scissorcal.workday.plates import plate_target, workspace_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.vision.camera import Camera
     from scissorcal.vision.live import Frame
     from scissorcal.vision.pose import Pose
     from scissorcal.vision.rig_frame import RigPose
@@ -110,7 +111,7 @@ def track_plate(
             _append(file, head)
             try:
                 for seen in track(counted, (PLATE_BOARD, PLATE_STRIP), fitted.camera):
-                    rows.append(_row(seen, back, rig))
+                    rows.append(_row(seen, fitted.camera, back, rig))
                     _append(file, rows[-1])
             except KeyboardInterrupt:
                 pass
@@ -183,17 +184,18 @@ def _counted(
         yield frame
 
 
-def _row(seen: Tracked, back: "Pose", rig: "RigPose | None") -> TrackRow:
+def _row(seen: Tracked, camera: "Camera", back: "Pose", rig: "RigPose | None") -> TrackRow:
     found = seen.found
     if found is None:
         return TrackRow(
             number=seen.number, time_s=seen.time_s, state=seen.state, corners=seen.corners
         )
 
-    def standing(pose: "Pose") -> PoseRecord:
-        plate = pose.after(back)
-        return pose_record(rig.camera_rig.inverse().after(plate) if rig else plate)
-
+    pose = (rig.holds(found, camera) if rig else found.pose).after(back)
+    other = None
+    if found.other:
+        known = replace(rig.camera_rig, covariance=None).inverse() if rig else None
+        other = (known.after(found.other) if known else found.other).after(back)
     return TrackRow(
         number=seen.number,
         time_s=seen.time_s,
@@ -202,10 +204,8 @@ def _row(seen: Tracked, back: "Pose", rig: "RigPose | None") -> TrackRow:
         corners=seen.corners,
         rms_px=found.rms_px,
         odds=min(found.odds, 1e12) if found.other else None,
-        pose=standing(found.pose),
-        other=standing(found.other).model_copy(update={"covariance": None})
-        if found.other
-        else None,
+        pose=pose_record(pose),
+        other=pose_record(other) if other else None,
     )
 
 
