@@ -112,18 +112,22 @@ def _other_target(grey: Picture, board: Board) -> str | None:
         if name != own and len(ids_of(name)) >= 2:
             return f"markers of {name}"
     if not isinstance(board, Chessboard):
-        plain = _plain_chessboard(grey)
+        plain = _plain_chessboard(grey, board)
         if plain:
             return "a plain chessboard"
     return None
 
 
-def _plain_chessboard(grey: Picture) -> bool:
+def _plain_chessboard(grey: Picture, board: Board) -> bool:
+    """Whether a chessboard is there that is not the board itself with its markers unread."""
     import cv2
 
+    own = (board.columns - 1, board.rows - 1) if isinstance(board, CharucoBoard) else None
     sizes = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5), (6, 5), (6, 4), (7, 4))
     return any(
-        cv2.findChessboardCorners(grey, size, flags=cv2.CALIB_CB_FAST_CHECK)[0] for size in sizes
+        cv2.findChessboardCorners(grey, size, flags=cv2.CALIB_CB_FAST_CHECK)[0]
+        for size in sizes
+        if size not in (own, own and own[::-1])
     )
 
 
