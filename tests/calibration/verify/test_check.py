@@ -56,7 +56,7 @@ def fit_of(experiment: Linear) -> FitResult:
         "held_out": held_out,
         "inputs_hash": "0" * 64,
         "effort_unit": "N m",
-        "diagnostics": {"k_hat": posterior.k_hat},
+        "diagnostics": {"effective_samples": posterior.effective},
         "parameter": lambda name: next(p for p in fitted if p.name == name),
     }
     return cast(FitResult, SimpleNamespace(**facts))

@@ -25,7 +25,8 @@ FEWEST_DRAWS = 600
 """Draws of each posterior where importance weights are even: a rank takes 199 of them."""
 
 EVEN_WEIGHTS = 0.5
-"""k-hat below which they are; above it, fits take as many draws as the fit itself."""
+"""Share of draws that count as independent from which they are; below it, fits take as many draws
+as the fit itself."""
 
 _NOISE_STREAM, _HALVES_STREAM = 10, 11
 
@@ -135,8 +136,7 @@ def unconstrained_draws(experiment: Experiment, fit: FitResult) -> Array:
 
 def _even(fit: FitResult) -> bool:
     """Whether the weights of a fit were even, as those of its like will be."""
-    k_hat = fit.diagnostics.get("k_hat")
-    return k_hat is None or not k_hat > EVEN_WEIGHTS
+    return float(fit.diagnostics["effective_samples"]) >= EVEN_WEIGHTS * len(fit.draws)
 
 
 def _facts(fit: FitResult, sheets: Mapping[int, int]) -> tuple[StrokeFacts, ...]:
