@@ -29,7 +29,8 @@ from tests.vision.scenes import lens, photo_of, pose_before
 
 LENS = lens()
 CAMERA = Camera(LENS.focal_px, LENS.focal_px, *LENS.centre_px, LENS.distortion, 1280, 720)
-SURE = dataclasses.replace(CAMERA, covariance=np.diag([0.3] * 4 + [1e-3] * 5) ** 2)
+KNOWN = np.array([0.3, 0.3, 0.3, 0.3, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3])
+SURE = dataclasses.replace(CAMERA, covariance=np.diag(KNOWN**2))
 REAL = Path(__file__).parents[3] / "shared" / "data" / "aruco"
 
 

@@ -18,7 +18,7 @@ from scissorcal.vision.rig_frame import RigPose
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 5
+ALGORITHM = 6
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -118,25 +118,30 @@ def _halves(corners: Corners, camera: Camera) -> Halves | None:
 
     Every other group of four corners (a marker's, or neighbours on a chessboard, which err
     together) shows errors of single corners; the left and the right half show a bent target and a
-    lens that was fitted badly. What is unknown of the camera and of the print's scale moves both
-    alike, and is left out of what they claim.
+    lens that was fitted badly. What is unknown of the camera and of the print counts in what they
+    claim only as far as it moves them differently.
     """
-    known = replace(camera, covariance=None)
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
-    found = [halves for way in ways if (halves := _half_and_half(corners, known, way))]
+    found = [halves for way in ways if (halves := _half_and_half(corners, camera, way))]
     return max(found, key=lambda halves: halves.square, default=None)
 
 
 def _half_and_half(corners: Corners, camera: Camera, way: NDArray[np.bool_]) -> Halves | None:
+    alone = replace(camera, covariance=None)
     try:
-        first, second = (locate_board(corners.where(half), camera) for half in (way, ~way))
+        first, second = (locate_board(corners.where(half), alone) for half in (way, ~way))
     except ValueError:
         return None
     assert first.pose.covariance is not None
     assert second.pose.covariance is not None
     away = difference(first.pose, second.pose)
+    printed = first.by_print - second.by_print
     claimed = first.pose.covariance + second.pose.covariance
+    claimed = claimed + PRINT_SCALE_SD**2 * printed @ printed.T
+    if camera.covariance is not None:
+        bent = first.by_camera - second.by_camera
+        claimed = claimed + bent @ camera.covariance @ bent.T
     return Halves(
         rotation_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         translation_mm=float(1e3 * np.linalg.norm(away[3:])),

@@ -52,8 +52,8 @@ class BoardPose:
     of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
     1 where both explain the picture alike. ``rms_px`` and ``sd_px`` are the rms error and the
     standard deviation that corners were found to have; ``used`` (n,) marks the corners that count,
-    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) says how the pose
-    moves with the camera's parameters.
+    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and ``by_print``
+    (6, 2) say how the pose moves with the camera's parameters and the print's scales.
     """
 
     pose: Pose
@@ -65,6 +65,7 @@ class BoardPose:
     used: NDArray[np.bool_]
     residuals_px: Array
     by_camera: Array
+    by_print: Array
 
 
 def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> BoardPose:
@@ -95,10 +96,13 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
         )
         best = refined[0]
         noise, kept = _components(best.residuals, corners, used)
-        covariance, by_camera = _covariance(best, corners, camera, used, (noise, kept), print_sd)
+        own, by_camera, by_print = _covariance(best, corners, used, noise, kept)
     except np.linalg.LinAlgError:
         raise ValueError("the corners that were seen do not determine a pose") from None
     sd = float(np.sqrt(noise + kept))
+    covariance = own + print_sd**2 * by_print @ by_print.T
+    if camera.covariance is not None:
+        covariance = covariance + by_camera @ camera.covariance @ by_camera.T
     other = refined[1] if len(refined) > 1 and _apart(refined[0], refined[1]) else None
     frames = len(np.unique(corners.frame[used]))
     gap = (other.square - best.square) / (noise + kept * frames) if other else np.inf
@@ -112,6 +116,7 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
         used=used,
         residuals_px=best.residuals,
         by_camera=by_camera,
+        by_print=by_print,
     )
 
 
@@ -225,14 +230,9 @@ def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> 
 
 
 def _covariance(
-    best: _Refined,
-    corners: Corners,
-    camera: Camera,
-    used: NDArray[np.bool_],
-    variances: tuple[float, float],
-    print_sd: float,
-) -> tuple[Array, Array]:
-    noise, kept = variances
+    best: _Refined, corners: Corners, used: NDArray[np.bool_], noise: float, kept: float
+) -> tuple[Array, Array, Array]:
+    """The corners' own covariance (6, 6), and the pose's slopes by camera and by print."""
     slope = best.slope[np.repeat(used, 2)]
     by_pose = slope[:, :6]
     inverse = np.linalg.inv(by_pose.T @ by_pose)
@@ -245,13 +245,10 @@ def _covariance(
     spread = spread + kept * flat.T @ flat
     turn = np.eye(6)
     turn[:3, :3] = left_jacobian(best.pose[:3])
-    by_camera = -turn @ inverse @ by_pose.T @ slope[:, 6:15]
-    stretched = by_pose.T @ print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
-    spread = spread + print_sd**2 * stretched @ stretched.T
-    covariance = turn @ inverse @ spread @ inverse @ turn.T
-    if camera.covariance is not None:
-        covariance = covariance + by_camera @ camera.covariance @ by_camera.T
-    return np.asarray(covariance), np.asarray(by_camera)
+    gain = turn @ inverse
+    printed = print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
+    own = gain @ spread @ gain.T
+    return np.asarray(own), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
 
 
 def _ratio(worse: float, better: float) -> float:
