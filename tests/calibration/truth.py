@@ -30,6 +30,7 @@ class Truth:
     upper_face: float = 5e-5
     noise: float = 1e-3
     rho: float = 0.9
+    damping: float = 0.0
 
     def height(self, x: float, beta: float) -> tuple[float, float]:
         low, high = -0.05, 0.3
@@ -51,6 +52,12 @@ class Truth:
         phi, slope = self.height(x, theta / 2)
         g = self.response(self.upper_face - phi)
         return g * (x + phi * slope), 2 * g * slope
+
+    def damped(self, theta: float, x: float, omega: float) -> float:
+        """Factor on the force while the edge over ``x`` sinks in, by finite differences."""
+        dt = 1e-6
+        later, before = (self.height(x, (theta + s * omega * dt) / 2)[0] for s in (0.5, -0.5))
+        return max(1.0 + self.damping * (before - later) / dt, 0.0)
 
     def opening_at_drive(self, start: float, end: float, x: float) -> float:
         """Opening between ``start`` and ``end`` at which the crack starts from ``x``."""
@@ -141,6 +148,7 @@ def _sheets(labels, strokes):
 
 def _cut_torque(theta, x_n, sheets, truth: Truth) -> np.ndarray:
     torque = np.zeros_like(theta)
+    rate = np.gradient(theta) * RATE_HZ
     crack, sheet, before = 0.0, None, float(theta[0])
     for i, (angle, advance) in enumerate(zip(theta.tolist(), x_n.tolist(), strict=True)):
         if sheets[i] != sheet:
@@ -154,6 +162,8 @@ def _cut_torque(theta, x_n, sheets, truth: Truth) -> np.ndarray:
             if truth.kappa >= 1:
                 break
         torque[i] = truth.cut(angle, crack - advance)[0]
+        if truth.damping > 0.0 and torque[i] > 0.0:
+            torque[i] *= truth.damped(angle, crack - advance, float(rate[i]))
         before = angle
     return torque
 

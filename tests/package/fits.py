@@ -39,6 +39,7 @@ def cut_fit(
     exponent: float = 1.5,
     energy: float | None = 0.5,
     kappa: float | None = None,
+    damping: float | None = None,
     spread: float = 0.03,
     seed: int = 1,
     draws: int = 400,
@@ -52,9 +53,12 @@ def cut_fit(
     if kappa is not None:
         values["kappa"] = kappa
         fracture = "rippled"
+    if damping is not None:
+        values["rate_damping"] = damping
     edge = chosen.rig.edge
     structure = {
         "response": response,
+        "rate_damping": damping is not None,
         "fracture": fracture,
         "closure": chosen.scene.closure,
         "reference_indentation_m": chosen.fit.cut.reference_indentation_mm * 1e-3,

@@ -23,6 +23,8 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "tough": ("cotton-cloth", {"energy": 35.0}),
     "pressed": ("press-only", {"energy": None, "force": 5.0}),
     "pressed, steep": ("press-only", {"energy": None, "exponent": 8.0}),
+    "damped": ("paper-80gsm", {"kappa": 0.7, "damping": 20.0}),
+    "pressed, much damped": ("press-only", {"energy": None, "damping": 90.0}),
     "pressed, exponential": ("press-only", {"energy": None, "response": "exponential"}),
 }
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import scissorcal
-from scissorcal.package import PackageSummary, open_package
+from scissorcal.package import PackageSummary, build_package, open_package
+from tests.package.fits import cut_fit, recipe
 
 
 def test_scissorcal_opens_it_by_name(paper: PackageSummary) -> None:
@@ -127,3 +129,19 @@ def test_closing_again_over_what_is_cut_gives_no_cutting_torque(paper: PackageSu
     cut, recut = (steps["torque"] - steps["friction_torque"] for steps in (first, again))
     assert np.max(cut) > 0.01
     assert np.mean(recut[:1500]) < 0.01 * np.mean(cut)
+
+
+def test_damping_by_rate_is_rendered_with_its_band(tmp_path: Path) -> None:
+    chosen = recipe("press-only", render_friction=False)
+    fit = cut_fit(chosen, energy=None, force=5.0, damping=20.0)
+    path = tmp_path / "p.zip"
+    build_package(chosen, None, fit, path, np.random.default_rng(1))
+    package = open_package(path)
+    assert package.tables.rate_damping == 20.0
+    opening, contact = np.radians(30.0), 0.03
+    slow, fast, leaving = package.torque(opening, np.array([-1e-6, -0.8, 0.8]), contact)
+    low, high = package.band(opening, np.array([-1e-6, -0.8]), contact)
+    assert leaving < slow < fast
+    assert low[1] < fast < high[1]
+    assert (high[1] - low[1]) / fast > (high[0] - low[0]) / slow
+    assert package.manifest.provenance.cut.structure.rate_damping

@@ -13,6 +13,7 @@ from scissorcal.calibration.cut_data import FrictionPrior, edge_of
 from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.cut_experiment import CutExperiment
 from scissorcal.calibration.cut_ladder import climb_cut_ladder, cut_design, cut_designs
+from scissorcal.calibration.cut_layout import CutLaw
 from scissorcal.calibration.cut_motion import CutMotion, cut_motion
 from scissorcal.calibration.cut_toughness import with_toughness
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
@@ -126,8 +127,7 @@ def cut_experiment(
         FrictionPrior.of(friction),
         recipe,
         belief,
-        str(fit.structure["response"]),
-        str(fit.structure["fracture"]),
+        CutLaw.of(fit.structure),
     )
     return replace(design, begin=tuple(_where_it_ended(design, fit).tolist()))
 

@@ -93,6 +93,7 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
         fracture_energy=values.get("fracture_energy"),
         kappa=values.get("kappa", 1.0),
         closure=structure["closure"],
+        rate_damping=values.get("rate_damping", 0.0),
     )
 
 

@@ -198,7 +198,8 @@ class Expected:
         settled = self.settled
         lever = np.where(settled.cuts, np.abs(settled.view.lever), 0.0)
         depth = (1.0 - np.asarray(self.cutting.kappa)) / np.sqrt(12.0)
-        return self.motion.binned(lever * settled.peak * depth)
+        peak = damped(self.cutting, settled.view, settled.peak, self.motion.nodes.rate)
+        return self.motion.binned(lever * peak * depth)
 
     @cached_property
     def cycle(self) -> Array:
@@ -216,8 +217,7 @@ class Expected:
             return held_torque(cutting, self.stance, self.run - nodes.advance, nodes.rate)
         settled, contact = self.settled, self.run - nodes.advance
         force = np.where(settled.cuts, settled.force, 0.0)
-        if np.any(cutting.rate_damping):
-            force = damped(cutting, settled.view, force, nodes.rate)
+        force = damped(cutting, settled.view, force, nodes.rate)
         torque = torque_of(cutting, settled.view, np.where(settled.cuts, contact, 0.0), force)
         behind = np.flatnonzero(np.isfinite(contact) & (contact != settled.contact))
         torque[behind] = held_torque(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut_data import FrictionPrior, cutting_from, edge_layout
 from scissorcal.calibration.cut_expected import Expected, Spread
-from scissorcal.calibration.cut_layout import NUISANCE, starts_over
+from scissorcal.calibration.cut_layout import NUISANCE, CutLaw, starts_over
 from scissorcal.calibration.cut_likelihood import Blocks, best_rests, make_blocks, normal_terms
 from scissorcal.calibration.cut_motion import CutMotion
 from scissorcal.calibration.cut_simulation import draw_torque
@@ -68,9 +68,7 @@ class CutExperiment:
     @property
     def name(self) -> str:
         """The law in words."""
-        fracture = self.structure["fracture"]
-        words = {"none": "no fracture"}.get(fracture, f"{fracture} fracture")
-        return f"{self.structure['response']} response, {words}"
+        return CutLaw.of(self.structure).name
 
     def mean(self, u: Array) -> Array:
         """Drive that is expected (n,) at ``u`` (p,), with cracks resting where they should."""
@@ -86,7 +84,7 @@ class CutExperiment:
     def rung(self, measured: Array) -> Rung:
         """Give the law over ``measured`` (n,), ready to be fitted."""
         posed = _Posed(self, np.asarray(measured, dtype=np.float64))
-        key = {name: self.structure[name] for name in ("response", "fracture")}
+        key = CutLaw.of(self.structure).key
         likelihood = Likelihood(posed.residuals, posed.normal)
         material = len(self.material.names)
         starts = np.array([self.begin])

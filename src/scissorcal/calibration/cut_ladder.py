@@ -1,5 +1,6 @@
-"""The ladder of a cut's laws: response families, smooth and rippled fracture."""
+"""The ladder of a cut's laws: response families, damping, smooth and rippled fracture."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from scissorcal.calibration.cut_data import FrictionPrior, geometry_of
 from scissorcal.calibration.cut_experiment import CutExperiment
-from scissorcal.calibration.cut_layout import material_layout
+from scissorcal.calibration.cut_layout import CutLaw, material_layout
 from scissorcal.calibration.cut_motion import CutMotion
 from scissorcal.calibration.ladder import Climbed, Rung, climb
 from scissorcal.model import EdgeBelief
@@ -22,10 +23,7 @@ def cut_designs(
     motion: CutMotion, friction: FrictionPrior, recipe: Recipe, belief: EdgeBelief
 ) -> list[CutExperiment]:
     """Every law that the recipe allows over one set of motions, cheapest first."""
-    return [
-        cut_design(motion, friction, recipe, belief, family, fracture)
-        for fracture, family in _allowed(recipe)
-    ]
+    return [cut_design(motion, friction, recipe, belief, law) for law in allowed_laws(recipe)]
 
 
 def cut_design(
@@ -33,15 +31,14 @@ def cut_design(
     friction: FrictionPrior,
     recipe: Recipe,
     belief: EdgeBelief,
-    family: str,
-    fracture: str,
+    law: CutLaw,
 ) -> CutExperiment:
     """One law over one set of motions, with priors from the recipe and the data's own size."""
     return CutExperiment(
         motion=motion,
         friction=friction,
-        structure={"response": family, "fracture": fracture, **geometry_of(recipe, belief.edge)},
-        material=material_layout(recipe, fracture, float(np.std(motion.bins.drive))),
+        structure={**law.key, **geometry_of(recipe, belief.edge)},
+        material=material_layout(recipe, law, float(np.std(motion.bins.drive))),
         belief=belief,
     )
 
@@ -58,7 +55,8 @@ def climb_cut_ladder(designs: list[CutExperiment], progress: Progress) -> list[C
     return climbed
 
 
-def _allowed(recipe: Recipe) -> list[tuple[str, str]]:
+def allowed_laws(recipe: Recipe) -> list[CutLaw]:
+    """The laws that a recipe lets the ladder have, cheapest first."""
     settings = recipe.fit.cut
     families = ("power", "exponential") if settings.response == "auto" else (settings.response,)
     fractures: tuple[str, ...] = ("smooth", "rippled")
@@ -66,12 +64,14 @@ def _allowed(recipe: Recipe) -> list[tuple[str, str]]:
         fractures = ("none",)
     elif settings.fracture != "auto":
         fractures = (settings.fracture,)
-    return [(fracture, family) for fracture in fractures for family in families]
+    dampings = {"none": (False,), "fit": (True,), "auto": (False, True)}[settings.rate_damping]
+    laws = itertools.product(fractures, dampings, families)
+    return [CutLaw(family, fracture, damped) for fracture, damped, family in laws]
 
 
 def _nearest(design: CutExperiment, climbed: list[Climbed]) -> Climbed | None:
     """The climbed rung that shares most discrete choices, the latest of equals."""
-    shared = [sum(c.rung.key[k] == design.structure[k] for k in c.rung.key) for c in climbed]
+    shared = [sum(c.rung.key[k] == design.structure.get(k) for k in c.rung.key) for c in climbed]
     return climbed[max(range(len(shared)), key=lambda i: (shared[i], i))] if climbed else None
 
 

@@ -1,7 +1,9 @@
 """Parameters of a cut's laws with their priors, and where a search for them begins."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +38,42 @@ NUISANCE = (
 """Parameters that describe the noise of a cut, not the cut."""
 
 
-def material_layout(recipe: Recipe, fracture: str, drive_sd: float) -> Layout:
-    """Parameters of a law with this ``fracture``, and of the noise.
+@dataclass(frozen=True)
+class CutLaw:
+    """The discrete choices of a cut's law.
+
+    ``response`` is the family of the force at the edge, ``damped`` says that it grows with the
+    speed of sinking in, ``fracture`` is "none", "smooth" or "rippled".
+    """
+
+    response: str
+    fracture: str
+    damped: bool = False
+
+    @classmethod
+    def of(cls, structure: Mapping[str, Any]) -> "CutLaw":
+        """The law of a fit's structure."""
+        damped = bool(structure.get("rate_damping", False))
+        return cls(str(structure["response"]), str(structure["fracture"]), damped)
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """The choices as a fit's structure holds them."""
+        return {
+            "response": self.response,
+            "rate_damping": self.damped,
+            "fracture": self.fracture,
+        }
+
+    @property
+    def name(self) -> str:
+        """The law in words."""
+        words = "no fracture" if self.fracture == "none" else f"{self.fracture} fracture"
+        return f"{self.response} response{', damped' if self.damped else ''}, {words}"
+
+
+def material_layout(recipe: Recipe, law: CutLaw, drive_sd: float) -> Layout:
+    """Parameters of a law, and of the noise.
 
     ``drive_sd`` (N m) is the size of the measured effort, which the noise's priors are wide about.
     """
@@ -49,13 +85,16 @@ def material_layout(recipe: Recipe, fracture: str, drive_sd: float) -> Layout:
         _log("response_force", "N", force.median, force.log_sd, depth),
         _log("response_exponent", "1", exponent.median, exponent.log_sd, grows),
     ]
-    if fracture != "none":
+    if law.damped:
+        damping, per_speed = settings.rate_damping_s_per_m, "share by which sinking in adds force"
+        rows.append(_log("rate_damping", "s/m", damping.median, damping.log_sd, per_speed))
+    if law.fracture != "none":
         toughness = settings.toughness_J_per_m2
         assert toughness is not None
         energy = toughness.median * recipe.material.thickness_mm * 1e-3
         meaning = "toughness times thickness: energy per length of cut"
         rows.append(_log("fracture_energy", "J/m", energy, toughness.log_sd, meaning))
-    if fracture == "rippled":
+    if law.fracture == "rippled":
         share = "share of the fracture energy at which a running crack stops"
         rows.append(Parameter("kappa", "1", "logit", 0.85, 1.0, share))
         size, pace = "size of the ripple as seen", "periods of it in a bin as seen"

@@ -37,9 +37,9 @@ def save_fit(result: FitResult, path: Path) -> None:
 
     Group ``posterior`` has every parameter over (chain, draw) as ArviZ expects it;
     ``prior`` draws of the prior where there are any, ``nuisance_posterior`` the draws of nuisance
-    parameters, ``derived_posterior`` those of what follows from them, ``observed_data`` the band-limited data, ``constant_data`` what belongs to each
-    point, ``posterior_predictive`` the mean's 5 % and 95 %. All else stands as JSON in the
-    attribute ``scissorcal`` of ``posterior``.
+    parameters, ``derived_posterior`` those of what follows from parameters, ``observed_data`` the
+    band-limited data, ``constant_data`` what belongs to each point, ``posterior_predictive`` the
+    mean's 5 % and 95 %. All else stands as JSON in the attribute ``scissorcal`` of ``posterior``.
     """
     posterior = _draws_group(result.parameters, result.draws)
     posterior.attrs.update(

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.model.edge import Edge, edge_height
+from scissorcal.model.edge import Edge, EdgeView, edge_height
 from scissorcal.model.response import Response
 
 Array = NDArray[np.float64]
@@ -105,21 +105,37 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     return np.where(cuts, x, -np.inf)
 
 
-def torque_at(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
+def torque_at(
+    cutting: Cutting, opening: ArrayLike, contact: ArrayLike, rate: ArrayLike | None = None
+) -> Array:
     """Torque with the crack held at ``contact``: the response alone, whatever it bears.
 
     ``work``: tau = g (x_c + phi tan(psi)), the gradient of the stored energy m * integral of g.
-    ``eq4``: tau = x_c g cos(alpha).
+    ``eq4``: tau = x_c g cos(alpha). At rest, unless the opening's ``rate`` (rad/s) is given.
     """
     theta = np.asarray(opening, dtype=np.float64)
     x = np.asarray(contact, dtype=np.float64)
     reached = np.isfinite(x)
     view = edge_height(cutting.edge, np.where(reached, x, 0.0), theta / cutting.moving_blades)
     force = cutting.response.force_at(np.where(reached, cutting.upper_face_m - view.height, -1.0))
+    if rate is not None:
+        force = damped(cutting, view, force, np.asarray(rate, dtype=np.float64))
     if cutting.closure == "work":
         return np.asarray(force * view.lever)
     taper = cutting.edge.slope_at(view.station)
     return np.asarray(force * x / np.sqrt(1.0 + taper**2))
+
+
+def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array:
+    """The response's force (N) while the edge sinks in or withdraws at the opening's rate.
+
+    g (1 + c d(delta)/dt) with d(delta)/dt = -lever rate / m, and never below 0: whoever withdraws
+    fast loses the material, which does not stick (Hunt and Crossley 1975, doi:10.1115/1.3423596).
+    """
+    if not np.any(cutting.rate_damping):
+        return force
+    deepening = -view.lever * rate / cutting.moving_blades
+    return np.asarray(force * np.maximum(1.0 + cutting.rate_damping * deepening, 0.0))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scissorcal.model.cutting import (
     STEEPEST_START,
     Cutting,
+    damped,
     mean_share,
     settled_contact,
 )
@@ -133,18 +134,10 @@ def held_torque(
 ) -> Array:
     """Torque with the crack held at ``contact`` (..., n): the response alone, whatever it bears.
 
-    With the opening's ``rate`` (n,) in rad/s the response is damped: g (1 + c d(delta)/dt) with
-    d(delta)/dt = -lever rate / m, and never below 0 (Hunt and Crossley 1975,
-    doi:10.1115/1.3423596).
+    With the opening's ``rate`` (n,) in rad/s the response is damped, see :func:`damped`.
     """
     view = stance.view(contact)
     force = cutting.response.force_at(cutting.upper_face_m - view.height)
-    if rate is not None and np.any(cutting.rate_damping):
+    if rate is not None:
         force = damped(cutting, view, force, rate)
     return torque_of(cutting, view, contact, force)
-
-
-def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array:
-    """The response's force (..., n) while the edge sinks in or withdraws at the opening's rate."""
-    deepening = -view.lever * rate / cutting.moving_blades
-    return np.asarray(force * np.maximum(1.0 + cutting.rate_damping * deepening, 0.0))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
-from scissorcal.model import edge_height, ripple_moments, settled_contact
+from scissorcal.model import damped, edge_height, ripple_moments, settled_contact
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_tables
 from scissorcal.package.grid import Box, Points, spread_points
@@ -117,7 +117,7 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
         handle_radius_m=recipe.rig.handle_radius_mm * 1e-3,
         tip_station_m=edge.length_m,
         closure=cutting.closure,
-        rate_damping_s_per_m=0.0,
+        rate_damping_s_per_m=float(cutting.rate_damping),
         loop_rate_Hz=scene.loop_rate_Hz,
         render=scene.render,
         fracture=fracture,
@@ -225,7 +225,8 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
     lever = np.abs(view.lever)
     if cutting.closure == "eq4":
         lever = np.abs(place) / np.sqrt(1.0 + edge.slope_at(station) ** 2)
-    enough = BEYOND_LIMIT * limit / np.maximum(lever, BEYOND_LIMIT * limit / STRONGEST_N)
+    felt = lever * damped(cutting, view, np.ones_like(lever), points.opening_rate)
+    enough = BEYOND_LIMIT * limit / np.maximum(felt, BEYOND_LIMIT * limit / STRONGEST_N)
     enough = np.where(ran, STRONGEST_N, enough)
     needed = np.minimum(indentation, cutting.response.indentation_at(enough))
     torque = np.minimum(peaks.torque(points.opening, points.opening_rate, points.contact), limit)

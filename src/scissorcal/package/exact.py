@@ -42,7 +42,7 @@ class ExactModel:
         place = self.settled(opening, contact)
         view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
         reached = view.station < self.cutting.edge.length_m
-        felt = np.where(reached, torque_at(self.cutting, opening, place), 0.0)
+        felt = np.where(reached, torque_at(self.cutting, opening, place, opening_rate), 0.0)
         if self.friction is None:
             return felt
         return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))

@@ -157,6 +157,7 @@ class CutStructure(Section):
     """The discrete choices of a cut fit."""
 
     response: Literal["power", "exponential"]
+    rate_damping: bool = False
     fracture: Literal["none", "smooth", "rippled"]
     closure: Literal["work", "eq4"]
     reference_indentation_m: Positive

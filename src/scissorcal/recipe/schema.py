@@ -265,13 +265,19 @@ class FitFriction(Section):
 
 
 class FitCut(Section):
-    """Families of the response and of fracture; "auto" compares them."""
+    """Families of the response and of fracture; "auto" compares them.
+
+    ``rate_damping = "fit"`` lets the force at the edge grow with the speed at which the blade sinks
+    in, ``"auto"`` compares laws with and without; ``rate_damping_s_per_m`` is its prior.
+    """
 
     response: Literal["auto", "power", "exponential"] = "auto"
     fracture: Literal["auto", "smooth", "rippled"] = "auto"
     reference_indentation_mm: Annotated[float, Field(ge=1e-6, le=100, allow_inf_nan=False)] = 0.3
     response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
     response_exponent: LogNormalPrior = LogNormalPrior(median=1.5, factor_90=3.0)
+    rate_damping: Literal["none", "fit", "auto"] = "none"
+    rate_damping_s_per_m: LogNormalPrior = LogNormalPrior(median=3.0, factor_90=20.0)
     toughness_J_per_m2: LogNormalPrior | None = None
     critic: bool = True
 
