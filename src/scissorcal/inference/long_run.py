@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 WELL_ABOVE_ROUNDING = 1e-6
+CHANCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,7 @@ def long_run_covariance(problem: Problem, scores: Array, slopes: Slopes | None) 
         total += covariance_of_sum(slopes.by_size[here], series, fit_ar(size_pull[here], series))
         found = _excess(by_mean, pull[here], blocks[here], noise)
         square, freedom = square + found[0], freedom + found[1]
-    spare = freedom - scores.shape[1]
-    dispersion = max(square / spare, 1.0) if spare > 0 else 1.0
+    dispersion = _dispersion(square, freedom - scores.shape[1])
     return LongRun(total * dispersion, tuple(orders), dispersion)
 
 
@@ -97,8 +97,27 @@ def _quadratic(slopes: Array, memory: Array) -> Array:
     return np.asarray(0.5 * (product + product.T))
 
 
+def _dispersion(square: float, spare: float) -> float:
+    """Chi-square over its degrees of freedom where it is larger than chance would have it, else 1.
+
+    Taken whenever above 1 it would widen honest intervals by 4 to 8 % on average.
+    """
+    from scipy.stats import chi2
+
+    if spare <= 0 or float(chi2.sf(square, spare)) > CHANCE:
+        return 1.0
+    return square / spare
+
+
 def _excess(slopes: Array, pull: Array, blocks: Labels, noise: ArNoise) -> tuple[float, float]:
-    """Chi-square of the blocks' score sums under noise with memory, and its degrees of freedom."""
+    """Chi-square of the blocks' score sums under noise with memory, and its degrees of freedom.
+
+    Slopes are taken in units of their own size: in mixed units rounding would decide which
+    directions of a block count. A parameter that hardly moves the mean has no say.
+    """
+    size = np.sqrt(np.mean(slopes**2, axis=0))
+    telling = size > WELL_ABOVE_ROUNDING * size.max(initial=0.0)
+    slopes = slopes[:, telling] / size[telling]
     bounds = runs(blocks)
     memory = noise.autocovariance(max((high - low for low, high in bounds), default=0))
     square = freedom = 0.0
