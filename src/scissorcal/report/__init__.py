@@ -11,6 +11,7 @@ from scissorcal.report.comparison import Comparison, Side, compare, side_of
 from scissorcal.report.inputs import (
     Fact,
     FactSheet,
+    Geometry,
     RecordingSummary,
     sheet_from_mapping,
     summarise_recording,
@@ -22,6 +23,7 @@ __all__ = [
     "Comparison",
     "Fact",
     "FactSheet",
+    "Geometry",
     "RecordingSummary",
     "ReportFiles",
     "Side",

@@ -21,7 +21,7 @@ from scissorcal.report.document import (
     compose_fit,
     scene_facts,
 )
-from scissorcal.report.inputs import FactSheet, RecordingSummary, summarise_recording
+from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary, summarise_recording
 from scissorcal.report.sections.verdicts import gather_verdicts
 
 
@@ -43,6 +43,7 @@ def build_report(
     recipe_text: str = "",
     sheets: Sequence[FactSheet] = (),
     checks: Mapping[str, VerifyResult] | None = None,
+    geometry: Geometry | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
 
@@ -51,18 +52,20 @@ def build_report(
     a fit can be reported without them, but only those with their samples give the work of each
     stroke. ``recipe_text`` is the recipe as it was written; without it the values are printed as
     read. ``sheets`` are further sections, such as a package's promises or a run of the loop
-    (:func:`sheet_from_mapping`); ``checks`` are trust checks by fit. ``created`` must carry its
+    (:func:`sheet_from_mapping`); ``checks`` are trust checks by fit, ``geometry`` what photographs
+    gave, whose pictures the page carries as far as they leave it small. ``created`` must carry its
     time zone. The same input gives the same bytes; a report there that says just the same keeps
     its time.
 
     Raises MissingError where there is no fit, InputError where ``output_dir`` cannot be written.
     """
-    from scissorcal.report.page import draw_fit, draw_scene, page_text
+    from scissorcal.report.page import draw_fit, draw_scene, whole_page
     from scissorcal.report.twin import twin_text
 
     if created.tzinfo is None:
         raise ValueError("created needs a time zone, for example datetime.now(timezone.utc)")
-    if not fits:
+    geometry = geometry or Geometry()
+    if not fits and not geometry.fits:
         raise MissingError(
             "There is nothing to report yet: no fit was found. Run scissorcal fit, then "
             "scissorcal report again."
@@ -74,6 +77,7 @@ def build_report(
         ),
         tuple(recording for recording in recordings if isinstance(recording, Recording)),
         checks or {},
+        geometry,
     )
     document, materials = compose(
         recipe,
@@ -86,7 +90,7 @@ def build_report(
     )
     document = _with_earlier_time(document, Path(output_dir) / "report.json")
     views = [draw_fit(material) for material in materials]
-    page = page_text(document, views, draw_scene(document, recipe, fits))
+    page = whole_page(document, views, draw_scene(document, recipe, fits), geometry)
     files = ReportFiles(Path(output_dir) / "report.html", Path(output_dir) / "report.json")
     _write_both(files, page, twin_text(document))
     return files

@@ -11,7 +11,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.report.inputs import FactSheet, RecordingSummary
+from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
 from scissorcal.report.sections.critic import (
     ProposalRow,
     ReplaySection,
@@ -23,6 +23,7 @@ from scissorcal.report.sections.edge_force import EdgeForce, force_along_edge
 from scissorcal.report.sections.fracture_work import FractureWork, fracture_work
 from scissorcal.report.sections.friction_curve import FrictionCurve, trace_friction
 from scissorcal.report.sections.friction_map import FrictionMap, map_friction
+from scissorcal.report.sections.geometry import GeometrySection, geometry_verdicts, take_geometry
 from scissorcal.report.sections.headline import Headline, write_headline
 from scissorcal.report.sections.held_out import HeldOutSection, gather_held_out
 from scissorcal.report.sections.law import named
@@ -103,6 +104,7 @@ class ReportDocument:
     material: str
     scene: SceneFacts
     verdicts: VerdictSection
+    geometry: GeometrySection
     scene_torque: SceneTorque
     fits: tuple[FitSection, ...]
     sheets: tuple[SheetSection, ...]
@@ -124,12 +126,13 @@ class Evidence:
     """What fits are reported from besides themselves, all of it optional.
 
     ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
-    checks by fit ("friction", "cut").
+    checks by fit ("friction", "cut"), ``geometry`` what photographs gave.
     """
 
     recordings: tuple[RecordingSummary, ...] = ()
     raw: tuple[Recording, ...] = ()
     checks: Mapping[str, VerifyResult] = field(default_factory=dict)
+    geometry: Geometry = field(default_factory=Geometry)
 
 
 def compose(
@@ -148,7 +151,9 @@ def compose(
         compose_fit(fit, anchor, evidence, friction)
         for fit, anchor in zip(fits, _anchors(fits), strict=True)
     )
-    verdicts = [v for fit in fits for v in fit.verdicts]
+    geometry = take_geometry(recipe, evidence.geometry)
+    verdicts = list(geometry_verdicts(geometry, evidence.geometry))
+    verdicts += [v for fit in fits for v in fit.verdicts]
     verdicts += [
         v for m in materials if m.section.trust_check for v in m.section.trust_check.verdicts
     ]
@@ -162,11 +167,12 @@ def compose(
         recipe.material.name,
         scene_facts(recipe),
         gather_verdicts(verdicts),
+        geometry,
         scene_torque(recipe, fits),
         tuple(material.section for material in materials),
         tuple(take_sheet(sheet) for sheet in sheets),
-        list_left_out(recipe, fits),
-        trace(recipe, recipe_text, fits, evidence.recordings),
+        list_left_out(recipe, fits, tuple((item.fit, item.why) for item in geometry.missing)),
+        trace(recipe, recipe_text, fits, evidence.recordings, evidence.geometry),
     )
     return document, materials
 

@@ -1,13 +1,19 @@
 """What a report is told besides the fits: recordings in brief, and sheets of facts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import PurePath
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
 from typing import Any
 
+from scissorcal.calibration.blade_result import BladeResult
+from scissorcal.calibration.camera_result import CameraFit
+from scissorcal.calibration.plate_result import PlateFit
+from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.numbers import Scalar, scalar
 from scissorcal.verdicts import Verdict
+
+GeometryFit = CameraFit | BladeResult | PlateFit
 
 UNITS = {
     "s": "s",
@@ -66,6 +72,32 @@ def summarise_recording(recording: Recording) -> RecordingSummary:
         recipe_toml=recording.recipe_toml,
         notes=recording.notes,
     )
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What photographs gave: fits of the camera, the blade and the plate, as far as there are any.
+
+    By fit: ``pictures`` are the files that it drew, ``sha256`` is of its own file, and ``missing``
+    says in a sentence why one that the scene requires is not there, and what to run.
+    """
+
+    camera: CameraFit | None = None
+    blade: BladeResult | None = None
+    plate: PlateFit | None = None
+    pictures: Mapping[GeometryKind, tuple[Path, ...]] = field(default_factory=dict)
+    sha256: Mapping[GeometryKind, str] = field(default_factory=dict)
+    missing: Mapping[GeometryKind, str] = field(default_factory=dict)
+
+    @property
+    def fits(self) -> dict[GeometryKind, GeometryFit]:
+        """The fits that are there, in the order in which they build on one another."""
+        every: dict[GeometryKind, GeometryFit | None] = {
+            "camera": self.camera,
+            "blade": self.blade,
+            "plate": self.plate,
+        }
+        return {what: fit for what, fit in every.items() if fit is not None}
 
 
 @dataclass(frozen=True)

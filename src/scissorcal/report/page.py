@@ -12,12 +12,15 @@ from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report import numbers
 from scissorcal.report.document import FitMaterial, FitSection, ReportDocument
+from scissorcal.report.inputs import Geometry
 from scissorcal.report.panel import Panel
+from scissorcal.report.pictures import PAGE_BYTES, PICTURE_BYTES, place_pictures
 from scissorcal.report.sections.critic import show_proposals, show_replay
 from scissorcal.report.sections.edge_force import show_edge_force
 from scissorcal.report.sections.fracture_work import show_work
 from scissorcal.report.sections.friction_curve import draw_friction
 from scissorcal.report.sections.friction_map import show_friction_map
+from scissorcal.report.sections.geometry import GeometryView, geometry_pictures, show_geometry
 from scissorcal.report.sections.held_out import draw_held_out
 from scissorcal.report.sections.pairs import show_pairs, show_prior
 from scissorcal.report.sections.residuals import StrokeResidual, draw_residuals
@@ -142,10 +145,36 @@ def draw_scene(document: ReportDocument, recipe: Recipe, fits: Sequence[FitResul
         return show_scene(document.scene_torque, recipe, fits)
 
 
-def page_text(document: ReportDocument, views: Sequence[FitView], scene: Panel | None) -> str:
+def whole_page(
+    document: ReportDocument, views: Sequence[FitView], scene: Panel | None, geometry: Geometry
+) -> str:
+    """Write the page with as many pictures as it can carry and stay below `PAGE_BYTES`."""
+    section = document.geometry
+    files = geometry_pictures(section, geometry)
+    with drawing_style():
+        without = show_geometry(section, {})
+        if not any(files.values()):
+            return page_text(document, views, scene, without)
+        bare = page_text(document, views, scene, without)
+        # the words around pictures take room too: some hundred bytes each
+        words = 1000 * sum(len(own) for own in files.values())
+        room = min(PAGE_BYTES - len(bare.encode()) - words, PICTURE_BYTES)
+        return page_text(
+            document, views, scene, show_geometry(section, place_pictures(files, room))
+        )
+
+
+def page_text(
+    document: ReportDocument,
+    views: Sequence[FitView],
+    scene: Panel | None,
+    geometry: Sequence[GeometryView] = (),
+) -> str:
     """Write the page; every value from outside is escaped."""
     template = environment().get_template("report.html.j2")
-    return template.render(document=document, views=views, scene=scene, style=style_sheet())
+    return template.render(
+        document=document, views=views, scene=scene, geometry=geometry, style=style_sheet()
+    )
 
 
 def style_sheet() -> str:

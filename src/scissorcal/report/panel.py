@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from scissorcal.report.pictures import Picture
 from scissorcal.report.svg import Svg
 
 
@@ -39,6 +40,7 @@ class Panel:
     """One part of the page. ``lead`` are sentences on top; ``finding`` the one that matters.
 
     ``wide`` figures are not shrunk below a legible width: they scroll sideways on a phone.
+    ``pictures`` are photographs, drawn on.
     """
 
     anchor: str
@@ -48,6 +50,7 @@ class Panel:
     figures: tuple[Svg, ...] = ()
     table: Table | None = None
     wide: bool = False
+    pictures: tuple[Picture, ...] = ()
 
 
 def absent(anchor: str, title: str, why: str) -> Panel:

@@ -12,15 +12,16 @@ from scissorcal.recipe.load import read_text
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.fits import current_fits
+from scissorcal.workday.fits import FIT_ORDER, current_fits
 from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.reported_geometry import report_geometry
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.verify.result import VerifyResult
-    from scissorcal.report import FactSheet
+    from scissorcal.report import FactSheet, Geometry
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Reported:
 def write_workspace_report(workspace: Workspace, *, now: datetime | None = None) -> Reported:
     """Write report/report.html and report/report.json from the workspace's fits and package.
 
-    A fit that is not there yet is named as such in the report. Where nothing that the report says
+    A fit that is not there yet is named as such in the report; one of photographs alone is enough
+    for a report. Where nothing that the report says
     has changed, it keeps its time, and with it a signature. Raises MissingError where there is no
     fit at all, or one has fallen behind.
     """
@@ -56,6 +58,7 @@ def write_workspace_report(workspace: Workspace, *, now: datetime | None = None)
         recipe_text=read_text(workspace.recipe_path),
         sheets=told.sheets,
         checks=told.checks,
+        geometry=told.geometry,
     )
     return Reported(workspace.report_html, workspace.report_json, told.verdicts)
 
@@ -63,6 +66,17 @@ def write_workspace_report(workspace: Workspace, *, now: datetime | None = None)
 def read_workspace_report(workspace: Workspace) -> Reported:
     """The report that lies there, left as it is, with the verdicts on what the workspace holds."""
     return Reported(workspace.report_html, workspace.report_json, _gather(workspace).verdicts)
+
+
+def reportable_fits(workspace: Workspace, recipe: Recipe) -> "dict[FitKind, FitResult]":
+    """Load the fits that a report shows; none where only photographs were fitted so far.
+
+    Raises MissingError where there is nothing to report at all, or a fit has fallen behind.
+    """
+    fitted = any(workspace.fit_path(what).is_file() for what in FIT_ORDER)
+    if not fitted and report_geometry(workspace, recipe).fits:
+        return {}
+    return current_fits(workspace, recipe, partial=True)
 
 
 def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitResult]") -> str:
@@ -80,6 +94,14 @@ def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitR
         shown[what] != (fit.inputs_hash, posterior_sha256(fit)) for what, fit in fits.items()
     ):
         return "it shows other fits than there are now"
+    geometry = report_geometry(workspace, recipe)
+    seen = {
+        row.get("fit"): (row.get("inputs_hash"), row.get("file_sha256"))
+        for row in provenance.get("geometry", [])
+    }
+    there = {what: (fit.inputs_hash, geometry.sha256[what]) for what, fit in geometry.fits.items()}
+    if seen != there:
+        return "it shows other fits of photographs than there are now"
     try:
         reported = parse_recipe(str(provenance.get("recipe_text", "")), "the reported recipe")
     except InputError:
@@ -110,19 +132,22 @@ class _Told:
     fits: "dict[FitKind, FitResult]"
     sheets: "list[FactSheet]"
     checks: "dict[str, VerifyResult]"
+    geometry: "Geometry"
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        found = [verdict for fit in self.fits.values() for verdict in fit.verdicts]
+        found = [verdict for fit in self.geometry.fits.values() for verdict in fit.verdicts]
+        found += [verdict for fit in self.fits.values() for verdict in fit.verdicts]
         found += [verdict for check in self.checks.values() for verdict in check.verdicts]
         return (*found, *(verdict for sheet in self.sheets for verdict in sheet.verdicts))
 
 
 def _gather(workspace: Workspace) -> _Told:
     recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True)
+    fits = reportable_fits(workspace, recipe)
     sheets = _package_sheets(workspace, recipe, fits)
-    return _Told(recipe, fits, sheets, _trust_checks(workspace, fits))
+    checks = _trust_checks(workspace, fits)
+    return _Told(recipe, fits, sheets, checks, report_geometry(workspace, recipe))
 
 
 def _package_sheets(

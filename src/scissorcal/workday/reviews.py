@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.fits import current_fits
-from scissorcal.workday.reports import why_stale
+from scissorcal.workday.reported_geometry import report_geometry
+from scissorcal.workday.reports import reportable_fits, why_stale
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def sign_report(
     from scissorcal.package import REVIEW_FORMAT, Review, stamp
 
     recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True)
+    fits = reportable_fits(workspace, recipe)
     if not workspace.report_json.is_file() or not workspace.report_html.is_file():
         raise MissingError("There is no report to sign yet: run 'scissorcal report' and read it.")
     stale = why_stale(workspace, recipe, fits)
@@ -72,7 +72,7 @@ def sign_report(
             note=note.strip(),
             time_utc=stamp(now or datetime.now(UTC)),
             report_sha256=_sha256(workspace.report_json),
-            fit_hashes={what: fit.inputs_hash for what, fit in fits.items()},
+            fit_hashes=_fit_hashes(workspace, recipe, fits),
         )
     except ValidationError as error:
         first = error.errors()[0]
@@ -106,7 +106,7 @@ def review_state(workspace: Workspace, recipe: Recipe, fits: Fits) -> ReviewStat
         return ReviewState(review, "the report that was signed is gone")
     if _sha256(workspace.report_json) != review.report_sha256:
         return ReviewState(review, "the report changed since it was signed")
-    if review.fit_hashes != {what: fit.inputs_hash for what, fit in fits.items()}:
+    if review.fit_hashes != _fit_hashes(workspace, recipe, fits):
         return ReviewState(review, "it is of other fits than there are now")
     stale = why_stale(workspace, recipe, fits)
     return ReviewState(review, f"its report is stale: {stale}" if stale else "")
@@ -120,7 +120,16 @@ def standing_review(workspace: Workspace) -> "Review | None":
     if not workspace.signature_path.is_file():
         return None
     recipe = workspace.recipe()
-    return review_state(workspace, recipe, current_fits(workspace, recipe, partial=True)).valid
+    return review_state(workspace, recipe, reportable_fits(workspace, recipe)).valid
+
+
+def _fit_hashes(workspace: Workspace, recipe: Recipe, fits: Fits) -> dict[str, str]:
+    """Inputs hashes of all that a report shows: what photographs gave, and the rig's fits."""
+    geometry = report_geometry(workspace, recipe).fits
+    return {
+        **{what: fit.inputs_hash for what, fit in geometry.items()},
+        **{what: fit.inputs_hash for what, fit in fits.items()},
+    }
 
 
 def _sha256(path: Path) -> str:

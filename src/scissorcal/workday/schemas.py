@@ -16,6 +16,7 @@ from scissorcal.recipe.library import schemas_dir
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
+    "blade.schema.json": "scissorcal.calibration.blade_storage:BladeDocument",
     "camera.schema.json": "scissorcal.calibration.camera_storage:CameraDocument",
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",

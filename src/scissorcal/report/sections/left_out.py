@@ -5,11 +5,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scissorcal.calibration.result import FitResult
+from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.numbers import percent, short
 from scissorcal.report.sections.rungs import RungRow, compare_rungs
 
 SAME_WITHIN = 1e-3
+
+PHOTOGRAPHED = ("blade photographs", "plate pose")
+"""What photographs would give, as requirements name it where a scene does without."""
 
 Reason = Literal["not needed", "not chosen", "not there yet"]
 
@@ -23,9 +27,19 @@ class LeftOut:
     why: str
 
 
-def list_left_out(recipe: Recipe, fits: Sequence[FitResult]) -> tuple[LeftOut, ...]:
-    """What the scene does not name, what is missing, and the rungs that were passed over."""
-    return (*_missing(recipe, fits), *_not_needed(recipe), *_not_chosen(fits))
+def list_left_out(
+    recipe: Recipe, fits: Sequence[FitResult], geometry: Sequence[tuple[str, str]] = ()
+) -> tuple[LeftOut, ...]:
+    """What the scene does not name, what is missing, and the rungs that were passed over.
+
+    ``geometry`` names fits of photographs that are missing, and says how to have them.
+    """
+    return (
+        *(LeftOut(f"{what} fit", "not there yet", why) for what, why in geometry),
+        *_missing(recipe, fits),
+        *_not_needed(recipe),
+        *_not_chosen(fits),
+    )
 
 
 def _missing(recipe: Recipe, fits: Sequence[FitResult]) -> Iterable[LeftOut]:
@@ -55,6 +69,10 @@ def _not_needed(recipe: Recipe) -> Iterable[LeftOut]:
             "not needed",
             "The scene says `render_friction = false`.",
         )
+    needs = requirements(recipe)
+    for item in needs.left_out:
+        if item.name in PHOTOGRAPHED:
+            yield LeftOut(item.name, "not needed", f"The recipe says `{item.why}`.")
     for target, words in (
         ("torque", "torque at the pivot"),
         ("handle_force", "force at the handle"),

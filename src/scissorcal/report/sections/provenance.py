@@ -8,7 +8,7 @@ import numpy as np
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report.inputs import RecordingSummary
+from scissorcal.report.inputs import Geometry, RecordingSummary
 from scissorcal.report.numbers import Number, Scalar, finite, scalar
 from scissorcal.report.strokes import split_source, summary_of
 
@@ -51,10 +51,21 @@ class FitOrigin:
 
 
 @dataclass(frozen=True)
+class GeometryOrigin:
+    """A fit of photographs: the hash of its inputs, the SHA-256 of its file, its photographs."""
+
+    fit: str
+    inputs_hash: str
+    file_sha256: str
+    sources: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Provenance:
     """All sources, the fits' inputs, and the recipe as text."""
 
     sources: tuple[SourceRow, ...]
+    geometry: tuple[GeometryOrigin, ...]
     fits: tuple[FitOrigin, ...]
     recipe_text: str
     recipe_text_origin: str
@@ -65,6 +76,7 @@ def trace(
     recipe_text: str,
     fits: Sequence[FitResult],
     recordings: Sequence[RecordingSummary],
+    geometry: Geometry | None = None,
 ) -> Provenance:
     """Tie recordings to fits, and name sources of fits whose recording was not handed in."""
     rows = [_row(recording, fits, recordings) for recording in recordings]
@@ -76,14 +88,24 @@ def trace(
     origins = tuple(
         FitOrigin(fit.what, fit.inputs_hash, posterior_sha256(fit), fit.sources) for fit in fits
     )
-    if recipe_text:
-        return Provenance(tuple(rows), origins, recipe_text, "as written")
-    return Provenance(tuple(rows), origins, recipe.model_dump_json(indent=2), "as read, in JSON")
+    text, how = (
+        (recipe_text, "as written")
+        if recipe_text
+        else (recipe.model_dump_json(indent=2), "as read, in JSON")
+    )
+    return Provenance(tuple(rows), _geometry(geometry or Geometry()), origins, text, how)
 
 
 def posterior_sha256(fit: FitResult) -> str:
     """SHA-256 of a fit's draws: their bytes as little-endian float64, draw by draw."""
     return hashlib.sha256(np.ascontiguousarray(fit.draws, dtype="<f8").tobytes()).hexdigest()
+
+
+def _geometry(geometry: Geometry) -> tuple[GeometryOrigin, ...]:
+    return tuple(
+        GeometryOrigin(what, fit.inputs_hash, geometry.sha256.get(what, ""), fit.sources)
+        for what, fit in geometry.fits.items()
+    )
 
 
 def _row(
