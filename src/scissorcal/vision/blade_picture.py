@@ -191,8 +191,8 @@ class _Canvas:
     ) -> None:
         import cv2
 
-        for shade, thickness in (((0, 0, 0), 3), (colour, 1)):
+        dark = (place[0] + 1, place[1] + 1)
+        for shade, where in (((0, 0, 0), dark), (colour, place)):
             cv2.putText(
-                self.picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.6, shade, thickness,
-                cv2.LINE_AA,
-            )  # fmt: skip
+                self.picture, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.6, shade, 1, cv2.LINE_AA
+            )
