@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.sensors import resolution_of
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -215,7 +216,8 @@ def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
     moved = steps[steps > 0]
     if len(moved) == 0:
         return 0.0
-    step = float(np.quantile(moved, 0.01))
+    seen = resolution_of(position)
+    step = seen if np.isfinite(seen) else float(np.quantile(moved, 0.01))
     share = min(2 * cutoff_Hz / rate_Hz, 1.0)
     noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
     return float(3 * noise)

@@ -180,7 +180,11 @@ def _bandwidth(
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
         return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
     there = replace(
-        law, windows=windows, strokes=_strokes(windows.bins), tails=chosen.rung.likelihood.tails
+        law,
+        windows=windows,
+        strokes=_strokes(windows.bins),
+        tails=chosen.rung.likelihood.tails,
+        shared=None,
     )
     here = chosen.optimum.point
     rung = replace(there.rung(there.observed), starts=here[None, :])
@@ -276,11 +280,14 @@ def _ladder(
     laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
-    return [
-        design(windows, strokes, law, symmetric, joint, settings.adopt)
-        for law in laws
-        for symmetric in both[settings.symmetry]
-    ]
+    ladder: list[FrictionExperiment] = []
+    for law in laws:
+        first, *others = (
+            design(windows, strokes, law, symmetric, joint, settings.adopt)
+            for symmetric in both[settings.symmetry]
+        )
+        ladder += [first, *(replace(other, shared=first.basis) for other in others)]
+    return ladder
 
 
 def _laws(windows: Windows) -> tuple[str, ...]:

@@ -98,20 +98,23 @@ class _Nodes:
     def __init__(self, at: Callable[[float], Array]) -> None:
         self.at = at
         self.known: dict[int, Array] = {}
+        self.last: tuple[float, Array] | None = None
 
     def __call__(self, scale: float) -> Array:
         """Cubic interpolation (Lagrange) in the logarithm of ``scale``."""
+        if self.last is None or self.last[0] != scale:
+            self.last = (scale, self._interpolated(scale))
+        return self.last[1]
+
+    def _interpolated(self, scale: float) -> Array:
         place = float(np.log(scale)) / SPACING
         low = int(np.floor(place))
         t = place - low
-        shares = (
-            -t * (t - 1) * (t - 2) / 6,
-            (t + 1) * (t - 1) * (t - 2) / 2,
-            -(t + 1) * t * (t - 2) / 2,
-            (t + 1) * t * (t - 1) / 6,
-        )
-        nodes = [self._node(low + k) for k in (-1, 0, 1, 2)]
-        return np.asarray(sum(share * node for share, node in zip(shares, nodes, strict=True)))
+        result = self._node(low - 1) * (-t * (t - 1) * (t - 2) / 6)
+        result += self._node(low) * ((t + 1) * (t - 1) * (t - 2) / 2)
+        result += self._node(low + 1) * (-(t + 1) * t * (t - 2) / 2)
+        result += self._node(low + 2) * ((t + 1) * t * (t - 1) / 6)
+        return result
 
     def _node(self, index: int) -> Array:
         if index not in self.known:

@@ -1,7 +1,7 @@
 """The design of a friction fit: motion, law and priors, over which efforts may be measured."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -28,7 +28,8 @@ class FrictionExperiment:
 
     ``windows`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's
     discrete choices: ``law``, ``symmetric``, ``angle_center`` and ``adopt``, the names of adopted
-    terms. ``tails`` are the degrees of freedom of the noise.
+    terms. ``tails`` are the degrees of freedom of the noise. ``shared`` is a basis that another law
+    of the same kind has made already, if any.
     """
 
     windows: Windows
@@ -39,10 +40,12 @@ class FrictionExperiment:
     tails: float = np.inf
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
+    shared: FrictionBasis | None = field(default=None, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the basis out of a pickle: it is made again sooner than it is sent."""
-        return {name: value for name, value in self.__dict__.items() if name != "basis"}
+        kept = {name: value for name, value in self.__dict__.items() if name != "basis"}
+        return {**kept, "shared": None}
 
     @property
     def bins(self) -> Bins:
@@ -68,6 +71,8 @@ class FrictionExperiment:
     @cached_property
     def basis(self) -> FrictionBasis:
         """Friction over these windows for any parameters of the law."""
+        if self.shared is not None:
+            return self.shared
         parts, adopt = LawParts.of(str(self.key["law"])), tuple(self.key["adopt"])
         center = float(self.key["angle_center"])
         return FrictionBasis(self.windows, center, angle=parts.angle, terms=adopt)

@@ -1,6 +1,7 @@
 """Verdicts on a friction law: is it one that a joint can have, and does it hold its ground."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ CERTAIN = 3.0
 MOVED_LIMIT = 4.0
 """Posterior standard deviations by which a parameter may move with the cutoff."""
 UNMOVED = 1e-9
+NOTHING = 0.02
+"""Share of the drive's standard deviation below which a Stribeck level counts as absent."""
 
 CURES = {
     "inertia": "check the signs of the torque and of the opening, and record a quicker excitation",
@@ -39,22 +42,19 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     ``point`` (p,), free of that constraint and of priors, says what they want. Laws without
     viscous friction are offered it. ``share`` is the share of bins that are independent.
     """
-    names, wanted, sd = _freed(experiment, point, share)
-    worst, found = 0.0, []
-    for name, value, spread in zip(names, wanted, sd, strict=True):
-        stem = name.removesuffix("_pos").removesuffix("_neg")
-        if stem in CURES and value < -CERTAIN * spread:
-            worst = min(worst, value / spread)
-            found.append((name, stem, value, spread))
-    if not found:
+    values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
+    rows = _rated(experiment, values)
+    found = [level for row in rows for level in _freed(experiment, row, share)]
+    negative = sorted(level for level in found if level.sds_below > CERTAIN)
+    if not negative:
         why = "No level of friction, nor the inertia, would be negative if it could."
         return Verdict(SCOPE, "physical", "pass", 0.0, CERTAIN, why)
-    listed = ", ".join(
-        f"{name} = {value:.2g} (sd {spread:.1g})" for name, _, value, spread in found
-    )
-    cures = "; ".join(dict.fromkeys(CURES[stem] for _, stem, _, _ in found))
+    worst = {level.name: level for level in negative}.values()
+    listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
+    cures = "; ".join(dict.fromkeys(CURES[one.stem] for one in worst))
     why = f"Freed from the bounds the data want {listed}, which no joint has: {cures}."
-    return Verdict(SCOPE, "physical", "fail", -worst, CERTAIN, why)
+    value = max(one.sds_below for one in worst)
+    return Verdict(SCOPE, "physical", "fail", value, CERTAIN, why)
 
 
 def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
@@ -102,12 +102,36 @@ def bandwidth_verdict(
     return Verdict(SCOPE, "bandwidth", status, value, MOVED_LIMIT, why)
 
 
-def _freed(
-    experiment: FrictionExperiment, point: Array, share: float
-) -> tuple[list[str], Array, Array]:
-    """Names, values and standard deviations of a free least-squares fit near an optimum."""
+@dataclass(frozen=True, order=True)
+class _Level:
+    """What the data want of a level when it is free: sorted, the worst comes last."""
+
+    sds_below: float
+    name: str
+    value: float
+    sd: float
+
+    @property
+    def stem(self) -> str:
+        return self.name.removesuffix("_pos").removesuffix("_neg")
+
+
+def _rated(experiment: FrictionExperiment, values: dict[str, float]) -> list[dict[str, float]]:
+    """Points to look from: the optimum, and without Stribeck friction several speeds of it.
+
+    A Stribeck level that the data want negative ends at nothing, and its speed anywhere.
+    """
+    rows = [values]
+    if 0.0 < values.get("stribeck", 0.0) < NOTHING * float(np.std(experiment.observed)):
+        names = experiment.layout.names
+        slow = float(np.exp(experiment.layout.mean[names.index("stribeck_rate")]))
+        rows += [{**values, "stribeck_rate": factor * slow} for factor in (0.3, 1.0, 3.0)]
+    return rows
+
+
+def _freed(experiment: FrictionExperiment, values: dict[str, float], share: float) -> list[_Level]:
+    """Levels of a free least-squares fit near a point."""
     layout = experiment.layout
-    values = {name: float(value) for name, value in layout.natural(point).items()}
     offered = []
     if LawParts.of(str(experiment.key["law"])).base == "coulomb":
         sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
@@ -116,13 +140,17 @@ def _freed(
     columns = np.stack([_slope(experiment, values, name) for name in names], axis=1)
     residuals = experiment.observed - experiment.mean_at(_arrays(values))
     size = np.sqrt(np.mean(columns**2, axis=0))
-    scaled = columns / np.where(size > 0, size, 1.0)
+    scale = np.where(size > 0, size, np.inf)
+    scaled = columns / scale
     step = np.linalg.lstsq(scaled, residuals, rcond=1e-8)[0]
     variance = float(np.var(residuals - scaled @ step)) / max(share, 1e-6)
     covariance = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10, hermitian=True) * variance
-    scale = np.where(size > 0, size, np.inf)
-    wanted = np.array([values.get(name, 0.0) for name in names]) + step / scale
-    return names, wanted, np.sqrt(np.diag(covariance)) / scale
+    levels = []
+    for name, moved, unit, sd in zip(names, step, scale, np.sqrt(np.diag(covariance)), strict=True):
+        value = values.get(name, 0.0) + float(moved / unit)
+        below = -value / float(sd / unit) if sd > 0 and np.isfinite(unit) else 0.0
+        levels.append(_Level(below, name, value, float(sd / unit)))
+    return [level for level in levels if level.stem in CURES]
 
 
 def _slope(experiment: FrictionExperiment, values: Mapping[str, float], name: str) -> Array:

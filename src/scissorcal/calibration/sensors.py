@@ -18,7 +18,7 @@ FEWEST_SPOILT = 20
 NOISY = 0.2
 """A channel whose neighbouring samples are equal this often has no noise, and then a stretch of
 equal values says nothing about its sensor."""
-STEADY_STEP = 0.9
+STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
 """Flags of a device's state frame (docs/protocol.md)."""
 
@@ -96,14 +96,14 @@ def resolution_of(values: Array) -> float:
     '0.010000'
     """
     levels = np.unique(values)
-    if len(levels) < 3:
-        return float("nan")
     apart = np.diff(levels)
-    step = float(np.median(apart[apart <= 1.5 * np.quantile(apart, 0.1)]))
-    multiples = apart / step
-    steady = np.mean(np.abs(multiples - np.round(multiples)) < 0.05)
-    repeated = len(levels) < 0.9 * len(values)
-    return step if steady > STEADY_STEP and repeated else float("nan")
+    apart = apart[apart > SAME * np.ptp(values)]
+    if len(apart) < 2:
+        return float("nan")
+    least = float(apart.min())
+    step = float(apart.sum() / np.round(apart / least).sum())
+    away = np.abs(apart / step - np.round(apart / step))
+    return step if np.mean(away < NEAR_WHOLE) > STEADY_STEP else float("nan")
 
 
 def _inspect(name: str, values: Array, moves: Mask) -> Channel:

@@ -1,0 +1,106 @@
+"""Sensors: ends of range, dead bands, steps and silence are seen, and nothing where nothing is."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import fit_friction
+from scissorcal.calibration.sensors import channels_of, inspect_sensors, resolution_of
+from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.recording import Recording
+from tests.calibration.truth import Truth, friction_recording
+
+SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+
+
+@pytest.fixture(scope="module")
+def clean() -> Recording:
+    return friction_recording(Truth(), np.random.default_rng(1))
+
+
+def changed(recording: Recording, change) -> Recording:
+    samples = recording.samples.copy()
+    samples["motor_torque"] = change(samples["motor_torque"])
+    return dataclasses.replace(recording, samples=samples)
+
+
+def clipped(recording: Recording, limit: float) -> Recording:
+    return changed(recording, lambda torque: np.clip(torque, -limit, limit))
+
+
+def test_a_clean_recording_keeps_every_sample_and_its_step_is_known(clean):
+    found = inspect_sensors((clean,))
+    assert np.all(found.usable[0])
+    assert found.verdict.status == "pass"
+    opening, torque = channels_of(clean)
+    assert opening.step == pytest.approx(5e-5)
+    assert np.isnan(torque.step)
+    assert any("opening comes in steps of 5e-05 rad" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clean_noise_is_never_called_saturated(seed):
+    rng = np.random.default_rng(seed)
+    one = friction_recording(Truth(), rng)
+    coarse = changed(one, lambda torque: np.round(torque / 2e-4) * 2e-4)
+    assert np.all(inspect_sensors((one, coarse)).usable[0])
+    assert np.all(inspect_sensors((one, coarse)).usable[1])
+
+
+def test_saturated_samples_are_found_and_left_out(clean):
+    found = inspect_sensors((clipped(clean, 0.0165),))
+    torque = np.abs(clean.samples["motor_torque"])
+    beyond = torque > 0.0165
+    assert np.mean(~found.usable[0][beyond]) > 0.6
+    assert not np.any(~found.usable[0][torque < 0.0164])
+    assert any("at an end of its range" in note for note in found.notes)
+
+
+def test_a_fit_to_a_saturated_sensor_says_so_and_is_no_calibration(clean):
+    spoilt = clipped(clean, 0.0155)
+    fit = fit_friction((spoilt,), SIMPLE, effort="draft", rng=np.random.default_rng(2))
+    (verdict,) = [v for v in fit.verdicts if v.check == "sensors"]
+    assert verdict.status == "fail"
+    assert "larger range" in verdict.why
+    assert any("at an end of its range" in note for note in fit.notes)
+
+
+def test_a_dead_band_is_found(clean):
+    band = changed(clean, lambda torque: np.where(np.abs(torque) < 0.012, 0.0, torque))
+    found = inspect_sensors((band,))
+    assert any("a dead band" in note for note in found.notes)
+    assert np.mean(~found.usable[0]) > 0.02
+
+
+def test_a_noiseless_plateau_is_not_called_saturation():
+    """Simulated or smoothed data hold a torque exactly; that says nothing about a sensor."""
+    time = np.arange(20000) / 1000
+    one = friction_recording(Truth(noise=0.0), np.random.default_rng(3))
+    held = np.where(np.sin(time) > 0, 0.013, -0.016)
+    samples = one.samples[:20000].copy()
+    samples["motor_torque"] = held
+    found = inspect_sensors((dataclasses.replace(one, samples=samples),))
+    assert np.all(found.usable[0])
+
+
+def test_flags_of_the_device_count_and_a_silent_channel_is_named(clean):
+    samples = clean.samples.copy()
+    samples["flags"][5000:5100] = 64
+    samples["motor_torque"] = 0.25
+    found = inspect_sensors((dataclasses.replace(clean, samples=samples),))
+    assert not np.any(found.usable[0][5000:5100])
+    assert any("motor_torque is 0.25 N m throughout" in note for note in found.notes)
+
+
+def test_a_step_is_seen_and_a_smooth_channel_has_none():
+    rng = np.random.default_rng(4)
+    smooth = np.cumsum(rng.standard_normal(5000))
+    assert resolution_of(np.round(smooth / 0.25) * 0.25) == pytest.approx(0.25)
+    assert np.isnan(resolution_of(smooth))
+    assert np.isnan(resolution_of(np.full(100, 2.0)))
+
+
+def test_near_zero_rates_are_said_to_be_left_out(clean):
+    fit = fit_friction((clean,), SIMPLE, effort="draft", rng=np.random.default_rng(5))
+    assert any("leave the direction open" in note for note in fit.notes)
