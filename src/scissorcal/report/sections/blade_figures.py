@@ -24,7 +24,7 @@ from scissorcal.report.svg import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from scissorcal.report.sections.blade import BladeEdge, EdgeBand
+    from scissorcal.report.sections.blade_facts import BladeEdge, EdgeBand
 
 LOOKS = ((BLUE, "o"), (VERMILLION, "^"), (GREEN, "s"), (PURPLE, "D"))
 """Colour and marker of the first photographs; further ones take them in turn."""

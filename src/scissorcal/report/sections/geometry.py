@@ -10,13 +10,10 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import Geometry
 from scissorcal.report.panel import Panel, absent
 from scissorcal.report.pictures import Picture, PictureFile
-from scissorcal.report.sections.blade import BladeSection, blade_pictures, show_blade, take_blade
-from scissorcal.report.sections.camera import (
-    CameraSection,
-    camera_pictures,
-    show_camera,
-    take_camera,
-)
+from scissorcal.report.sections.blade import blade_pictures, show_blade
+from scissorcal.report.sections.blade_facts import BladeSection, take_blade
+from scissorcal.report.sections.camera import camera_pictures, show_camera
+from scissorcal.report.sections.camera_facts import CameraSection, take_camera
 from scissorcal.report.sections.headline import Headline
 from scissorcal.report.sections.plate import PlateSection, plate_pictures, show_plate, take_plate
 from scissorcal.verdicts import Verdict

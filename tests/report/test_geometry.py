@@ -1,0 +1,229 @@
+"""What photographs gave: shown where the scene asks for it, with pictures, and no more."""
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import jsonschema
+import numpy as np
+import pytest
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.requirements import GeometryKind
+from scissorcal.recipe.schema import Recipe
+from scissorcal.report import Geometry, build_report
+from scissorcal.report.pictures import PICTURE_BYTES, PictureFile, place_pictures
+from tests.report.conftest import CREATED, Built, paper
+from tests.report.fits import friction_fit
+from tests.report.geometry_fits import (
+    blade_result,
+    camera_fit,
+    geometry,
+    imported_camera,
+    noise,
+    plate_fit,
+)
+from tests.report.pages import read_page, read_twin
+
+HOSTILE = '<script>alert("x")</script>'
+DATA = "data:image/jpeg;base64,"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A report of photographs and what it was made from."""
+
+    built: Built
+    geometry: Geometry
+
+
+def photographed() -> Recipe:
+    """The paper recipe, with its edge and its plate's pose from photographs."""
+    recipe = paper()
+    edge = recipe.rig.edge.model_copy(update={"source": "photographs"})
+    rig = recipe.rig.model_copy(update={"edge": edge})
+    scene = recipe.scene.model_copy(update={"plate_pose": "estimated"})
+    return recipe.model_copy(update={"rig": rig, "scene": scene})
+
+
+def report_of(
+    folder: Path,
+    found: Geometry | None,
+    recipe: Recipe | None = None,
+    fits: Sequence[FitResult] = (),
+) -> Built:
+    files = build_report(
+        recipe or photographed(), fits, [], folder, created=CREATED, geometry=found
+    )
+    return Built(folder, read_page(files.html), read_twin(files.json))
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Shown:
+    folder = tmp_path_factory.mktemp("photographed")
+    found = geometry(folder / "fits")
+    return Shown(report_of(folder, found), found)
+
+
+def test_photographs_alone_make_a_report(shown: Shown) -> None:
+    assert shown.built.twin["fits"] == []
+    assert {"camera", "blade", "plate"} <= set(shown.built.page.ids)
+    assert shown.built.page.unbalanced == []
+
+
+def test_the_twin_follows_its_schema_and_has_the_numbers(shown: Shown) -> None:
+    twin = shown.built.twin
+    schema = json.loads((schemas_dir() / "report.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(twin)
+    camera, blade, plate = (twin["geometry"][kind] for kind in ("camera", "blade", "plate"))
+    fit = camera_fit()
+    assert [row["value"] for row in camera["parameters"][:2]] == [fit.camera.fx, fit.camera.fy]
+    assert camera["parameters"][0]["sd"] == pytest.approx(0.5)
+    assert [view["name"] for view in camera["views"]] == [
+        "board-2.jpg",
+        "board-1.jpg",
+        "board-3.jpg",
+    ]
+    assert camera["cross_validation"] == {"rms_px": 0.2, "claimed_px": 0.17, "p_value": 0.31}
+    (edge,) = blade["edges"]
+    assert edge["offset_m"]["mean"] == pytest.approx(blade_result().blades[0].offset.mean, rel=1e-5)
+    assert edge["nicks"][0]["station_m"] == 0.0421
+    assert len(edge["height_m"]["mean"]) == len(edge["opening_rad"]) * len(edge["contact_m"])
+    assert plate["camera_plate"]["translation_m"] == [0.01, -0.02, 0.4]
+    assert plate["rig_plate"]["quaternion"] == pytest.approx(plate_fit().rig_plate.quaternion)  # type: ignore[union-attr]
+    assert plate["other_apart_deg"] == pytest.approx(np.degrees(2 * np.pi - 5.2), abs=3.0)
+    origins = {row["fit"]: row for row in twin["provenance"]["geometry"]}
+    assert origins["blade"] == {
+        "fit": "blade",
+        "inputs_hash": "b1ade",
+        "file_sha256": "22",
+        "sources": ["blade-1.jpg", "blade-2.jpg"],
+    }
+
+
+def test_verdicts_join_the_list_on_top(shown: Shown) -> None:
+    rows = shown.built.twin["verdicts"]["rows"]
+    assert [row["status"] for row in rows] == ["fail", "not_evaluated", "pass"]
+    ids = shown.built.page.ids
+    assert ids.index("verdicts") < ids.index("camera")
+    stances = {row["fit"]: row["stance"] for row in shown.built.twin["geometry"]["headlines"]}
+    assert stances == {"camera": "reject", "blade": "trust", "plate": "care"}
+
+
+def test_the_page_says_what_staff_must_know(shown: Shown) -> None:
+    text = shown.built.page.text
+    for words in (
+        "board-2.jpg fits far worse than the others",
+        "differ by 0.20 px (rms) where 0.17 px is claimed",
+        "10.00 ± 0.10",  # the plate's x in mm
+        "odds of 40 to 1",
+        "The edge is an arc",
+        "42.1",  # the nick's place in mm
+        "−8.000 0.020",  # the edge's offset in mm
+    ):
+        assert words in text, words
+
+
+def test_pictures_are_within_the_page_and_in_words(shown: Shown) -> None:
+    page = shown.built.page
+    pictures = page.all("img")
+    assert len(pictures) == 7  # all but the chart that is drawn anew
+    for picture in pictures:
+        assert picture["src"].startswith(DATA)
+        raw = np.frombuffer(base64.b64decode(picture["src"].removeprefix(DATA)), np.uint8)
+        image = cv2.imdecode(raw, cv2.IMREAD_COLOR)
+        assert image is not None
+        assert image.shape[:2] == (int(picture["height"]), int(picture["width"]))
+        assert len(picture["alt"]) > 40
+    assert len({picture["alt"] for picture in pictures}) == len(pictures)
+    for figure in page.all("figure", **{"class": "photo"}):
+        assert figure["tabindex"] == "0"
+    assert page.values("src") == [picture["src"] for picture in pictures]
+
+
+def test_the_same_input_gives_the_same_bytes(shown: Shown, tmp_path: Path) -> None:
+    again = report_of(tmp_path, shown.geometry)
+    assert again.page.source == shown.built.page.source
+
+
+def test_what_the_scene_does_not_require_is_not_shown(shown: Shown, tmp_path: Path) -> None:
+    plain = report_of(tmp_path, shown.geometry, paper(), [friction_fit()])
+    assert not {"camera", "blade", "plate"} & set(plain.page.ids)
+    assert plain.page.all("img") == []
+    told = plain.twin["geometry"]
+    assert told == {"headlines": [], "camera": None, "blade": None, "plate": None, "missing": []}
+    assert all(row["scope"] != "fit.camera" for row in plain.twin["verdicts"]["rows"])
+    left_out = {row["what"]: row["reason"] for row in plain.twin["left_out"]}
+    assert left_out["blade photographs"] == left_out["plate pose"] == "not needed"
+
+
+def test_what_is_missing_names_the_command(shown: Shown, tmp_path: Path) -> None:
+    lost = "The scene requires it: its inputs changed since. Run `scissorcal fit plate`."
+    found = replace(shown.geometry, blade=None, plate=None, missing={"plate": lost})
+    report = report_of(tmp_path, found)
+    assert "scissorcal capture blade --image blade-*.jpg" in report.page.text
+    assert "its inputs changed since. Run scissorcal fit plate" in report.page.text
+    assert [row["fit"] for row in report.twin["geometry"]["missing"]] == ["blade", "plate"]
+    reasons = {row["what"]: row["reason"] for row in report.twin["left_out"]}
+    assert reasons["blade fit"] == reasons["plate fit"] == "not there yet"
+
+
+def test_an_imported_camera_and_an_edge_without_scale(tmp_path: Path) -> None:
+    found = Geometry(imported_camera(), blade_result(metric=False, nicked=False))
+    report = report_of(tmp_path, found)
+    text = report.page.text
+    assert "Nobody said how well this camera is known" in text
+    assert "k6, radial distortion, below the line" in text
+    assert "Its size is not known" in text
+    assert "No nick was found" in text
+    assert "µm" not in " ".join(figure["aria-label"] for figure in report.page.all("svg"))
+
+
+def test_words_from_photographs_never_become_markup(tmp_path: Path) -> None:
+    camera = camera_fit()
+    views = tuple(replace(view, name=HOSTILE) for view in camera.views)
+    found = geometry(tmp_path / "fits")
+    found = replace(found, camera=replace(camera, views=views, board=HOSTILE, sources=(HOSTILE,)))
+    page = report_of(tmp_path, found).page
+    assert "<script" not in page.source
+    assert page.unbalanced == []
+
+
+def test_many_pictures_are_dropped_and_named(tmp_path: Path) -> None:
+    found = geometry(tmp_path / "fits", size=(1100, 900))
+    report = report_of(tmp_path, found)
+    size = len(report.page.source.encode())
+    kept = report.page.all("img")
+    assert PICTURE_BYTES // 2 < size < 5_000_000
+    assert 0 < len(kept) < 7
+    assert sum(len(picture["src"]) for picture in kept) <= PICTURE_BYTES
+    assert report.page.text.count("left out to keep this page small") == 7 - len(kept)
+
+
+def test_the_first_of_each_fit_come_before_the_second_of_any(tmp_path: Path) -> None:
+    files = {
+        kind: [
+            PictureFile(noise(tmp_path / kind / f"{n}.png", (64, 48)), "", "", "") for n in range(3)
+        ]
+        for kind in ("camera", "blade")
+    }
+    whole = place_pictures(files, 10**9)
+    room = len(whole["camera"][0].data) + len(whole["blade"][0].data)
+    some = place_pictures(files, room)
+    assert [[bool(one.data) for one in own] for own in some.values()] == [[True, False, False]] * 2
+    assert "2.png is left out" in some["blade"][2].caption
+
+
+def test_a_picture_that_is_gone_is_named(shown: Shown, tmp_path: Path) -> None:
+    torn = tmp_path / "001-blade-1.png"
+    torn.write_bytes(b"no picture")
+    pictures: dict[GeometryKind, tuple[Path, ...]] = {
+        "blade": (torn, tmp_path / "002-blade-2.png")
+    }
+    report = report_of(tmp_path, replace(shown.geometry, pictures=pictures))
+    assert report.page.all("img") == []
+    assert report.page.text.count("not there any more, or damaged") == 2
