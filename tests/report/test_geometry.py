@@ -11,6 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from scissorcal.calibration.blade_result import SeenOpening
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.recipe.requirements import GeometryKind
@@ -183,6 +184,18 @@ def test_an_imported_camera_and_an_edge_without_scale(tmp_path: Path) -> None:
     assert "µm" not in " ".join(figure["aria-label"] for figure in report.page.all("svg"))
 
 
+def test_both_blades_of_open_scissors_have_parts_of_their_own(tmp_path: Path) -> None:
+    (one,) = blade_result().blades
+    pair = tuple(replace(one, name=name) for name in ("left", "right"))
+    openings = (SeenOpening("blade-1.jpg", np.radians(40.0)), SeenOpening("blade-2.jpg", 0.0))
+    found = Geometry(blade=replace(blade_result(), blades=pair, openings=openings))
+    page = report_of(tmp_path, found).page
+    assert len(set(page.ids)) == len(page.ids)
+    assert {"blade-left-shape", "blade-right-shape", "blade-openings"} <= set(page.ids)
+    assert "blade-1.jpg 40" in page.text
+    assert "blade-2.jpg closed" in page.text
+
+
 def test_words_from_photographs_never_become_markup(tmp_path: Path) -> None:
     camera = camera_fit()
     views = tuple(replace(view, name=HOSTILE) for view in camera.views)
@@ -221,9 +234,7 @@ def test_the_first_of_each_fit_come_before_the_second_of_any(tmp_path: Path) -> 
 def test_a_picture_that_is_gone_is_named(shown: Shown, tmp_path: Path) -> None:
     torn = tmp_path / "001-blade-1.png"
     torn.write_bytes(b"no picture")
-    pictures: dict[GeometryKind, tuple[Path, ...]] = {
-        "blade": (torn, tmp_path / "002-blade-2.png")
-    }
+    pictures: dict[GeometryKind, tuple[Path, ...]] = {"blade": (torn, tmp_path / "002-blade-2.png")}
     report = report_of(tmp_path, replace(shown.geometry, pictures=pictures))
     assert report.page.all("img") == []
     assert report.page.text.count("not there any more, or damaged") == 2
