@@ -13,7 +13,8 @@ from scissorcal.calibration.blade_storage import load_blade, save_blade
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
-from scissorcal.vision.blade import BladeMeasurement, BorderPoints
+from scissorcal.vision.blade import BladeMeasurement
+from scissorcal.vision.blade_borders import BorderPoints
 from scissorcal.vision.blade_parts import BladeParts
 
 LENGTH = 0.075

@@ -204,10 +204,12 @@ def _rows(
 
 
 def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
+    scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
     spoilt = max(row.spoilt_share for row in fit.photographs)
     worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
     checks = [
         _verdict(
+            scope,
             "clear edge",
             spoilt,
             MOST_SPOILT,
@@ -218,7 +220,7 @@ def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
     if len(fit.photographs) < 2:
         checks.append(
             Verdict(
-                SCOPE,
+                scope,
                 "photographs agree",
                 "not_evaluated",
                 None,
@@ -232,6 +234,7 @@ def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
         value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
         checks.append(
             _verdict(
+                scope,
                 "photographs agree",
                 float(value),
                 MOST_DISAGREEMENT,
@@ -242,9 +245,9 @@ def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
     return tuple(checks)
 
 
-def _verdict(check: str, value: float, threshold: float, why: str) -> Verdict:
+def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -> Verdict:
     status: Status = "pass" if value <= threshold else "fail"
-    return Verdict(SCOPE, check, status, value, threshold, why)
+    return Verdict(scope, check, status, value, threshold, why)
 
 
 def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -> tuple[str, ...]:

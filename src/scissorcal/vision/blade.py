@@ -1,14 +1,15 @@
 """A blade in one photograph: its edge to a fraction of a pixel, and what makes it uncertain."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import InputError
+from scissorcal.vision.blade_borders import BorderPoints, find_border, find_hole, fit_circle
 from scissorcal.vision.blade_parts import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
 from scissorcal.vision.blade_view import View
-from scissorcal.vision.profile import Crossings, Light, crossings, steepest
+from scissorcal.vision.profile import Light
 
 Array = NDArray[np.float64]
 
@@ -18,26 +19,7 @@ TONE_SHARE = 0.12
 GRAIN_SHARE = 0.5
 """Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
 
-_MOST_POINTS = 3000
-_SHADOW_SEARCH = 0.05
-_LEAST_GOOD = {"edge": 0.6, "back": 0.3}
-_LEAST_IN_SHADOW = 0.4
-_MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
-
-
-@dataclass(frozen=True)
-class BorderPoints:
-    """Border points of one part in the picture: ``pixels`` (n, 2), unit ``normals`` (n, 2) outward.
-
-    ``sd_px`` (n,) is how well each is known along its normal.
-    """
-
-    pixels: Array
-    normals: Array
-    sd_px: Array
-    softness: Array
-    blur_px: float
-    good_share: float
+_ANCHORS, _STRETCHES = 14, 30
 
 
 @dataclass(frozen=True)
@@ -79,9 +61,11 @@ def measure_blade(
     ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
-    edge = _border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
-    back = _border(light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search)
-    hole = _hole(light, view, parts)
+    edge = find_border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
+    back = find_border(
+        light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
+    )
+    hole = find_hole(light, view, parts)
     scene = _Scene(view, parts, edge, back, hole)
     place = scene.place()
     columns, names = _modes(scene, place)
@@ -132,7 +116,7 @@ class _Scene:
         if self.hole is None:
             pivot, radius = self._moved_pivot(), 0.0
         else:
-            pivot, radius = _circle(self._on_sheet(self.hole))
+            pivot, radius = fit_circle(self._on_sheet(self.hole))
         pivot = pivot + np.asarray(self.pivot_shift)
         axis, up = self.parts.axis, self.parts.up
         for _ in range(3):
@@ -267,173 +251,43 @@ def _halved(
 
 
 def _smooth(station: Array, offset: Array, along: Array) -> Array:
-    """A side of the blade, by medians of stretches: neither nicks nor glare should turn it."""
-    cells = np.linspace(along[0], along[-1], 31)
-    index = np.digitize(station, cells) - 1
-    middles, medians = [], []
-    for cell in range(30):
-        here = index == cell
-        if here.sum() >= 2:
-            middles.append(float(np.median(station[here])))
-            medians.append(float(np.median(offset[here])))
-    return np.asarray(np.interp(along, middles, medians))
+    """A side of the blade at places along it, whatever nicks and glare take out of it.
+
+    Of all parabolas through three of the side's stretches the one that most stretches lie nearest
+    to tells what belongs to it; medians of that are the side, and the parabola where there are
+    none.
+    """
+    here = (station > along[0]) & (station < along[-1])
+    s, e = station[here], offset[here]
+    middle = 0.5 * (along[0] + along[-1])
+    anchors = np.array(
+        [
+            (np.median(x), np.median(y))
+            for x, y in zip(np.array_split(s, _ANCHORS), np.array_split(e, _ANCHORS), strict=True)
+            if len(x)
+        ]
+    )
+    triples = np.array(list(combinations(range(len(anchors)), 3)))
+    powers = np.vander(anchors[:, 0] - middle, 3)
+    curves = np.linalg.solve(powers[triples], anchors[triples, 1][..., None])[..., 0]
+    off = np.abs(anchors[:, 1] - curves @ powers.T)
+    curve = curves[np.argmin(np.quantile(off, 0.6, axis=1))]
+    for _ in range(2):
+        rest = np.abs(e - np.polyval(curve, s - middle))
+        kept = rest < 4.0 * 1.4826 * float(np.quantile(rest, 0.4)) + 1e-12
+        curve = np.polyfit(s[kept] - middle, e[kept], 2)
+    cells = np.linspace(along[0], along[-1], _STRETCHES + 1)
+    index = np.digitize(s, cells) - 1
+    places = 0.5 * (cells[1:] + cells[:-1])
+    values = np.polyval(curve, places - middle)
+    for cell in range(_STRETCHES):
+        own = kept & (index == cell)
+        if own.sum() >= 2:
+            shift = e[own] - np.polyval(curve, s[own] - middle)
+            values[cell] += float(np.median(shift))
+    return np.asarray(np.interp(along, places, values))
 
 
 def _turned(axis: Array, up: Array, angle: float) -> tuple[Array, Array]:
     c, s = np.cos(angle), np.sin(angle)
     return c * axis + s * up, c * up - s * axis
-
-
-def _border(
-    light: Light,
-    view: View,
-    parts: BladeParts,
-    side: Array,
-    first: float,
-    last: float,
-    source: str,
-    what: str,
-    search: float,
-) -> BorderPoints:
-    """Cross one side of a blade in the picture, about once every pixel."""
-    frame = parts.frame(side)
-    there = (frame[:, 0] > first * parts.length) & (frame[:, 0] < last * parts.length)
-    if there.sum() < 20:
-        raise InputError(f"{source}: too little of the blade's {what} can be seen.")
-    s, e = _thinned(frame[there])
-    rough = _in_pixels(view, parts, s, e)
-    count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
-    stations = np.linspace(s[0], s[-1], count)
-    per_unit = count / max(s[-1] - s[0], 1e-12)
-    offsets = np.interp(stations, s, e)
-    outward = np.sign(np.median(e))
-    shadowed = what == "edge" and search > _SHADOW_SEARCH
-    for soft, far in ((1.2 if shadowed else 2.0, search), (1.5, 0.012)):
-        points, normals = _with_normals(view, parts, stations, offsets, outward)
-        reach = float(np.clip(far * parts.length * per_unit, 6.0, 80.0))
-        shift = steepest(light, points, normals, reach, soft, innermost=shadowed and far == search)
-        offsets = offsets + outward * shift / per_unit
-    points, normals = _with_normals(view, parts, stations, offsets, outward)
-    found = crossings(light, points, normals, 6.0)
-    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
-    if blur > 1.6:
-        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
-        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
-    good = found.good & _alike(found)
-    share = float(good.mean())
-    _refuse_blur(blur, per_unit, parts, source)
-    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD[what]):
-        raise InputError(
-            f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
-            "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
-            "the metal looks darker than the sheet."
-        )
-    seen = points + normals * found.place[:, None]
-    return BorderPoints(
-        seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
-    )
-
-
-def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -> None:
-    width = float(np.median(np.abs(parts.frame(parts.edge)[:, 1]))) * per_unit
-    if not blur < max(_MOST_BLUR_PX, _MOST_BLUR_SHARE * width):
-        raise InputError(
-            f"{source} is too blurred: borders are {blur:.1f} pixels soft. Hold the camera still, "
-            "focus on the blade, and try again."
-        )
-
-
-def _alike(found: Crossings) -> NDArray[np.bool_]:
-    """Crossings whose blur and contrast are like those of most."""
-    contrast = found.outer - found.inner
-    usual = np.median(contrast[found.good]) if found.good.any() else 0.0
-    blur = np.median(found.blur[found.good]) if found.good.any() else 1.0
-    return np.asarray(
-        (contrast * np.sign(usual) > 0.25 * abs(usual))
-        & (found.blur < 1.8 * blur + 0.2)
-        & (found.blur > 0.4 * blur - 0.3)
-    )
-
-
-def _hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | None:
-    if not len(parts.hole):
-        return None
-    middle = parts.hole.mean(axis=0)
-    radius = float(np.linalg.norm(parts.hole - middle, axis=1).mean())
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]
-    ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    for _ in range(2):
-        points = view.to_pixels(middle + radius * ring)
-        inward = view.to_pixels(middle + 0.98 * radius * ring) - points
-        size = float(np.median(np.linalg.norm(points - points.mean(axis=0), axis=1)))
-        normals = inward / np.linalg.norm(inward, axis=1, keepdims=True)
-        found = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
-        if found.good.sum() < 60:
-            return None
-        seen = points + normals * found.place[:, None]
-        middle, radius = _circle(view.to_sheet(seen[found.good]))
-        off = np.abs(np.linalg.norm(view.to_sheet(seen) - middle, axis=1) - radius)
-        sure = found.good & (off < 4.0 * 1.4826 * np.median(off[found.good]) + 1e-12)
-        middle, radius = _circle(view.to_sheet(seen[sure]))
-    return BorderPoints(
-        seen[sure],
-        normals[sure],
-        found.sd[sure],
-        np.ones(int(sure.sum())),
-        float(np.median(found.blur[sure])),
-        1.0,
-    )
-
-
-def _circle(points: Array) -> tuple[Array, float]:
-    """Least-squares circle: algebraic start, then Gauss-Newton on the distances."""
-    middle = points.mean(axis=0)
-    away = points - middle
-    design = np.column_stack([2.0 * away, np.ones(len(away))])
-    a, b, c = np.linalg.lstsq(design, np.sum(away**2, axis=1), rcond=None)[0]
-    centre, radius = np.array([a, b]), float(np.sqrt(max(c + a * a + b * b, 0.0)))
-    for _ in range(10):
-        out = away - centre
-        distance = np.linalg.norm(out, axis=1)
-        J = np.column_stack([-out / distance[:, None], -np.ones(len(out))])
-        step = np.linalg.lstsq(J, -(distance - radius), rcond=None)[0]
-        centre, radius = centre + step[:2], radius + float(step[2])
-    return middle + centre, radius
-
-
-def _thinned(frame: Array) -> tuple[Array, Array]:
-    """One offset per station, smoothed over a few flat pixels."""
-    order = np.argsort(frame[:, 0])
-    s, e = frame[order, 0], frame[order, 1]
-    cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
-    index = np.digitize(s, cells)
-    kept = [(s[index == k].mean(), np.median(e[index == k])) for k in np.unique(index)]
-    thin = np.array(kept)
-    return thin[:, 0], _median_filtered(thin[:, 1], 5)
-
-
-def _median_filtered(values: Array, width: int) -> Array:
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(values, size=width, mode="nearest"))
-
-
-def _in_pixels(view: View, parts: BladeParts, s: Array, e: Array) -> Array:
-    return view.to_pixels(parts.pivot + s[:, None] * parts.axis + e[:, None] * parts.up)
-
-
-def _with_normals(
-    view: View, parts: BladeParts, s: Array, e: Array, outward: float
-) -> tuple[Array, Array]:
-    """Points in the picture and unit normals there that lead out of the blade."""
-    from scipy.ndimage import gaussian_filter1d
-
-    smooth = gaussian_filter1d(e, 8.0, mode="nearest")
-    points = _in_pixels(view, parts, s, e)
-    line = _in_pixels(view, parts, s, smooth)
-    along = np.gradient(line, axis=0)
-    normals = np.column_stack([along[:, 1], -along[:, 0]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    step = outward * 0.01 * parts.length
-    leads = _in_pixels(view, parts, s, smooth + step) - line
-    return points, normals * np.sign(np.sum(leads * normals, axis=1))[:, None]

@@ -58,7 +58,8 @@ def blade_picture(
     """
     canvas = _Canvas(photo, _frame(photo, view, outline, measured))
     if outline is not None:
-        canvas.line(view.to_pixels(outline.outer), OUTLINE, closed=True)
+        for border in (outline.outer, *outline.others):
+            canvas.line(view.to_pixels(border), OUTLINE, closed=True)
     factor = 0.0
     for index, one in enumerate(measured):
         edge = edges[index] if index < len(edges) else None
@@ -128,7 +129,7 @@ def _frame(
     height, width = photo.image.shape[:2]
     points = [one.edge.pixels for one in measured] + [one.pivot_px[None] for one in measured]
     if outline is not None:
-        points.append(view.to_pixels(outline.outer))
+        points += [view.to_pixels(border) for border in (outline.outer, *outline.others)]
     every = np.concatenate(points) if points else np.array([[0.0, 0.0], [width, height]])
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0), every.max(axis=0)
