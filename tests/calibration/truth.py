@@ -72,6 +72,25 @@ class Truth:
         return x + _bisect(lambda d: self.cut(theta, x + d)[1] < arrest, 0.08)
 
 
+@dataclass(frozen=True)
+class TwoSlopes(Truth):
+    """A response that stiffens at a knee: no power law and no exponential."""
+
+    knee: float = 5e-4
+    steeper: float = 3.5
+
+    def response(self, delta: float) -> float:
+        if delta <= 0:
+            return 0.0
+        if delta <= self.knee:
+            return self.force * (delta / self.reference) ** self.exponent
+        return (
+            self.force
+            * (self.knee / self.reference) ** self.exponent
+            * (delta / self.knee) ** self.steeper
+        )
+
+
 def sweep(low: float, high: float, speed: float) -> np.ndarray:
     """Opening from ``low`` to ``high``: constant speed with rounded ends."""
     count = int(abs(high - low) / speed * RATE_HZ * 1.15) + 40
@@ -234,4 +253,20 @@ def loaded_cut_recording(truth: Truth, rng: np.random.Generator, sheets: int = 3
                 strokes.append(Stroke(len(strokes), kind, v, sheet))
                 opening.append(sweep(a, b, v))
                 advance.append(x_n)
+    return make_recording("cut", opening, advance, strokes, truth, rng, True)
+
+
+def press_recording(truth: Truth, rng: np.random.Generator, presses: int = 6) -> Recording:
+    """Presses at several contacts, to about the same indentation, in which nothing is cut."""
+    opening, advance, strokes = [], [], []
+    speeds, high = (0.1, 0.25, 0.6), 0.75
+    for k in range(presses):
+        place = 0.02 + 0.005 * (k % 3)
+        closed = _bisect(
+            lambda t, x=place: truth.height(x, (high - t) / 2)[0] < truth.upper_face - 1.2e-3, high
+        )
+        for a, b, kind in ((high, high - closed, "closing"), (high - closed, high, "opening")):
+            strokes.append(Stroke(len(strokes), kind, speeds[k % 3], k))
+            opening.append(sweep(a, b, speeds[k % 3]))
+            advance.append(-place)
     return make_recording("cut", opening, advance, strokes, truth, rng, True)

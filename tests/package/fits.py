@@ -40,12 +40,18 @@ def cut_fit(
     energy: float | None = 0.5,
     kappa: float | None = None,
     damping: float | None = None,
+    shape: tuple[float, ...] = (),
     spread: float = 0.03,
     seed: int = 1,
     draws: int = 400,
 ) -> FitResult:
-    """A cut fit that agrees with a recipe; ``energy`` None for a scene that only presses."""
+    """A cut fit that agrees with a recipe; ``energy`` None for a scene that only presses.
+
+    ``shape`` is a spline's, whose knots lie about the reference indentation.
+    """
+    reference = chosen.fit.cut.reference_indentation_mm * 1e-3
     values = {"response_force": force, "response_exponent": exponent}
+    values |= {f"response_shape_{index}": step for index, step in enumerate(shape, 1)}
     fracture = "none"
     if energy is not None:
         values["fracture_energy"] = energy
@@ -61,7 +67,7 @@ def cut_fit(
         "rate_damping": damping is not None,
         "fracture": fracture,
         "closure": chosen.scene.closure,
-        "reference_indentation_m": chosen.fit.cut.reference_indentation_mm * 1e-3,
+        "reference_indentation_m": reference,
         "moving_blades": chosen.rig.moving_blades,
         "upper_face_m": chosen.upper_face_m,
         "edge": {
@@ -72,6 +78,8 @@ def cut_fit(
             "curvature_per_m": edge.curvature_per_m,
         },
     }
+    if shape:
+        structure["response_knots_m"] = [reference * 2.0**k for k in range(-2, len(shape))]
     return _result("cut", values, structure, spread, seed, draws)
 
 

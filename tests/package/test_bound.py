@@ -25,6 +25,14 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "pressed, steep": ("press-only", {"energy": None, "exponent": 8.0}),
     "damped": ("paper-80gsm", {"kappa": 0.7, "damping": 20.0}),
     "pressed, much damped": ("press-only", {"energy": None, "damping": 90.0}),
+    "spline": (
+        "paper-80gsm",
+        {"response": "spline", "shape": (0.8, -0.5, 0.4), "kappa": 0.6, "damping": 5.0},
+    ),
+    "pressed, spline": (
+        "press-only",
+        {"energy": None, "response": "spline", "shape": (-0.8, 1.2, 0.3), "force": 5.0},
+    ),
     "pressed, exponential": ("press-only", {"energy": None, "response": "exponential"}),
 }
 

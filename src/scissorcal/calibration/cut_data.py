@@ -1,7 +1,7 @@
 """What a cut's fit needs beside its motion: friction's posterior, geometry, the law by name."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -82,12 +82,7 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
     """
     return Cutting(
         edge=edge_from(structure, values),
-        response=Response(
-            structure["response"],
-            values["response_force"],
-            values["response_exponent"],
-            structure["reference_indentation_m"],
-        ),
+        response=_response_from(structure, values),
         moving_blades=structure["moving_blades"],
         upper_face_m=structure["upper_face_m"],
         fracture_energy=values.get("fracture_energy"),
@@ -95,6 +90,16 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
         closure=structure["closure"],
         rate_damping=values.get("rate_damping", 0.0),
     )
+
+
+def _response_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Response:
+    family, reference = structure["response"], structure["reference_indentation_m"]
+    plain = Response(family, values["response_force"], values["response_exponent"], reference)
+    if family != "spline":
+        return plain
+    knots = tuple(structure["response_knots_m"])
+    steps = [values[f"response_shape_{index}"] for index in range(1, len(knots) - 1)]
+    return replace(plain, shape=np.stack(steps, axis=-1), knots_m=knots)
 
 
 def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:

@@ -5,25 +5,63 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.calibration.cut_data import FrictionPrior, geometry_of
 from scissorcal.calibration.cut_experiment import CutExperiment
 from scissorcal.calibration.cut_layout import CutLaw, material_layout
 from scissorcal.calibration.cut_motion import CutMotion
 from scissorcal.calibration.ladder import Climbed, Rung, climb
-from scissorcal.model import EdgeBelief
+from scissorcal.calibration.layout import Layout
+from scissorcal.inference import find_optimum
+from scissorcal.model import EdgeBelief, edge_height
 from scissorcal.recipe.schema import Recipe
 
+Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 STARTING_KAPPAS = (0.9, 0.6)
+KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99
 
 
 def cut_designs(
     motion: CutMotion, friction: FrictionPrior, recipe: Recipe, belief: EdgeBelief
 ) -> list[CutExperiment]:
-    """Every law that the recipe allows over one set of motions, cheapest first."""
-    return [cut_design(motion, friction, recipe, belief, law) for law in allowed_laws(recipe)]
+    """Every law that the recipe allows over one set of motions, cheapest first.
+
+    The knots of a spline are placed, and its search begins, by a power law that is fitted first.
+    """
+    laws = allowed_laws(recipe)
+    if all(law.response != "spline" for law in laws):
+        return [cut_design(motion, friction, recipe, belief, law) for law in laws]
+    scouting = CutLaw("power", "smooth" if recipe.scene.cut else "none")
+    scout = cut_design(motion, friction, recipe, belief, scouting)
+    point = _explored(scout)
+    knots = place_knots(scout, point)
+    designs = []
+    for law in laws:
+        spline = law.response == "spline"
+        chosen = replace(law, knots_m=knots) if spline else law
+        design = cut_design(motion, friction, recipe, belief, chosen)
+        begin = _carried_over(scout.layout, point, design.layout)
+        designs.append(replace(design, begin=tuple(begin.tolist())) if spline else design)
+    return designs
+
+
+def place_knots(design: CutExperiment, point: Array) -> tuple[float, ...]:
+    """Knots (m) of a spline over the indentations that data reach by a law at ``point`` (p,).
+
+    Evenly in the logarithm, up to the deepest (the 99 % quantile) from an eighth of it: below, a
+    response bears little that is felt.
+    """
+    motion = design.motion
+    contact = design.expected(point).contact
+    view = edge_height(design.belief.edge, contact, motion.bins.opening / motion.moving_blades)
+    depth = float(design.structure["upper_face_m"]) - view.height
+    pressed = depth[depth > 0.0]
+    reference = float(design.structure["reference_indentation_m"])
+    deepest = float(np.quantile(pressed, DEEPEST)) if len(pressed) else reference
+    return tuple(float(f"{knot:.4g}") for knot in np.geomspace(deepest / SPAN, deepest, KNOTS))
 
 
 def cut_design(
@@ -58,7 +96,10 @@ def climb_cut_ladder(designs: list[CutExperiment], progress: Progress) -> list[C
 def allowed_laws(recipe: Recipe) -> list[CutLaw]:
     """The laws that a recipe lets the ladder have, cheapest first."""
     settings = recipe.fit.cut
-    families = ("power", "exponential") if settings.response == "auto" else (settings.response,)
+    families = {
+        "auto": ("power", "exponential"),
+        "auto+spline": ("power", "exponential", "spline"),
+    }.get(settings.response, (settings.response,))
     fractures: tuple[str, ...] = ("smooth", "rippled")
     if not recipe.scene.cut:
         fractures = ("none",)
@@ -67,6 +108,21 @@ def allowed_laws(recipe: Recipe) -> list[CutLaw]:
     dampings = {"none": (False,), "fit": (True,), "auto": (False, True)}[settings.rate_damping]
     laws = itertools.product(fractures, dampings, families)
     return [CutLaw(family, fracture, damped) for fracture, damped, family in laws]
+
+
+def _explored(scout: CutExperiment) -> Array:
+    """Where a law is most likely, by the best of its starts alone."""
+    rung = scout.rung(scout.observed)
+    return find_optimum(replace(rung, starts=rung.starts[:1]).problem(scout.series)).point
+
+
+def _carried_over(source: Layout, point: Array, target: Layout) -> Array:
+    """A point of one layout (p,) in another (q,), whose own parameters start at their priors."""
+    start = target.mean.copy()
+    for index, name in enumerate(target.names):
+        if name in source.names:
+            start[index] = point[source.names.index(name)]
+    return start
 
 
 def _nearest(design: CutExperiment, climbed: list[Climbed]) -> Climbed | None:
@@ -78,10 +134,11 @@ def _nearest(design: CutExperiment, climbed: list[Climbed]) -> Climbed | None:
 def _from_neighbour(rung: Rung, neighbour: Climbed) -> Rung:
     """Start a rung where its neighbour ended, in the parameters that mean the same in both."""
     names = list(neighbour.rung.layout.names)
-    same_family = rung.key["response"] == neighbour.rung.key["response"]
+    families = {rung.key["response"], neighbour.rung.key["response"]}
+    alike = len(families) == 1 or "exponential" not in families
     start = rung.starts[0].copy()
     for index, name in enumerate(rung.layout.names):
-        if name in names and (same_family or name != "response_exponent"):
+        if name in names and (alike or name != "response_exponent"):
             start[index] = neighbour.optimum.point[names.index(name)]
     return replace(rung, starts=start[None, :])
 

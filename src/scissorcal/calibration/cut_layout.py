@@ -26,6 +26,12 @@ it uniform (0, with 0.29 about it); blades that yield stop where the force is hi
 the crack would run (-0.5). Priors of the place that rests have in common, and of the spread of each
 about it."""
 
+SHAPE_SD = 0.5
+SHAPE_MEANING = (
+    "logarithm by which the exponent changes from one interval of the spline to the next"
+)
+"""Its prior, weakly smooth: 90 % of neighbouring exponents within a factor of 2.3."""
+
 NUISANCE = (
     "noise",
     "slow_noise",
@@ -43,18 +49,21 @@ class CutLaw:
     """The discrete choices of a cut's law.
 
     ``response`` is the family of the force at the edge, ``damped`` says that it grows with the
-    speed of sinking in, ``fracture`` is "none", "smooth" or "rippled".
+    speed of sinking in, ``fracture`` is "none", "smooth" or "rippled". ``knots_m`` are a spline's.
     """
 
     response: str
     fracture: str
     damped: bool = False
+    knots_m: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, structure: Mapping[str, Any]) -> "CutLaw":
         """The law of a fit's structure."""
         damped = bool(structure.get("rate_damping", False))
-        return cls(str(structure["response"]), str(structure["fracture"]), damped)
+        response = str(structure["response"])
+        knots = structure.get("response_knots_m", ()) if response == "spline" else ()
+        return cls(response, str(structure["fracture"]), damped, tuple(knots))
 
     @property
     def key(self) -> dict[str, Any]:
@@ -63,6 +72,7 @@ class CutLaw:
             "response": self.response,
             "rate_damping": self.damped,
             "fracture": self.fracture,
+            **({"response_knots_m": self.knots_m} if self.knots_m else {}),
         }
 
     @property
@@ -84,6 +94,10 @@ def material_layout(recipe: Recipe, law: CutLaw, drive_sd: float) -> Layout:
     rows = [
         _log("response_force", "N", force.median, force.log_sd, depth),
         _log("response_exponent", "1", exponent.median, exponent.log_sd, grows),
+    ]
+    rows += [
+        Parameter(f"response_shape_{index}", "1", "identity", 0.0, SHAPE_SD, SHAPE_MEANING)
+        for index in range(1, len(law.knots_m) - 1)
     ]
     if law.damped:
         damping, per_speed = settings.rate_damping_s_per_m, "share by which sinking in adds force"

@@ -1,10 +1,13 @@
 """The material's response g(delta): force at the edge against indentation."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.model.log_spline import LogSpline
 
 Array = NDArray[np.float64]
 
@@ -14,14 +17,17 @@ LARGEST_ARGUMENT = 700.0
 
 @dataclass(frozen=True)
 class Response:
-    """A response family with its two parameters, which may be arrays that broadcast.
+    """A response family with its parameters, which may be arrays that broadcast.
 
-    Both families are written through ``force``, the force in newtons at the indentation
+    All families are written through ``force``, the force in newtons at the indentation
     ``reference_m``, so that their parameters are nearly uncorrelated and mean the same:
 
     * ``power``: g = force (delta / reference)^exponent
     * ``exponential``: g = force (exp(b delta) - 1) / (exp(b reference) - 1), with
       b = exponent / reference
+    * ``spline``: a power whose exponent changes over the indentations ``knots_m`` (k,), one value
+      between each two of them: their logarithms change by ``shape`` (..., k - 2) from one to the
+      next, and ``exponent`` is their geometric mean. Beyond the knots the outermost powers go on.
 
     For delta <= 0 there is no contact and no force.
 
@@ -29,14 +35,19 @@ class Response:
     2.0
     """
 
-    family: Literal["power", "exponential"]
+    family: Literal["power", "exponential", "spline"]
     force: float | Array
     exponent: float | Array
     reference_m: float
+    shape: tuple[float, ...] | Array = ()
+    knots_m: tuple[float, ...] = ()
 
     def force_at(self, indentation: ArrayLike) -> Array:
         """Force g in newtons, shape of the broadcast of ``indentation`` (m) and parameters."""
         u = self._relative(indentation)
+        if self.family == "spline":
+            grown = np.minimum(self._spline.value(_logarithm(u)), LARGEST_ARGUMENT)
+            return np.asarray(self.force * np.exp(grown))
         if self.family == "power":
             with np.errstate(divide="ignore"):
                 return np.asarray(self.force * np.where(u > 0, u, 0.0) ** self.exponent)
@@ -45,6 +56,8 @@ class Response:
     def energy_at(self, indentation: ArrayLike) -> Array:
         """Stored energy, the integral of g from 0 to delta, in joules."""
         u = self._relative(indentation)
+        if self.family == "spline":
+            return np.asarray(self.force * self.reference_m * self._spline.area(_logarithm(u)))
         if self.family == "power":
             power = np.asarray(self.exponent) + 1.0
             return np.asarray(self.force * self.reference_m * u**power / power)
@@ -56,7 +69,11 @@ class Response:
         """Stiffness dg/d(delta) in N/m; infinite at 0+ for a power below one."""
         u = self._relative(indentation)
         inside = np.asarray(indentation) > 0
-        if self.family == "power":
+        if self.family == "spline":
+            v = _logarithm(np.where(inside, u, 1.0))
+            grown = np.minimum(self._spline.value(v) - v, LARGEST_ARGUMENT)
+            grade = self._spline.slope(v) * np.exp(grown)
+        elif self.family == "power":
             with np.errstate(divide="ignore"):
                 grade = self.exponent * np.where(u > 0, u, 0.0) ** (np.asarray(self.exponent) - 1.0)
         else:
@@ -66,13 +83,28 @@ class Response:
     def indentation_at(self, force: ArrayLike) -> Array:
         """Indentation in metres at which the response reaches ``force`` >= 0 (the inverse of g)."""
         ratio = np.maximum(np.asarray(force, dtype=np.float64), 0.0) / self.force
+        if self.family == "spline":
+            return np.asarray(self.reference_m * np.exp(self._spline.inverse(_logarithm(ratio))))
         if self.family == "power":
             return np.asarray(self.reference_m * ratio ** (1.0 / np.asarray(self.exponent)))
         grown = np.log1p(ratio * np.expm1(self.exponent))
         return np.asarray(self.reference_m * grown / self.exponent)
+
+    @cached_property
+    def _spline(self) -> LogSpline:
+        steps = np.cumsum(np.asarray(self.shape, dtype=np.float64), axis=-1)
+        logs = np.concatenate([np.zeros((*steps.shape[:-1], 1)), steps], axis=-1)
+        logs = logs - logs.mean(axis=-1, keepdims=True)
+        exponents = np.asarray(self.exponent)[..., None] * np.exp(logs)
+        return LogSpline(np.log(np.asarray(self.knots_m) / self.reference_m), exponents)
 
     def _relative(self, indentation: ArrayLike) -> Array:
         return np.maximum(np.asarray(indentation, dtype=np.float64), 0.0) / self.reference_m
 
     def _argument(self, relative: Array) -> Array:
         return np.minimum(self.exponent * relative, LARGEST_ARGUMENT)
+
+
+def _logarithm(x: Array) -> Array:
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(x))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
@@ -156,7 +157,8 @@ class EdgeStructure(Section):
 class CutStructure(Section):
     """The discrete choices of a cut fit."""
 
-    response: Literal["power", "exponential"]
+    response: Literal["power", "exponential", "spline"]
+    response_knots_m: Annotated[tuple[Positive, ...], Strict(False), Field(max_length=16)] = ()
     rate_damping: bool = False
     fracture: Literal["none", "smooth", "rippled"]
     closure: Literal["work", "eq4"]
@@ -164,6 +166,14 @@ class CutStructure(Section):
     moving_blades: Literal[1, 2]
     upper_face_m: NonNegative
     edge: EdgeStructure
+
+    @model_validator(mode="after")
+    def _knots_ascend(self) -> CutStructure:
+        knots = self.response_knots_m
+        ascend = all(low < high for low, high in pairwise(knots))
+        if (self.response == "spline") != (len(knots) > 2) or not ascend:
+            raise ValueError("response_knots_m belong to a spline, ascend, and are three or more")
+        return self
 
 
 class FrictionStructure(Section):

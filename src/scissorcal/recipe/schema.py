@@ -267,11 +267,13 @@ class FitFriction(Section):
 class FitCut(Section):
     """Families of the response and of fracture; "auto" compares them.
 
+    The ``"spline"`` of the response has three parameters more, which most data leave to their
+    priors: so ``"auto"`` compares the power law and the exponential, ``"auto+spline"`` all three.
     ``rate_damping = "fit"`` lets the force at the edge grow with the speed at which the blade sinks
     in, ``"auto"`` compares laws with and without; ``rate_damping_s_per_m`` is its prior.
     """
 
-    response: Literal["auto", "power", "exponential"] = "auto"
+    response: Literal["auto", "power", "exponential", "spline", "auto+spline"] = "auto"
     fracture: Literal["auto", "smooth", "rippled"] = "auto"
     reference_indentation_mm: Annotated[float, Field(ge=1e-6, le=100, allow_inf_nan=False)] = 0.3
     response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
