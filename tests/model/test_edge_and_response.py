@@ -17,6 +17,10 @@ DEPTH = st.floats(1e-9, 3e-3)
 
 @given(beta=TURN, x=PLACE, offset=st.floats(-0.02, 0.02), curvature=st.floats(-2.0, 2.0))
 def test_edge_height_lies_on_the_turned_edge(beta, x, offset, curvature):
+    """Wherever a parabola that bends upwards still reaches over x at all."""
+    taper, sine = math.tan(math.radians(2.0)), math.sin(beta)
+    run = math.cos(beta) - taper * sine
+    assume(run**2 - 2.0 * curvature * sine * (x + offset * sine) > 0.05)
     edge = Edge("arc", offset, math.radians(2.0), 0.075, curvature)
     run = math.cos(beta) - math.tan(math.radians(2.0)) * math.sin(beta)
     # an edge bent so far that it is upright before it reaches x has no point over it
