@@ -104,6 +104,12 @@ def silent(recording: Recording) -> Recording:
     return dataclasses.replace(recording, samples=samples)
 
 
+def coarse(recording: Recording) -> Recording:
+    samples = recording.samples[recording.samples["stroke"] == 0].copy()
+    samples["opening"] = np.round(samples["opening"] / 0.01) * 0.01
+    return dataclasses.replace(recording, samples=samples)
+
+
 def standing_clock(recording: Recording) -> Recording:
     samples = recording.samples.copy()
     samples["device_time_us"] = 7
@@ -117,6 +123,7 @@ def standing_clock(recording: Recording) -> Recording:
         (one_way, r"positive \(opening\) one is missing"),
         (silent, "constant although the joint moves"),
         (standing_clock, "clock does not advance"),
+        (coarse, "leave its direction open"),
     ],
 )
 def test_poor_recordings_are_refused_with_what_is_missing(recording, spoil, says):
@@ -199,3 +206,63 @@ def test_emps_prefers_the_asymmetric_law():
     found = fit_friction((emps(),), FitFriction(), effort="draft", rng=np.random.default_rng(0))
     assert found.rung == "coulomb + viscous, asymmetric"
     assert found.effort_unit == "N"
+
+
+def test_an_adopted_term_is_fitted_recovered_and_kept(tmp_path):
+    """Four standard deviations: false alarm 6e-5."""
+    recording = friction_recording(Truth(), np.random.default_rng(21))
+    rate = np.gradient(recording.samples["opening"]) * 1000.0
+    samples = recording.samples.copy()
+    samples["motor_torque"] += 8e-4 * np.convolve(rate, np.full(5, 0.2), "same") ** 2
+    bent = dataclasses.replace(recording, samples=samples)
+    settings = SIMPLE.model_copy(update={"adopt": ("rate^2",), "critic": False})
+    found = fit_friction((bent,), settings, effort="standard", rng=np.random.default_rng(22))
+    assert found.rung == "coulomb + viscous + rate^2, asymmetric"
+    assert found.structure["adopt"] == ["rate^2"]
+    term = found.parameter("rate^2")
+    assert abs(term.mean - 8e-4) < 4 * term.sd
+    assert term.sd < 2e-4
+    assert term.unit == "N m s^2/rad^2"
+    save_fit(found, tmp_path / "friction.nc")
+    back = load_fit(tmp_path / "friction.nc")
+    assert back.parameters == found.parameters
+    assert back.structure == found.structure
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"adopt": ("sign",)}, "has already"),
+        ({"adopt": ("rate^2", "rate^2")}, "has already"),
+        ({"adopt": ("load*sign",)}, "needs the load"),
+    ],
+)
+def test_terms_that_cannot_be_adopted_are_refused(recording, settings, says):
+    wanted = SIMPLE.model_copy(update=settings)
+    with pytest.raises(InputError, match=says):
+        fit_friction((recording,), wanted, effort="draft", rng=np.random.default_rng(5))
+
+
+def test_presliding_is_recovered_from_turns():
+    """Swings of several sizes, friction by Dahl's law in small steps; 4 sd, false alarm 1e-4."""
+    rng = np.random.default_rng(23)
+    time = np.arange(60000) / 1000
+    opening = 0.5 + 0.2 * np.sin(1.3 * time) + 0.12 * np.sin(2.9 * time + 1)
+    rate, z = np.gradient(opening) * 1000.0, 1.0
+    state = np.empty(len(time))
+    for i, step in enumerate(np.diff(opening, prepend=opening[0])):
+        z = np.clip(z + (1.0 - z * np.sign(step)) * step / 0.03, -1, 1)
+        state[i] = z
+    samples = np.zeros(len(time), SAMPLE_DTYPE)
+    samples["device_time_us"] = np.round(time * 1e6)
+    samples["opening"] = np.round(opening / 2e-5) * 2e-5
+    drive = 2e-4 * np.gradient(rate) * 1e3 + 0.02 * (0.4 * np.sign(rate) + 0.6 * state)
+    samples["motor_torque"] = drive + 3e-4 * rng.standard_normal(len(time))
+    samples["stroke"] = -1
+    recording = Recording("friction", samples, source="turns")
+    settings = FitFriction(rung="coulomb+presliding", symmetry="symmetric", critic=False)
+    found = fit_friction((recording,), settings, effort="standard", rng=rng)
+    for name, value in (("presliding_share", 0.6), ("presliding_length", 0.03), ("coulomb", 0.02)):
+        parameter = found.parameter(name)
+        assert abs(parameter.mean - value) < 4 * parameter.sd + 0.01 * value, name
+        assert parameter.sd < 0.1 * value, name

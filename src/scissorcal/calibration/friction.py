@@ -39,8 +39,8 @@ OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
 place of normal noise; milder tails are left to the widening by the scores."""
 FEWEST_BINS = 200
-LEAST_TRAVEL_SHARE = 20
-"""Motion must span at least this many times the position that its slowest bin covers."""
+LEAST_TRAVEL_S = 0.1
+"""Travel of so many seconds at the slowest certain rate is motion, if a slow one."""
 
 
 def fit_friction(
@@ -72,7 +72,7 @@ def fit_friction(
     every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
     windows = every.where(every.bins.moving)
     bins = windows.bins
-    _refuse_poor_motion(bins, every.bins, recordings, joint)
+    _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
     ladder = _ladder(windows, strokes, settings, joint)
@@ -217,11 +217,19 @@ def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:
 
 
 def _refuse_poor_motion(
-    bins: Bins, every: Bins, recordings: tuple[Recording, ...], joint: Joint
+    bins: Bins, every: Bins, recordings: tuple[Recording, ...], joint: Joint, sensors: Sensors
 ) -> None:
     names = ", ".join(recording.source or "the recording" for recording in recordings)
     if len(bins.rate) < FEWEST_BINS:
         travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
+        if sensors.verdict.status == "fail":
+            raise InputError(f"{names}: hardly a sample is left to fit. {sensors.verdict.why}")
+        if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
+            raise InputError(
+                f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
+                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps "
+                "leave its direction open: record faster sweeps, or lower fit.friction.cutoff_Hz."
+            )
         raise InputError(
             f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
             f"{len(bins.rate) * bins.bin_s:.2g} s of it moving). Friction needs at least "
@@ -248,9 +256,10 @@ def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None
     wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
     if wanted and not windows.bears_load:
         raise InputError(
-            f"{wanted[0]} needs the load that the joint bears, and these recordings have none: "
-            "record sweeps in which motor and handle work against each other (motor_torque and "
-            "handle_force, with handle_radius), or choose a rung without load."
+            f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
+            "one that hardly varies: record sweeps in which motor and handle work against each "
+            "other by various amounts (motor_torque and handle_force, with handle_radius), or "
+            "choose a rung without load."
         )
     angles = [name for name in settings.adopt if TERMS[name].rotary]
     if angles and joint.kind == "linear":

@@ -1,0 +1,54 @@
+"""What tables carry of a friction law: adopted terms of the rate; the rest is refused or told."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scissorcal.errors import InputError
+from scissorcal.package import build_package, open_package
+from tests.package.fits import cut_fit, friction_fit, recipe
+
+
+def with_structure(fit, **changes):
+    return dataclasses.replace(fit, structure={**fit.structure, **changes})
+
+
+def built(tmp_path, friction):
+    chosen = recipe()
+    path = tmp_path / "model.scissorcal"
+    summary = build_package(chosen, friction, cut_fit(chosen), path, np.random.default_rng(0))
+    return summary, open_package(path)
+
+
+def adopted(**terms: float):
+    return with_structure(friction_fit(**terms), adopt=list(terms))
+
+
+def test_adopted_terms_of_the_rate_are_rendered(tmp_path):
+    """The term is even in the rate: it resists opening, and helps closing."""
+    _, plain = built(tmp_path, friction_fit())
+    _, package = built(tmp_path, adopted(**{"rate^2": 0.004}))
+    for rate in (0.3, -0.3, 0.8):
+        more = float(plain.torque(0.55, rate, 0.05) - package.torque(0.55, rate, 0.05))
+        assert more == pytest.approx(0.004 * rate**2, rel=0.02), rate
+
+
+def test_terms_of_the_place_are_refused_with_a_way_out(tmp_path):
+    with pytest.raises(InputError, match=r'adopted "sin\(opening\)".*Remove it'):
+        built(tmp_path, adopted(**{"sin(opening)": 0.001}))
+
+
+def test_terms_that_let_friction_drive_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"drives the motion at .* rad/s"):
+        built(tmp_path, adopted(**{"rate*|rate|": -0.5}))
+
+
+def test_what_load_and_presliding_cost_is_told(tmp_path):
+    fit = friction_fit(load_share=0.2, load_gain=0.0, presliding_share=0.5, presliding_length=0.02)
+    summary, package = built(tmp_path, with_structure(fit, law="stribeck+angle+load+presliding"))
+    told = " ".join(summary.warnings)
+    assert "friction grows by 0.2 of the load" in told
+    assert "builds up over 0.02 rad" in told
+    assert "0.012 N m too much right after one" in told
+    assert package.warnings == summary.warnings
