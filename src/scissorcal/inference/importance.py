@@ -63,15 +63,17 @@ def sample_by_importance(
     proposal: Mixture,
     count: int,
     rng: np.random.Generator,
-    rounds: int = 4,
+    rounds: int | None = None,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.
 
     Draws come from a mixture of multivariate Student-t (7 degrees of freedom), one for each known
     optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat exceeds 0.5
     the proposal is moved to the mean and covariance of the weighted draws, ``rounds`` times at
-    most, and kept where that served.
+    most, and kept where that served. Many parameters take more rounds, since a covariance is
+    learnt from few effective draws at first: four and one for every four of them if not given.
     """
+    rounds = 4 + proposal.centres.shape[1] // 4 if rounds is None else rounds
     first = _once(log_posterior, proposal, count, rng)
     if first.k_hat <= GOOD_K or rounds < 2:
         return first
