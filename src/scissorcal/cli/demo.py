@@ -23,7 +23,9 @@ _ANSWERS = {True: "yes", False: "no", None: "-"}
     show_default=True,
     help="Where the demo's workspace goes; that of an earlier demo is replaced.",
 )
-@click.option("--recipe", default="paper-80gsm", show_default=True, help="A built-in recipe.")
+@click.option(
+    "--recipe", default="paper-photographed", show_default=True, help="A built-in recipe."
+)
 @click.option(
     "--effort",
     type=click.Choice(["draft", "standard", "thorough"]),
@@ -67,6 +69,17 @@ def demo(
             {**row.parameter.as_dict(), "truth": row.truth, "inside": row.inside}
             for row in found.judged
         ],
+        "geometry": [
+            {
+                "name": row.name,
+                "unit": row.unit,
+                "truth": row.truth,
+                "estimate": row.estimate,
+                "sd": row.sd,
+                "inside": row.inside,
+            }
+            for row in found.geometry
+        ],
         "share_inside": found.share_inside,
         "torque_error": found.torque_error,
         "rendering": found.rendering,
@@ -81,7 +94,13 @@ def _text(found: "DemoResult") -> str:
         truth = "-" if row.truth is None else f"{row.truth:.4g}"
         estimate = [f"{value:.4g}" for value in (parameter.mean, parameter.q05, parameter.q95)]
         rows.append([parameter.name, parameter.unit, truth, *estimate, _ANSWERS[row.inside]])
+    for seen in found.geometry:
+        reach = 1.6449 * seen.sd
+        numbers = (seen.truth, seen.estimate, seen.estimate - reach, seen.estimate + reach)
+        cells = [f"{value:.4g}" for value in numbers]
+        rows.append([seen.name, seen.unit, *cells, _ANSWERS[seen.inside]])
     inside = [row.inside for row in found.judged if row.inside is not None]
+    inside += [seen.inside for seen in found.geometry]
     lines = [
         *found.rungs,
         "",

@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
+from scissorcal.workday.demo_photographs import (
+    JudgedGeometry,
+    fit_photographs,
+    judge_photographs,
+    photograph,
+)
 from scissorcal.workday.fits import fit_workspace
 from scissorcal.workday.packages import build_workspace_package
 from scissorcal.workday.reports import write_workspace_report
@@ -53,6 +59,7 @@ class DemoResult:
     workspace: Path
     specimen: str
     judged: tuple[Judged, ...]
+    geometry: tuple[JudgedGeometry, ...]
     torque_error: float
     rungs: tuple[str, ...]
     rendering: "RenderResult"
@@ -61,15 +68,16 @@ class DemoResult:
 
     @property
     def share_inside(self) -> float:
-        """Share of the 90 % intervals that hold the truth."""
+        """Share of the 90 % intervals that hold the truth, photographs' among them."""
         known = [row.inside for row in self.judged if row.inside is not None]
+        known += [row.inside for row in self.geometry]
         return sum(known) / len(known)
 
 
 def run_demo(
     folder: Path,
     *,
-    recipe_name: str = "paper-80gsm",
+    recipe_name: str = "paper-photographed",
     seed: int = 0,
     effort: "Effort | None" = None,
     progress: Progress | None = None,
@@ -93,7 +101,9 @@ def run_demo(
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
     _capture(workspace, recipe, specimen, rng, _part(tell, 0.0, 0.2))
-    outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.2, 0.85))
+    photograph(workspace, recipe, seed, _part(tell, 0.2, 0.35))
+    geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.35, 0.45))
+    outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.45, 0.85))
     tell(0.85, "building the package")
     built = build_workspace_package(workspace, seed=seed)
     tell(0.88, "writing the report")
@@ -104,12 +114,14 @@ def run_demo(
     )
     tell(0.98, "judging")
     fits = [outcome.result for outcome in outcomes]
-    verdicts = [verdict for fit in fits for verdict in fit.verdicts]
-    files = [outcome.path for outcome in outcomes]
+    verdicts = [verdict for found in geometry for verdict in found.verdicts]
+    verdicts += [verdict for fit in fits for verdict in fit.verdicts]
+    files = [found.path for found in geometry] + [outcome.path for outcome in outcomes]
     return DemoResult(
         workspace=workspace.root,
         specimen=specimen.name,
         judged=tuple(row for fit in fits for row in judge(fit, specimen)),
+        geometry=judge_photographs(workspace, recipe, specimen, seed),
         torque_error=torque_error(package, specimen, recipe),
         rungs=tuple(f"{fit.what}: {fit.rung}" for fit in fits),
         rendering=rendering,

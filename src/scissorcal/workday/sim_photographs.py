@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 QUALITY = 92
 PHOTOGRAPHS = 3
+_CORNERS = ((0.4, 0.35), (-0.4, 0.35), (0.4, -0.35), (-0.4, -0.35))
 
 
 def sim_lens() -> "Lens":
@@ -63,28 +64,41 @@ def render_blade_photographs(
 def render_board_photographs(
     board: "Board", folder: Path, seed: int, name: str, *, count: int = 15
 ) -> tuple[Path, ...]:
-    """Render photographs of one target from many sides into a folder; their files."""
+    """Render photographs of one target from many sides into a folder; their files.
+
+    Every other one has the target in a corner of the picture, where lenses bend most.
+    """
     from scissorcal.vision.sim import target_layers
 
     paths = []
     for number in range(count):
         rng = np.random.default_rng([seed, 8, number])
         tilted = 0.6 if number else 0.05
-        pose = _before(board, rng, tilt=tilted, nearness=float(rng.uniform(0.55, 1.0)))
+        near = float(rng.uniform(0.55, 1.0))
+        aside = _CORNERS[number // 2 % 4] if number % 2 else (0.0, 0.0)
+        pose = _before(board, rng, tilt=tilted, nearness=near, aside=aside)
         paths.append(_taken(target_layers(board, pose), rng, folder, f"{name}-{number + 1:02d}"))
     return tuple(paths)
 
 
 def _before(
-    board: "Board", rng: np.random.Generator, *, tilt: float = 0.15, nearness: float = 0.85
+    board: "Board",
+    rng: np.random.Generator,
+    *,
+    tilt: float = 0.15,
+    nearness: float = 0.85,
+    aside: tuple[float, float] = (0.0, 0.0),
 ) -> "Pose":
-    """A place of the camera before a target: ``nearness`` 1 fills the picture with it."""
+    """A place of the camera before a target: ``nearness`` 1 fills the picture with it.
+
+    ``aside`` says where the camera aims instead of at its middle, in widths and heights of it.
+    """
     from scissorcal.vision.sim import Pose
 
     lens = sim_lens()
     fills = max(board.width_m / lens.width, board.height_m / lens.height) * lens.focal_px
     return Pose.looking_at(
-        (0.5 * board.width_m, 0.5 * board.height_m),
+        ((0.5 + aside[0]) * board.width_m, (0.5 + aside[1]) * board.height_m),
         1.12 * fills / nearness,
         tilt=float(rng.uniform(0.3, 1.0) * tilt),
         azimuth=float(rng.uniform(0.0, 2.0 * math.pi)),
