@@ -59,7 +59,7 @@ def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:
     recipes, schemas, *names = run(unpacked, tmp_path, code).split()
     assert recipes == str(unpacked / "scissorcal" / "recipes")
     assert schemas == str(unpacked / "scissorcal" / "data_schemas")
-    assert names == ["cotton-cloth", "paper-80gsm", "press-only"]
+    assert names == ["cotton-cloth", "paper-80gsm", "paper-photographed", "press-only"]
 
 
 def test_the_command_makes_a_workspace(unpacked: Path, tmp_path: Path) -> None:

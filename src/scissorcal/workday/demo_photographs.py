@@ -79,7 +79,7 @@ def fit_photographs(
 ) -> tuple[GeometryFit, ...]:
     """Fit what the scene requires of its photographs, in order."""
     needs = requirements(recipe)
-    fits = []
+    fits: list[GeometryFit] = []
     kinds: tuple[GeometryKind, ...] = ("camera", "blade", "plate")
     for what in kinds:
         if needs.needs_geometry(what):
