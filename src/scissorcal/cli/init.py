@@ -13,7 +13,8 @@ from scissorcal.cli.output import Answer, command
     "--recipe",
     default="paper-80gsm",
     show_default=True,
-    help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), or a recipe file (.toml).",
+    help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), or a "
+    "recipe file (.toml).",
 )
 @command
 def init(folder: Path, recipe: str) -> Answer:
