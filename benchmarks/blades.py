@@ -138,7 +138,18 @@ def photographed(width: int, strength: float, rng: np.random.Generator, *, known
 
 
 def random_shape(rng: np.random.Generator) -> BladeShape:
-    """A blade 60 to 100 mm long whose edge is a line, an arc, a cubic or wavy."""
+    """A blade 60 to 100 mm long whose edge is a line, an arc, a cubic or wavy.
+
+    One whose edge meets its back before the tip would be shorter than it says, and is drawn anew.
+    """
+    while True:
+        shape = _any_shape(rng)
+        s = np.linspace(0.0, (1.0 - shape.tip_share) * shape.length_m, 50)
+        if np.min(shape.back_at(s) - shape.edge_at(s)) > 3e-3:
+            return shape
+
+
+def _any_shape(rng: np.random.Generator) -> BladeShape:
     length = rng.uniform(0.06, 0.1)
     kind = rng.integers(0, 4)
     offset = -rng.uniform(0.005, 0.009)

@@ -20,6 +20,9 @@ GRAIN_SHARE = 0.5
 """Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
 
 _ANCHORS, _STRETCHES = 14, 30
+_SHARP = 1.4
+_WAVY = 0.008
+"""How far, in shares of its length, a side may leave a parabola and still be the side."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +122,12 @@ class _Scene:
             pivot, radius = fit_circle(self._on_sheet(self.hole))
         pivot = pivot + np.asarray(self.pivot_shift)
         axis, up = self.parts.axis, self.parts.up
+        sides = [
+            points[border.softness < _SHARP]
+            for points, border in ((edge, self.edge), (back, self.back))
+        ]
         for _ in range(3):
-            axis, up = _halved(edge, back, pivot, axis, up, self.parts.length)
+            axis, up = _halved(sides, pivot, axis, up, self.parts.length)
         axis, up = _turned(axis, up, self.turn)
         away = edge - pivot
         station, offset = away @ axis, away @ up
@@ -240,11 +247,12 @@ def _turn_sd(scene: _Scene, place: _Place) -> float:
 
 
 def _halved(
-    edge: Array, back: Array, pivot: Array, axis: Array, up: Array, length: float
+    sides: list[Array], pivot: Array, axis: Array, up: Array, length: float
 ) -> tuple[Array, Array]:
+    """The axis turned so that it halves the way between both sides of the blade."""
     along = np.linspace(BACK_FIRST, BACK_LAST, 201) * length
     middle = np.zeros_like(along)
-    for side in (edge, back):
+    for side in sides:
         away = side - pivot
         middle += 0.5 * _smooth(away @ axis, away @ up, along)
     return _turned(axis, up, float(np.sum(middle * along) / np.sum(along**2)))
@@ -272,9 +280,10 @@ def _smooth(station: Array, offset: Array, along: Array) -> Array:
     curves = np.linalg.solve(powers[triples], anchors[triples, 1][..., None])[..., 0]
     off = np.abs(anchors[:, 1] - curves @ powers.T)
     curve = curves[np.argmin(np.quantile(off, 0.6, axis=1))]
-    for _ in range(2):
+    for _ in range(4):
         rest = np.abs(e - np.polyval(curve, s - middle))
-        kept = rest < 4.0 * 1.4826 * float(np.quantile(rest, 0.4)) + 1e-12
+        usual = 4.0 * 1.4826 * float(np.quantile(rest, 0.4))
+        kept = rest < max(usual, _WAVY * float(along[-1]))
         curve = np.polyfit(s[kept] - middle, e[kept], 2)
     cells = np.linspace(along[0], along[-1], _STRETCHES + 1)
     index = np.digitize(s, cells) - 1

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 _MOST_POINTS = 3000
 _SHADOW_SEARCH = 0.05
-_LEAST_GOOD = {"edge": 0.6, "back": 0.3}
+_LEAST_GOOD = {"edge": 0.75, "back": 0.3}
 _LEAST_IN_SHADOW = 0.4
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
 
