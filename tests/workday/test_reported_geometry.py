@@ -11,6 +11,9 @@ from scissorcal.calibration.plate_storage import save_plate
 from scissorcal.errors import MissingError
 from scissorcal.workday.blades import blade_inputs_hash, blade_path
 from scissorcal.workday.cameras import camera_path
+from scissorcal.workday.geometry import fit_state
+from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
+from scissorcal.workday.plan import make_plan
 from scissorcal.workday.plates import plate_inputs_hash, plate_path
 from scissorcal.workday.reported_geometry import report_geometry
 from scissorcal.workday.reports import reported_fits, why_stale, write_workspace_report
@@ -77,6 +80,28 @@ def test_what_fell_behind_is_named_and_not_shown(workspace: Workspace) -> None:
     assert "`scissorcal capture blade" in found.missing["blade"]
     assert "not fitted yet" in found.missing["plate"]
     assert "`scissorcal fit plate`" in found.missing["plate"]
+
+
+def test_an_imported_camera_gives_way_to_photographs_of_a_board(workspace: Workspace) -> None:
+    recipe = workspace.recipe()
+    assert fit_state(workspace, recipe, "camera").status == "done"
+    index = PhotoIndex(kind="camera", photographs=())
+    folder = workspace.captures_dir / "camera-20260101T000000Z"
+    folder.mkdir(parents=True)
+    (folder / INDEX_FILE).write_text(index.model_dump_json(), encoding="utf-8")
+    assert fit_state(workspace, recipe, "camera").status == "stale"
+
+
+def test_damage_is_a_state_of_the_plan_with_a_command_that_mends_it(workspace: Workspace) -> None:
+    folder = workspace.captures_dir / "rig-20260101T000000Z"
+    folder.mkdir(parents=True)
+    (folder / INDEX_FILE).write_text("{", encoding="utf-8")
+    blade_path(workspace).write_text("{", encoding="utf-8")
+    steps = {step.name: step for step in make_plan(workspace).steps}
+    assert steps["fit plate"].status == "stale"
+    assert steps["fit blade"].command == "scissorcal fit blade --force"
+    missing = report_geometry(workspace, workspace.recipe()).missing
+    assert folder.name in missing["plate"]
 
 
 def test_a_scene_without_photographs_loads_none(workspace: Workspace) -> None:

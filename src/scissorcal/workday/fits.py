@@ -126,13 +126,13 @@ def expected_hash(
 
 
 def _upstream(workspace: Workspace, recipe: Recipe, friction: "FitResult | None") -> str:
-    """What a fit of a cut builds on now; what is missing gives a hash that no fit has."""
+    """What a fit of a cut builds on now; what is missing or of no use gives a hash no fit has."""
     from scissorcal.calibration.hashing import cut_upstream
     from scissorcal.workday.geometry import edge_belief
 
     try:
         edge = edge_belief(workspace, recipe)
-    except MissingError:
+    except (MissingError, InputError):
         return "no fit of the blade"
     return cut_upstream(friction.inputs_hash if friction else "", edge)
 

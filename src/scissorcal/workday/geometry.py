@@ -37,11 +37,15 @@ class GeometryFit:
 
 @dataclass(frozen=True)
 class GeometryState:
-    """Whether photographs, or what is fitted to them, are there and current."""
+    """Whether photographs, or what is fitted to them, are there and current.
+
+    ``damaged``: a fit is there that cannot be read, and only --force replaces it.
+    """
 
     status: Literal["done", "missing", "stale"]
     state: str
     files: tuple[Path, ...] = ()
+    damaged: bool = False
 
 
 def fit_geometry(
@@ -118,7 +122,10 @@ def expected_package_hash(
 
 def photograph_state(workspace: Workspace, what: GeometryKind) -> GeometryState:
     """Whether there are photographs of the camera's board, the blade or the plate."""
-    captures = photo_captures(workspace, what)
+    try:
+        captures = photo_captures(workspace, what)
+    except InputError as error:
+        return GeometryState("stale", str(error))
     if not captures and what == "camera" and camera_path(workspace).is_file():
         return GeometryState("done", "brought in from a file", (camera_path(workspace),))
     if not captures:
@@ -136,8 +143,13 @@ def fit_state(workspace: Workspace, recipe: "Recipe", what: GeometryKind) -> Geo
     try:
         stored, verdicts, imported = _stored(what, path)
     except InputError:
-        return GeometryState("stale", f"{workspace.relative(path)} is damaged")
-    if not imported and stored not in _expected(workspace, recipe, what):
+        return GeometryState("stale", f"{workspace.relative(path)} is damaged", damaged=True)
+    try:
+        current = stored in _expected(workspace, recipe, what)
+        current |= imported and not photo_captures(workspace, what)
+    except InputError as error:
+        return GeometryState("stale", str(error))
+    if not current:
         return GeometryState("stale", "its inputs changed since")
     wrong = [verdict.check for verdict in failed(verdicts)]
     words = f"failed: {', '.join(wrong)}" if wrong else "fitted"

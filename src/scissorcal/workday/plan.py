@@ -99,10 +99,7 @@ def _photograph_step(workspace: Workspace, item: Requirement) -> Step:
 
     command = f"scissorcal capture {item.name} --image {_PHOTOGRAPHS[item.name]}"
     name = f"capture {item.name}"
-    try:
-        found = photograph_state(workspace, _geometry(item.name))
-    except InputError as error:
-        return Step(name, "stale", str(error), item.why, command)
+    found = photograph_state(workspace, _geometry(item.name))
     files = tuple(workspace.relative(path) for path in found.files)
     return Step(name, found.status, found.state, item.why, command, files)
 
@@ -112,6 +109,8 @@ def _geometry_step(workspace: Workspace, recipe: Recipe, item: Requirement, capt
 
     name, command = f"fit {item.name}", f"scissorcal fit {item.name}"
     found = fit_state(workspace, recipe, _geometry(item.name))
+    if found.damaged:
+        return Step(name, found.status, found.state, item.why, f"{command} --force")
     if captured.status != "done" and found.status != "missing":
         state = f"its photographs are {captured.status}"
         return Step(name, "stale", state, item.why, command)

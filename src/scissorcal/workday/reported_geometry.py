@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.recipe.requirements import GeometryKind, requirements
-from scissorcal.workday.geometry import fit_state, photograph_state
+from scissorcal.workday.geometry import GeometryState, fit_state, photograph_state
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def report_geometry(workspace: Workspace, recipe: "Recipe") -> "Geometry":
         if state.status == "done":
             files[kind] = state.files[0]
         else:
-            missing[kind] = f"The scene requires it: {state.state}. {_how(workspace, kind)}"
+            missing[kind] = f"The scene requires it: {state.state}. {_how(workspace, kind, state)}"
     return Geometry(
         camera=load_camera(files["camera"]) if "camera" in files else None,
         blade=load_blade(files["blade"]) if "blade" in files else None,
@@ -55,8 +55,8 @@ def report_geometry(workspace: Workspace, recipe: "Recipe") -> "Geometry":
     )
 
 
-def _how(workspace: Workspace, kind: GeometryKind) -> str:
-    fit = f"`scissorcal fit {kind}`"
+def _how(workspace: Workspace, kind: GeometryKind, state: GeometryState) -> str:
+    fit = f"`scissorcal fit {kind}{' --force' if state.damaged else ''}`"
     if photograph_state(workspace, kind).status == "missing":
         capture = f"`scissorcal capture {kind} --image {_PHOTOGRAPHS[kind]}`"
         return f"Run {capture}, then {fit}."
