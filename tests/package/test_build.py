@@ -20,8 +20,10 @@ from scissorcal.package import (
     package_inputs_hash,
     put_review,
 )
+from scissorcal.package.manifest import PlateRecord
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
+from tests.report.geometry_fits import plate_fit
 
 
 def rng() -> np.random.Generator:
@@ -107,6 +109,26 @@ def test_fits_that_are_missing_are_named(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="scissorcal fit friction"):
         build_package(chosen, None, cut_fit(chosen), tmp_path / "p.zip", rng())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_plate_travels_with_its_covariance_and_what_its_fit_failed(tmp_path: Path) -> None:
+    chosen = recipe()
+    wrong = Verdict("fit.plate", "ambiguity", "fail", 3.0, 20.0, "Two poses.")
+    plate = replace(plate_fit(), verdicts=(wrong,))
+    path = tmp_path / "p.zip"
+    build_package(chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=plate)
+    package = open_package(path)
+    record = package.manifest.plate
+    assert record is not None
+    assert plate.rig_plate is not None
+    assert (record.frame, record.quaternion) == ("rig", plate.rig_plate.quaternion)
+    assert "fit.plate, ambiguity: Two poses." in package.warnings
+    for broken in ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, {"covariance": ((0.0,),)}):
+        with pytest.raises(ValueError, match="a plate's"):
+            PlateRecord(**{**dict(record), **broken})
+    unsure = replace(plate, rig_plate=replace(plate.rig_plate, covariance=None))
+    with pytest.raises(InputError, match="how well its pose is known"):
+        build_package(chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=unsure)
 
 
 def test_a_linear_joint_has_no_package(tmp_path: Path) -> None:

@@ -223,14 +223,19 @@ def _stated_edge(fitted: Mapping[str, Any], edge: Edge) -> dict[str, tuple[Any, 
 def _plate_record(plate: PlateFit) -> PlateRecord:
     """The plate's pose in the rig's frame, or before the camera where that is all there is."""
     pose = plate.rig_plate or plate.camera_plate
-    rows = np.zeros((6, 6)) if pose.covariance is None else pose.covariance
+    if pose.covariance is None:
+        raise InputError(
+            "The plate's fit does not say how well its pose is known: run 'scissorcal fit plate "
+            "--force'."
+        )
     return PlateRecord(
         frame="rig" if plate.rig_plate else "camera",
         quaternion=pose.quaternion,
         translation_m=pose.translation_m,
-        covariance=tuple(tuple(float(value) for value in row) for row in rows),
+        covariance=tuple(tuple(float(value) for value in row) for row in pose.covariance),
         target=plate.target,
         inputs_hash=plate.inputs_hash,
+        warnings=_warnings(plate.verdicts),
     )
 
 
@@ -280,8 +285,12 @@ def _record(fit: FitResult) -> dict[str, Any]:
         "inputs_hash": fit.inputs_hash,
         "sources": fit.sources,
         "parameters": parameters,
-        "warnings": tuple(f"{v.scope}, {v.check}: {v.why}" for v in failed(fit.verdicts)),
+        "warnings": _warnings(fit.verdicts),
     }
+
+
+def _warnings(verdicts: tuple[Verdict, ...]) -> tuple[str, ...]:
+    return tuple(f"{verdict.scope}, {verdict.check}: {verdict.why}" for verdict in failed(verdicts))
 
 
 def _centre(fit: FitResult) -> FitDraws:

@@ -240,15 +240,27 @@ class PlateRecord(Section):
     """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
 
     ``quaternion`` is (w, x, y, z), ``covariance`` (6, 6) over a rotation vector in the outer frame
-    (rad), then the translation (m).
+    (rad), then the translation (m). ``warnings`` are the verdicts that its fit failed.
     """
 
     frame: Literal["rig", "camera"]
     quaternion: tuple[float, float, float, float]
     translation_m: tuple[float, float, float]
     covariance: tuple[tuple[float, ...], ...]
-    target: str
-    inputs_hash: str
+    target: Text
+    inputs_hash: Annotated[str, Field(max_length=200)]
+    warnings: tuple[Text, ...] = ()
+
+    @model_validator(mode="after")
+    def _is_a_pose(self) -> PlateRecord:
+        if abs(sum(part**2 for part in self.quaternion) - 1.0) > 1e-6:
+            raise ValueError("a plate's quaternion has length one")
+        rows = self.covariance
+        if len(rows) != 6 or any(len(row) != 6 for row in rows):
+            raise ValueError("a plate's covariance has six rows of six")
+        if any(rows[index][index] < 0.0 for index in range(6)):
+            raise ValueError("a plate's covariance has variances below zero")
+        return self
 
 
 class Manifest(Section):

@@ -108,8 +108,9 @@ class ModelPackage:
     @property
     def fit_warnings(self) -> tuple[str, ...]:
         """What the fits' own verdicts hold against them, as sentences."""
-        record = self.manifest.provenance
-        return record.cut.warnings + (record.friction.warnings if record.friction else ())
+        record, plate = self.manifest.provenance, self.manifest.plate
+        rig = record.cut.warnings + (record.friction.warnings if record.friction else ())
+        return rig + (plate.warnings if plate else ())
 
     @property
     def warnings(self) -> tuple[str, ...]:
