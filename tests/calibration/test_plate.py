@@ -24,8 +24,11 @@ from scissorcal.vision.detect import Detection, find_board, find_markers
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.pose import Pose as Found
 from scissorcal.vision.pose import difference
+from scissorcal.vision.rig_frame import locate_rig
 from scissorcal.vision.sim import Lens, Looks, Pose, render, target_layers
 from tests.vision.scenes import lens, photo_of, pose_before
+from tests.vision.test_pose import CAMERA as CARD_CAMERA
+from tests.vision.test_pose import MIDDLE, card_views
 
 LENS = lens()
 CAMERA = Camera(LENS.focal_px, LENS.focal_px, *LENS.centre_px, LENS.distortion, 1280, 720)
@@ -228,3 +231,16 @@ def test_every_real_marker_is_found() -> None:
     assert found.sharp.all()
     with pytest.raises(InputError, match=r"plate board|markers of DICT_6X6_250"):
         find_board(photo, PLATE_BOARD)
+
+
+def test_stances_that_do_not_fit_the_card_fail(still: tuple[Pose, list[PlatePhoto]]) -> None:
+    """The blade turned by half of what was said."""
+    _, seen = card_views(
+        [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)
+    )
+    told = tuple(
+        dataclasses.replace(view, blade_angle_rad=2.0 * view.blade_angle_rad) for view in seen
+    )
+    honest, wrong = (locate_rig(views, CARD_CAMERA, MIDDLE) for views in (seen, told))
+    assert verdict(fit_plate(still[1], SURE, rig=honest), "rig frame") == "pass"
+    assert verdict(fit_plate(still[1], SURE, rig=wrong), "rig frame") == "fail"

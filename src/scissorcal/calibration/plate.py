@@ -18,7 +18,7 @@ from scissorcal.vision.rig_frame import RigPose
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 6
+ALGORITHM = 7
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

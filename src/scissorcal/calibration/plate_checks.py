@@ -134,5 +134,13 @@ def _rig(rig: RigPose | None) -> Verdict:
             "several advances and several openings."
         )
         return Verdict(SCOPE, "rig frame", "fail", float(len(rig.untold)), 0.0, why)
+    off = rig.rms_px / np.sqrt(2.0)
+    if not off < LEFT_OVER_PX:
+        why = (
+            f"The card's corners lie {off:.2g} px (sd) from where its stances have them: look at "
+            "the advances (mm) and openings (deg) that were given, and whether the camera stayed "
+            "and the card is fixed to the blade that moves."
+        )
+        return Verdict(SCOPE, "rig frame", "fail", float(off), LEFT_OVER_PX, why)
     why = f"The rig's frame is known from its markers (rms {rig.rms_px:.2f} px)."
     return Verdict(SCOPE, "rig frame", "pass", 0.0, 0.0, why)

@@ -88,13 +88,14 @@ def track_plate(
     """Follow the plate from picture to picture into captures/track-<stamp>.jsonl.
 
     A line is written, and given to the operating system, as soon as its picture is located, so that
-    a killed track ends with its last whole line. Poses are in the rig's frame where its card was
-    photographed. Ends after ``seconds``, with the pictures, or by an interrupt from the keyboard.
+    a killed track ends with its last whole line. Poses are in the rig's frame where its card tells
+    all of it. Ends after ``seconds``, with the pictures, or by an interrupt from the keyboard.
     Raises InputError, and keeps nothing, where no picture showed the target.
     """
     fitted = require_camera(workspace)
     recipe = workspace.recipe()
-    rig = workspace_rig(workspace, fitted.camera, recipe)
+    located = workspace_rig(workspace, fitted.camera, recipe)
+    rig = None if located is None or located.untold else located
     back = plate_target(recipe).inverse()
     head = TrackHead(
         source=Path(source).name,
