@@ -217,6 +217,14 @@ def test_without_a_scale_the_edge_is_in_blade_lengths_until_a_length_is_given(tm
         fit_blade([flat, measurement(rng)], None, effort="draft", rng=rng)
 
 
+def test_a_nick_is_found_without_a_scale_too():
+    rng = np.random.default_rng(14)
+    nicked = measurement(rng, nicks=((0.04, 4e-4, 2e-4),), metric=False)
+    (nick,) = fit_blade([nicked], None, effort="draft", rng=rng).nicks
+    assert nick.station_m == pytest.approx(0.04 / LENGTH, abs=2e-3)
+    assert nick.depth_m == pytest.approx(2e-4 / LENGTH, rel=0.1)
+
+
 def test_nothing_to_fit_is_said():
     with pytest.raises(InputError, match="nothing to fit"):
         fit_blade([], None, rng=np.random.default_rng(0))

@@ -19,7 +19,7 @@ from scissorcal.vision.blade import BladeMeasurement
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
-ALGORITHM = 1
+ALGORITHM = 2
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 PLACES = 41

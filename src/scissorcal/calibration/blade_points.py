@@ -19,7 +19,7 @@ CELLS_OF_ONE = 110
 _WEIGHTS = 14
 _ROUNDS = 30
 _FAR_OFF = 5.0
-_SHALLOWEST_M = 15e-6
+_SHALLOWEST_M, _SHALLOWEST_SHARE = 15e-6, 2e-4
 _SHORTEST_SHARE = 0.002
 _FEWEST_POINTS = 3
 _SOFTEST = 1.45
@@ -58,11 +58,12 @@ def edge_cells(measured: BladeMeasurement, cells: int) -> EdgeCells:
     """Take nicks and stray points out of a measured edge, and average the rest.
 
     A flexible curve is fitted with Tukey's weights; stretches that lie beyond five robust standard
-    deviations of it are left out with their neighbourhood. Inward they are nicks.
+    deviations of it are left out with their neighbourhood. Inward they are nicks. What has no
+    scale comes in blade lengths.
     """
     off = _away_from_smooth(measured)
     spread = 1.4826 * float(np.median(np.abs(off - np.median(off))))
-    limit = max(_FAR_OFF * spread, _SHALLOWEST_M if measured.metric else 0.5)
+    limit = max(_FAR_OFF * spread, _SHALLOWEST_M if measured.metric else _SHALLOWEST_SHARE)
     stretches = _stretches(off, limit, spread)
     keep = np.ones(len(off), dtype=bool)
     nicks = []
