@@ -96,6 +96,7 @@ def test_files_of_others_are_read(tmp_path: Path) -> None:
         ("", "is no camera file"),
         ("a: 1\n", "neither camera_matrix nor cam0"),
         ("{{", "damaged"),
+        ("%YAML:1.0\n---\ncamera_matrix: 5\n", "no matrices"),
         ("a: [1", "no YAML"),
         ("\x00\x01", "no YAML"),
         (OPENCV_1[:180], "damaged"),

@@ -103,6 +103,10 @@ def _opencv(path: Path) -> CameraFile:
 
     try:
         return _from_opencv(path, matrix, number)
+    except cv2.error:
+        raise InputError(
+            f"{path} has no matrices where a camera's belong: save it again."
+        ) from None
     finally:
         storage.release()
 
