@@ -283,7 +283,7 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
 
 
 def test_a_checkpoint_of_another_posterior_is_refused_and_kept(tmp_path: Path) -> None:
-    path = tmp_path / "walks.npz"
+    path = tmp_path / "not there yet" / "walks.npz"
     rng = np.random.default_rng(0)
     infer(problem_of(normal(np.eye(2)), [[1.0, 1.0]]), "thorough", rng, checkpoint=path)
     before = path.read_bytes()

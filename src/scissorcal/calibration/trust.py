@@ -82,6 +82,9 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
         why = "Draft effort does not check the posterior's shape; use --effort standard."
         return Verdict(scope, "k-hat", "not_evaluated", None, K_HAT_LIMIT, why)
     status: Status = "pass" if posterior.status.trusted else "fail"
+    if posterior.ensembles:
+        # what decides then is in the sentence; k-hat is of a proposal that was not used
+        return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
     return Verdict(scope, "k-hat", status, k, K_HAT_LIMIT, posterior.sentence)
 
 

@@ -8,8 +8,14 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.errors import InputError
+
 Array = NDArray[np.float64]
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
+
+
+class CheckpointError(InputError, ValueError):
+    """A checkpoint that cannot be read, or is of another posterior."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,11 @@ class Walk:
 
 
 def save_walks(path: Path, walks: list[Walk]) -> None:
-    """Write walks of equal length; the file is replaced as a whole or not at all."""
+    """Write walks of equal length; the file is replaced as a whole or not at all.
+
+    Makes its folder where there is none yet.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(path.name + ".part")
     with draft.open("wb") as file:
         np.savez(
@@ -53,14 +63,15 @@ def load_walks(
 ) -> list[Walk]:
     """Read walks over ``shape`` (walkers, p), after a check that they are of this posterior.
 
-    Raises ValueError, naming the file, where it cannot be read or belongs to another posterior.
+    Raises CheckpointError (a ValueError), naming the file, where it cannot be read or belongs to
+    another posterior.
     """
     walks = _read(path)
     first = walks[0]
     own = first.coords.shape == shape
     heights = [log_posterior(point) for point in first.coords] if own else []
     if not own or not np.allclose(heights, first.heights, rtol=1e-6, atol=1e-3):
-        raise ValueError(
+        raise CheckpointError(
             f"{path}: this checkpoint is of another posterior (data, settings or model have "
             "changed since); move it away, or name another file, to start afresh."
         )
@@ -94,7 +105,7 @@ def _read(path: Path) -> list[Walk]:
                 )
             ]
     except (OSError, ValueError, KeyError, EOFError, IndexError, BadZipFile) as error:
-        raise ValueError(
+        raise CheckpointError(
             f"{path}: not a readable checkpoint ({error}); move it away, or name another file, to "
             "start afresh."
         ) from error

@@ -65,7 +65,8 @@ class SamplingStatus(Enum):
     )
     BUDGET_USED_UP = (
         "The budget of evaluations was used up before the ensembles were long enough against "
-        "their autocorrelation: resume from the checkpoint with a larger budget."
+        "their autocorrelation, so the intervals cannot be trusted: record more varied data, or "
+        "choose a simpler rung. A larger budget goes on from the checkpoint, where one was kept."
     )
     STUCK = (
         "A parameter never moved in the ensembles, so nothing is known of its spread: check that "

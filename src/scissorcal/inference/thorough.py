@@ -100,8 +100,9 @@ def run_ensembles(
     exists, the run goes on from there exactly as if it had never stopped. Randomness comes from
     ``rng`` alone.
 
-    Raises NotFiniteError where too few finite starts are found, ValueError where the checkpoint
-    belongs to another posterior or cannot be read, or where the budget is less than one block.
+    Raises NotFiniteError where too few finite starts are found, CheckpointError where the
+    checkpoint belongs to another posterior or cannot be read, and ValueError where the budget is
+    less than one block.
     """
     tell = progress or (lambda done, sentence: None)
     walks = [_begin(log_posterior, proposal, rng) for _ in range(ENSEMBLES)]
