@@ -22,6 +22,7 @@ from scissorcal.workday.fits import fit_workspace
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.records import RecordFile
+from scissorcal.workday.reports import reportable_fits, why_stale, write_workspace_report
 from scissorcal.workday.verify import VerifySettings, verify_workspace
 from scissorcal.workday.workspace import Workspace
 
@@ -76,12 +77,30 @@ def test_a_check_holds_all_three_parts_and_keeps_its_schema(
         "halves": "pass",
         "halves-effort": "pass",
         "prior": "pass",
-    }
+    }, [verdict.why for verdict in whole.verdicts]
     path = cleared.verify_path("friction")
     save_verify(whole, path)
     assert load_verify(path) == whole
     schema = json.loads((schemas_dir() / "verify.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), schema)
+
+
+def test_a_report_is_stale_once_its_check_is_another_or_gone(
+    cleared: Workspace, whole: VerifyResult
+) -> None:
+    """A check of more fits, of the same seed, is another one."""
+    recipe, path = cleared.recipe(), cleared.verify_path("friction")
+    save_verify(whole, path)
+    write_workspace_report(cleared)
+    fits = reportable_fits(cleared, recipe)
+    assert why_stale(cleared, recipe, fits) == ""
+    assert whole.calibration is not None
+    longer = replace(whole, calibration=replace(whole.calibration, fits=400))
+    save_verify(longer, path)
+    said = "it shows another trust check of friction than there is now"
+    assert why_stale(cleared, recipe, fits) == said
+    path.unlink()
+    assert why_stale(cleared, recipe, fits) == said
 
 
 def test_two_workers_give_the_same_numbers(cleared: Workspace, whole: VerifyResult) -> None:

@@ -113,9 +113,9 @@ def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitR
         checks = _trust_checks(workspace, fits)
     except InputError:
         return "a trust check beside its fits cannot be read"
-    for what, check in checks.items():
-        if (checked.get(what) or {}).get("seed") != check.seed:
-            return f"the trust check of {what} was made since"
+    for what in fits:
+        if checked.get(what) != _as_reported(checks.get(what)):
+            return f"it shows another trust check of {what} than there is now"
     return ""
 
 
@@ -195,6 +195,15 @@ def _trust_checks(
     return {
         what: check for what, check in found.items() if check.fit_hash == fits[what].inputs_hash
     }
+
+
+def _as_reported(check: "VerifyResult | None") -> Any:
+    """A trust check as the report's twin holds it."""
+    from pydantic import TypeAdapter
+
+    from scissorcal.calibration.verify.result import VerifyResult
+
+    return None if check is None else TypeAdapter(VerifyResult).dump_python(check, mode="json")
 
 
 def _facts(workspace: Workspace) -> Any:
