@@ -112,6 +112,8 @@ def verify(
     """
     from scissorcal.workday.verify import VerifySettings, verify_workspace
 
+    if workers is not None and cluster is not None:
+        raise click.UsageError("A cluster has workers of its own: give --workers or --cluster.")
     workspace = open_workspace(folder)
     wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
     settings = VerifySettings(checks=checks, fits=fits, prior=prior, spread=spread, seed=seed)

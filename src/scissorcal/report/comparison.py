@@ -166,6 +166,7 @@ def incomparable(first: Side, second: Side) -> list[str]:
             ("the thickness", f"{short(a.thickness_mm)} mm", f"{short(b.thickness_mm)} mm"),
             ("the kind of scene", words[a.cut], words[b.cut]),
             ("which blades move", a.moving, b.moving),
+            ("the closure of the torque", a.closure, b.closure),
         ):
             if one != other:
                 found.append(f"{name} differs ({one} against {other})")
