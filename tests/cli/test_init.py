@@ -40,7 +40,7 @@ def test_a_recipe_file_is_checked_before_it_is_copied(cli: Cli, tmp_path: Path) 
 def test_an_unknown_recipe_is_met_with_those_there_are(cli: Cli, tmp_path: Path) -> None:
     said = cli("init", tmp_path / "work", "--recipe", "paper-80")
     assert said.code == 2
-    assert "cotton-cloth, paper-80gsm, press-only" in said.err
+    assert "cotton-cloth, paper-80gsm, paper-photographed, press-only" in said.err
 
 
 def test_a_folder_that_cannot_be_made_is_named(cli: Cli, tmp_path: Path) -> None:

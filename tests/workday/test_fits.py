@@ -130,7 +130,12 @@ def test_a_linear_joint_is_asked_for_friction_alone(tmp_path: Path) -> None:
     workspace = quick_workspace(tmp_path / "linear")
     edit(workspace, "[rig]", '[rig]\njoint = "linear"')
     plan = make_plan(workspace)
-    assert [step.name for step in plan.steps] == ["capture friction", "fit friction", "report"]
+    assert [step.name for step in plan.steps] == [
+        "capture friction",
+        "fit friction",
+        "report",
+        "report sign",
+    ]
     with pytest.raises(InputError, match="requires no fit of cut"):
         fit_workspace(workspace, ("cut",))
 

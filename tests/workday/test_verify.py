@@ -71,12 +71,13 @@ def test_a_check_holds_all_three_parts_and_keeps_its_schema(
     assert whole.sensitivity is not None
     assert [row.name for row in whole.sensitivity.rows] == list(names)
     status = {verdict.check: verdict.status for verdict in whole.verdicts}
+    conflict = any(row.diagnosis == "prior-data conflict" for row in whole.sensitivity.rows)
     assert status == {
         "calibration": "not_evaluated",
         "refits": "pass",
         "halves": "pass",
         "halves-effort": "pass",
-        "prior": "pass",
+        "prior": "fail" if conflict else "pass",
     }, [verdict.why for verdict in whole.verdicts]
     path = cleared.verify_path("friction")
     save_verify(whole, path)
