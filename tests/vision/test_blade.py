@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.vision.blade_photo import photograph_blade, photograph_scissors
 from scissorcal.vision.blade_picture import NickMark, as_png, blade_picture
 from scissorcal.vision.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
+from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
 from tests.vision.blade_scenes import (
     CAMERA,
@@ -183,3 +185,26 @@ def test_a_nick_is_not_smoothed_away():
     deepest = one.station[np.argmax(off)]
     assert deepest == pytest.approx(0.045, abs=4e-4)
     assert off.max() == pytest.approx(4e-4, abs=8e-5)
+
+
+def reduced(photo: Photo) -> Photo:
+    """The same photograph read at half its size."""
+    half = cv2.resize(photo.image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    return replace(photo, image=half, reduction=2)
+
+
+def test_scale_and_pivot_are_in_the_pixels_of_the_whole_photograph_however_it_was_read():
+    whole = scissors_photo(0.8, mat=False)
+    lengths = [
+        max(one.length for one in photograph_scissors(photo, mat=False, scale=1e-4).measured)
+        for photo in (whole, reduced(whole))
+    ]
+    assert lengths[1] == pytest.approx(lengths[0], rel=0.02)
+    photo = blade_photo()
+    known = photograph_blade(photo, CAMERA)
+    pixel = known.view.to_pixels(known.measured[0].parts.pivot[None])[0]
+    pivots = [
+        photograph_blade(one, CAMERA, pivot_px=(float(pixel[0]), float(pixel[1]))).measured[0]
+        for one in (photo, reduced(photo))
+    ]
+    assert pivots[1].length == pytest.approx(pivots[0].length, abs=5e-4)

@@ -24,6 +24,7 @@ from scissorcal.inference import infer
 from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Verdict, failed
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -48,6 +49,7 @@ def fit_cut(
     rng: np.random.Generator,
     progress: Progress | None = None,
     edge: EdgeBelief | None = None,
+    edge_verdicts: tuple[Verdict, ...] = (),
     checkpoint: Path | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses).
@@ -58,8 +60,9 @@ def fit_cut(
     sheet's edge and runs as the model says. A rippling fracture shows as variance: its bins have
     the variance that a saw-tooth between kappa g_c and g_c keeps after averaging over a bin.
 
-    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
-    InputError where the blades hardly touched the material.
+    ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
+    friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
+    interrupted goes on. Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
     belief = edge or edge_of(recipe)
@@ -105,8 +108,20 @@ def fit_cut(
         nuisance=design.nuisance,
         rng=rng,
         critic=recipe.fit.cut.critic,
+        extra_verdicts=(_foundations(friction, edge_verdicts),),
     )
     return with_toughness(fit, recipe, rng)
+
+
+def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Verdict:
+    """Whether what the fit builds on may be used at all."""
+    wrong = [*friction.rejected, *failed(edge_verdicts)]
+    if not wrong:
+        why = "The fits that this one builds on passed their verdicts."
+        return Verdict("fit.cut", "foundations", "pass", 0.0, 0.0, why)
+    said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
+    why = f"A fit that this one builds on is no calibration ({said}): mend that first."
+    return Verdict("fit.cut", "foundations", "fail", float(len(wrong)), 0.0, why)
 
 
 def cut_experiment(

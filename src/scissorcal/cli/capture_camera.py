@@ -1,13 +1,18 @@
 """``scissorcal capture camera``"""
 
 import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import workspace_option
+from scissorcal.cli.options import seed_option, workspace_option
 from scissorcal.cli.output import Answer, command, note
+
+if TYPE_CHECKING:
+    from scissorcal.vision.boards import Board
 
 
 @click.command("camera")
@@ -22,8 +27,9 @@ from scissorcal.cli.output import Answer, command, note
 @click.option(
     "--camera",
     "source",
-    metavar="NUMBER|VIDEO",
-    help="Pick pictures from a camera or a video file, where the board is held still.",
+    metavar="NUMBER|VIDEO|sim",
+    help="Pick pictures from a camera or a video file, where the board is held still; sim: render "
+    "them.",
 )
 @click.option(
     "--views",
@@ -41,6 +47,7 @@ from scissorcal.cli.output import Answer, command, note
     help="The printed camera board, or another: chessboard:9x6:25 (inner corners, mm), "
     "charuco:5x7:40:20:DICT_6X6_250 (squares, mm, mm).",
 )
+@seed_option
 @workspace_option
 @command
 def camera(
@@ -49,6 +56,7 @@ def camera(
     source: str | None,
     views: int,
     words: str,
+    seed: int,
     folder: Path | None,
 ) -> Answer:
     """Take in photographs of the camera board, and say which views are still wanted.
@@ -74,7 +82,11 @@ def camera(
     workspace = open_workspace(folder)
     if source:
         with tempfile.TemporaryDirectory() as scratch:
-            frames = pick_frames(source, board, Path(scratch), views)
+            frames: Iterable[Path]
+            if source == "sim":
+                frames = _rendered(board, Path(scratch), seed, views)
+            else:
+                frames = pick_frames(source, board, Path(scratch), views)
             done = capture_camera(workspace, frames, board, note)
     else:
         done = capture_camera(workspace, (*images, *more), board, note)
@@ -93,3 +105,12 @@ def camera(
     }
     files = [done.capture.path(photo) for photo in done.capture.index.photographs]
     return Answer(result, text, files=files)
+
+
+def _rendered(board: "Board", folder: Path, seed: int, views: int) -> Sequence[Path]:
+    from scissorcal.vision.boards import Chessboard
+    from scissorcal.workday.sim_photographs import render_board_photographs
+
+    if isinstance(board, Chessboard):
+        raise click.UsageError("Only printed boards with markers are rendered: leave --board out.")
+    return render_board_photographs(board, folder, seed, "board", count=views)

@@ -71,14 +71,14 @@ def render(
     from scissorcal.render import VirtualStrokes
     from scissorcal.workday.renders import (
         package_has_fallen_behind,
+        package_warnings,
         render_workspace,
-        review_warnings,
     )
 
     workspace = open_workspace(folder)
     if package_path is None and package_has_fallen_behind(workspace):
         note("The package is not of the fits and recipe as they are now; see 'scissorcal plan'.")
-    for sentence in review_warnings(workspace, package_path):
+    for sentence in package_warnings(workspace, package_path):
         note(sentence)
     with LiveView(ask=not yes) as view:
         rendered = render_workspace(

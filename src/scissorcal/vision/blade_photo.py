@@ -47,7 +47,8 @@ def photograph_blade(
 ) -> BladePhoto:
     """Measure one blade on the mat.
 
-    ``pivot_px`` is the pivot in the picture where no hole shows it, known to ``pivot_sd_px``.
+    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it, known to
+    ``pivot_sd_px``.
     Raises InputError where the photograph cannot be used, saying what is wrong with it.
     """
     view = see_mat(photo, camera)
@@ -55,7 +56,8 @@ def photograph_blade(
     outline = silhouette(light, view, photo.source)
     pivot, sd = None, 0.0
     if pivot_px is not None:
-        there = view.to_sheet(np.array([pivot_px, (pivot_px[0] + 1.0, pivot_px[1])]))
+        beside = (pivot_px[0] + 1.0, pivot_px[1])
+        there = view.to_sheet(photo.within([pivot_px, beside]))
         pivot, sd = there[0], pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
     parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
     measured = measure_blade(light, view, parts, photo.source)
@@ -67,9 +69,9 @@ def photograph_scissors(
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
-    Without the mat shapes come out up to their size; ``scale`` (metres per pixel) gives it, and the
-    camera should look straight down, since its tilt stays in. Raises InputError where the
-    photograph shows no scissors, or cannot be used.
+    Without the mat shapes come out up to their size; ``scale`` (metres per pixel of the whole
+    photograph) gives it, and the camera should look straight down, since its tilt stays in. Raises
+    InputError where the photograph shows no scissors, or cannot be used.
     """
     light = linear_light(photo.grey)
     if mat:
@@ -77,9 +79,10 @@ def photograph_scissors(
         outline = silhouette(light, view, photo.source)
     else:
         height, width = photo.image.shape[:2]
-        unit = scale or 1.0
+        read = scale * photo.reduction if scale else None
+        unit = read or 1.0
         whole = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
-        view = PlainView(whole, scale, _SCALE_SD if scale else 0.0)
+        view = PlainView(whole, read, _SCALE_SD if read else 0.0)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
     scissors = find_scissors(outline, photo.source)
     measured = tuple(

@@ -65,6 +65,11 @@ class Photo:
         scaled = (np.asarray(pixels, dtype=np.float64) + 0.5) * self.reduction - 0.5
         return np.asarray(scaled + self.origin)
 
+    def within(self, pixels: ArrayLike) -> Array:
+        """Pixels (n, 2) of ``image`` from those of the whole photograph."""
+        moved = np.asarray(pixels, dtype=np.float64) - self.origin
+        return np.asarray((moved + 0.5) / self.reduction - 0.5)
+
 
 def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True) -> Photo:
     """Read a JPEG, PNG, TIFF, BMP or WebP file.

@@ -150,7 +150,7 @@ def _fit(
 
     from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
     from scissorcal.calibration.hashing import cut_upstream
-    from scissorcal.workday.geometry import edge_belief
+    from scissorcal.workday.geometry import edge_belief, edge_verdicts
 
     chosen: Effort = effort or recipe.fit.effort
     progress(0.0, f"{what}: reading recordings")
@@ -191,10 +191,12 @@ def _fit(
             rng=rng,
             progress=progress,
             edge=edge,
+            edge_verdicts=edge_verdicts(workspace, recipe),
             checkpoint=checkpoint,
         )
     save_fit(result, path)
-    checkpoint.unlink(missing_ok=True)
+    if not result.rejected:
+        checkpoint.unlink(missing_ok=True)
     return FitOutcome(what, result, path, cached=False)
 
 

@@ -89,6 +89,15 @@ def edge_belief(workspace: Workspace, recipe: "Recipe") -> "EdgeBelief | None":
     return load_blade(blade_path(workspace)).belief
 
 
+def edge_verdicts(workspace: Workspace, recipe: "Recipe") -> tuple[Verdict, ...]:
+    """Verdicts on the fit that the edge is taken from; none where it is the recipe's own."""
+    from scissorcal.calibration.blade_storage import load_blade
+
+    if not requirements(recipe).needs_geometry("blade"):
+        return ()
+    return load_blade(blade_path(workspace)).verdicts
+
+
 def scene_plate(workspace: Workspace, recipe: "Recipe") -> "PlateFit | None":
     """Where the plate stands, None where the scene does not ask for it.
 

@@ -69,8 +69,8 @@ def render_workspace(
     return Rendered(done, path, rig)
 
 
-def review_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:
-    """What is wrong with the review of the package that would be rendered, as sentences.
+def package_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:
+    """What is wrong with the package that would be rendered, its review and fits, as sentences.
 
     Empty where there is none that can be opened, which rendering it then says.
     """
@@ -80,7 +80,7 @@ def review_warnings(workspace: Workspace, package_path: Path | None = None) -> t
         package = open_package(package_path or workspace.package_path(workspace.recipe()))
     except ScissorcalError:
         return ()
-    return package.review_warnings
+    return package.warnings
 
 
 def package_has_fallen_behind(workspace: Workspace) -> bool:
