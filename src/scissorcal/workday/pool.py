@@ -120,7 +120,7 @@ def _cluster(address: str) -> Iterator[Pool]:
             "'scissorcal[cluster]'."
         ) from error
     try:
-        client = distributed.Client(address, timeout="10s")
+        client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
             f"No dask scheduler answers at {address}: start one with 'dask scheduler' and workers "
