@@ -97,6 +97,7 @@ class Layout:
                     q95=float(q95),
                     identifiability=float(min(u.std(ddof=1) / parameter.sd, 1.0)),
                     meaning=parameter.meaning,
+                    believed=parameter.believed,
                 )
             )
         return tuple(rows)

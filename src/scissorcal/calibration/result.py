@@ -16,6 +16,7 @@ Effort = Literal["draft", "standard", "thorough"]
 class FittedParameter:
     """One parameter with its marginal posterior, in the unit that stands beside it.
 
+    ``believed`` marks what another measurement told before, as photographs tell the edge.
     ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
     speak, near 1 the prior does.
     """
@@ -29,6 +30,7 @@ class FittedParameter:
     q95: float
     identifiability: float
     meaning: str = ""
+    believed: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Give the parameter as the plain object that ``--json`` prints."""

@@ -99,7 +99,7 @@ def compare_prior(fit: FitResult) -> tuple[PriorRow, ...]:
             parameter.unit,
             finite_each(np.quantile(prior[:, i], QUANTILES)),
             finite_each(np.quantile(fit.draws[:, i], QUANTILES)),
-            finite(parameter.identifiability),
+            None if parameter.believed else finite(parameter.identifiability),
         )
         for i, parameter in enumerate(fit.parameters)
     )

@@ -7,7 +7,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite
 
-Word = Literal["identified", "prior only", "not available"]
+Word = Literal["identified", "prior only", "measured before", "not available"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,9 @@ def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
             finite(parameter.q50),
             finite(parameter.q95),
             finite(parameter.identifiability),
-            identifiability_word(finite(parameter.identifiability)),
+            "measured before"
+            if parameter.believed
+            else identifiability_word(finite(parameter.identifiability)),
         )
         for parameter in (*fit.parameters, *fit.derived)
     )
