@@ -7,19 +7,12 @@ from typing import Literal
 import click
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.options import images_option, seed_option, workspace_option
 from scissorcal.cli.output import Answer, command, note
 
 
 @click.command("blade")
-@click.option(
-    "--image",
-    "-i",
-    "images",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    help="A photograph of the blade on the mat; give it again for each.",
-)
+@images_option("the blade on the mat")
 @click.option(
     "--camera",
     "source",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.options import images_option, seed_option, workspace_option
 from scissorcal.cli.output import Answer, command, note
 
 if TYPE_CHECKING:
@@ -16,14 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("camera")
-@click.option(
-    "--image",
-    "-i",
-    "images",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    help="A photograph of the board; give it again for each.",
-)
+@images_option("the board")
 @click.option(
     "--camera",
     "source",

@@ -35,3 +35,15 @@ device_option: Decorator = click.option(
 yes_option: Decorator = click.option(
     "--yes", is_flag=True, help="Ask nobody: blades are clear, or material is loaded."
 )
+
+
+def images_option(of_what: str) -> Decorator:
+    """``--image``, which may be given many times, for photographs of something."""
+    return click.option(
+        "--image",
+        "-i",
+        "images",
+        type=click.Path(path_type=Path),
+        multiple=True,
+        help=f"A photograph of {of_what}; give it again for each.",
+    )

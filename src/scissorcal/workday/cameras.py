@@ -21,6 +21,7 @@ from scissorcal.workday.photographs import (
     PhotoWriter,
     detection_of,
     photo_captures,
+    pictures_beside,
     refuse_known,
 )
 from scissorcal.workday.workspace import Workspace
@@ -129,7 +130,7 @@ def fit_workspace_camera(
     if path.is_file() and not force:
         stored = load_camera(path)
         if stored.inputs_hash == expected:
-            return CameraOutcome(stored, path, _pictures_of(path), cached=True)
+            return CameraOutcome(stored, path, pictures_beside(path), cached=True)
         if stored.origin == "imported" and not captures:
             return CameraOutcome(stored, path, (), cached=True)
     photos = _photos(captures)
@@ -295,7 +296,7 @@ def _draw(
     from scissorcal.vision.overlay import residual_overlay
 
     folder = path.with_suffix("")
-    for old in _pictures_of(path):
+    for old in pictures_beside(path):
         old.unlink()
     boards = [seen_board(photo.name, photo.detection) for photo in photos]
     drawn = [
@@ -310,7 +311,3 @@ def _draw(
         picture = residual_overlay(photo, boards[index].pixels, residuals)
         drawn.append(write_picture(picture, folder / f"worst-{place}-{files[index].stem}.png"))
     return tuple(drawn)
-
-
-def _pictures_of(path: Path) -> tuple[Path, ...]:
-    return tuple(sorted(path.with_suffix("").glob("*.png")))

@@ -58,7 +58,7 @@ def fit_workspace(
         order.insert(0, "friction")
     outcomes: list[FitOutcome] = []
     for index, kind in enumerate(order):
-        share = _share(progress, index, len(order))
+        share = progress_share(progress, index, len(order))
         outcomes.append(_fit(workspace, recipe, kind, effort, seed, force, share))
     return tuple(outcomes)
 
@@ -226,7 +226,7 @@ def _nothing_captured(workspace: Workspace, what: str, left_out: Sequence[str]) 
     )
 
 
-def _share(progress: Progress | None, index: int, count: int) -> Progress:
+def progress_share(progress: Progress | None, index: int, count: int) -> Progress:
     """Give the part of a progress that one of several steps may fill."""
 
     def tell(done: float, sentence: str) -> None:

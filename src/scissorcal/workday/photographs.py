@@ -199,6 +199,11 @@ def already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:
     return None
 
 
+def pictures_beside(path: Path) -> tuple[Path, ...]:
+    """Pictures that were drawn for a fit's file: those in the folder of its name."""
+    return tuple(sorted(path.with_suffix("").glob("*.png")))
+
+
 def _new_folder(workspace: Workspace, kind: PhotoKind) -> Path:
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     workspace.captures_dir.mkdir(parents=True, exist_ok=True)

@@ -18,6 +18,7 @@ from scissorcal.workday.photographs import (
     PhotoWriter,
     detection_of,
     photo_captures,
+    pictures_beside,
     refuse_known,
 )
 from scissorcal.workday.workspace import Workspace
@@ -154,7 +155,7 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
     if path.is_file() and not force:
         stored = load_plate(path)
         if stored.inputs_hash == expected:
-            return PlateOutcome(stored, path, _pictures_of(path), cached=True)
+            return PlateOutcome(stored, path, pictures_beside(path), cached=True)
     camera = require_camera(workspace).camera
     newest = photo_captures(workspace, "plate")[-1:]
     photos = [photo for capture in newest for photo in _photos(capture)]
@@ -289,7 +290,7 @@ def _draw(
     from scissorcal.vision.overlay import residual_overlay, write_picture
     from scissorcal.vision.photo import read_photo
 
-    for old in _pictures_of(path):
+    for old in pictures_beside(path):
         old.unlink()
     pose = fit.camera_plate.after(plate_target(recipe))
     axes = camera.project(fit.camera_plate.apply(AXES_M * np.eye(4, 3, -1)))
@@ -304,7 +305,3 @@ def _draw(
                 write_picture(picture, path.with_suffix("") / f"{Path(photograph.file).stem}.png")
             )
     return tuple(drawn)
-
-
-def _pictures_of(path: Path) -> tuple[Path, ...]:
-    return tuple(sorted(path.with_suffix("").glob("*.png")))

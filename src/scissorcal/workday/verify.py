@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.fits import FIT_ORDER, current_fits
+from scissorcal.workday.fits import FIT_ORDER, current_fits, progress_share
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.recordings import usable_recordings
 from scissorcal.workday.records import Record, RecordFile
@@ -82,7 +82,7 @@ def verify_workspace(
     outcomes = []
     with open_pool(workers, cluster) as pool:
         for index, kind in enumerate(kinds):
-            tell = _share(progress, index, len(kinds))
+            tell = progress_share(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
             experiment, sheets = _experiment(workspace, recipe, kind, fits)
             study = make_study(
@@ -208,13 +208,3 @@ def _duration(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
-
-def _share(progress: Progress | None, index: int, count: int) -> Progress:
-    """Give the part of a progress that one of several steps may fill."""
-
-    def tell(done: float, sentence: str) -> None:
-        if progress is not None:
-            progress((index + done) / count, sentence)
-
-    return tell
