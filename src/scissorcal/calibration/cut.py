@@ -33,11 +33,8 @@ CUTOFF_HZ = 300.0
 """The latter leaves the ripple to the averaging over bins, whose effect is known exactly."""
 
 DRAWS = 2000
-STANDARD_BUDGET = 45_000
+STANDARD_BUDGET = 60_000
 """Evaluations of the likelihood, of some milliseconds each, that standard effort may take."""
-ADAPTED_LIMIT = 0.6
-"""k-hat of an adapted proposal that will do: some twenty parameters settle between 0.5 and 0.6, and
-a mixture that takes them lower costs three times as much."""
 FEWEST_CONTACT_BINS = 60
 FELT = 5.0
 """Torque counts as contact from this many standard deviations of the empty sweeps' noise."""
@@ -85,7 +82,6 @@ def fit_cut(
         optimum=chosen.optimum,
         budget=STANDARD_BUDGET if effort == "standard" else None,
         checkpoint=checkpoint,
-        adapted_limit=ADAPTED_LIMIT,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
     u = chosen.optimum.point

@@ -7,13 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.importance import (
-    ADAPTED_LIMIT,
-    GOOD_K,
-    Sampled,
-    sample_by_importance,
-    sample_by_mixture,
-)
+from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
 from scissorcal.inference.laplace import Laplace, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
@@ -45,7 +39,6 @@ def infer(
     escalate: bool = True,
     checkpoint: Path | None = None,
     budget: int | None = None,
-    adapted_limit: float = ADAPTED_LIMIT,
 ) -> Posterior:
     """Infer a posterior whose likelihood terms may be autocorrelated.
 
@@ -63,8 +56,7 @@ def infer(
     for a proposal that was adapted to draws) and ``budget`` allows, with ensembles. What it became
     is said in the result. ``optimum`` may be passed if it is known already,
     ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
-    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`). A caller with
-    many parameters may set another ``adapted_limit`` for the k-hat of an adapted proposal.
+    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`).
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
     beside the optimum.
@@ -81,7 +73,7 @@ def infer(
     )
     local = laplace(counted, shape, worth.covariance if worth else None)
     proposal = _proposal(counted, best, local)
-    run = _Run(problem.names, local, proposal, counter, rng, count, tell, adapted_limit)
+    run = _Run(problem.names, local, proposal, counter, rng, count, tell)
     if effort == "draft":
         found = run.draft(problem)
     elif effort == "standard":
@@ -181,7 +173,6 @@ class _Run:
     rng: np.random.Generator
     count: int
     tell: Progress
-    adapted_limit: float
 
     def draft(self, problem: Problem) -> _Found:
         draws = self.rng.multivariate_normal(
@@ -200,10 +191,8 @@ class _Run:
         target = self.local.log_posterior
         first = self.counter.calls
         sampled = sample_by_importance(target, self.proposal, self.count, self.rng)
-        if sampled.limit < self.adapted_limit:
-            sampled = replace(sampled, limit=self.adapted_limit)
         said = f"k-hat {sampled.k_hat:.2f}"
-        if sampled.k_hat > max(GOOD_K, self.adapted_limit) and escalate:
+        if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count) - 2)
             if rounds > 0:
