@@ -111,8 +111,8 @@ def capture_cut(
 
 def driven_timeline(plan: Plan, interruptions: Sequence[Interruption] = ()) -> Timeline:
     """String a plan's segments together, each with a rest before and motors off after it."""
-    at_each = {"opening": [], "rate": [], "advance": [], "mode": [], "stroke": [], "sheet": []}
-    columns: dict[str, list[NDArray[np.float64]]] = {**at_each, "gap_s": []}
+    names = ("opening", "rate", "advance", "mode", "stroke", "sheet", "gap_s")
+    columns: dict[str, list[NDArray[np.float64]]] = {name: [] for name in names}
     for number, segment in enumerate(plan.segments):
         reference, sheet = segment.reference, segment.sheet
         order, mode = _order(reference.stroke, interruptions, plan.tick_s)

@@ -14,7 +14,12 @@ touch rig_touch_at(rig *r, double opening, double contact)
 {
     const rig_parameters *p = r->p;
     const double beta = p->moving > 1.5 ? 0.5 * opening : opening;
-    const double sine = sin(beta), cosine = cos(beta);
+    if (beta != r->beta) {
+        r->beta = beta;
+        r->sine = sin(beta);
+        r->cosine = cos(beta);
+    }
+    const double sine = r->sine, cosine = r->cosine;
     const double last = p->edge_length + 2.0 * p->tip_radius;
     touch none = {-1.0, 0.0, 0.0}, found;
     double s = r->station, e = 0.0, slope = 0.0;
@@ -105,6 +110,32 @@ double rig_excess_at(rig *r, double th, double x, double place, double kappa)
     return rig_drive_of(r, &where) - kappa * rig_toughness_at(r, place, NULL);
 }
 
+/* The place between `low` and `high` at which the drive is spent: secants within a bracket. */
+static double spent_between(rig *r, double th, double x, double kappa, double low, double at_low,
+                            double high, double at_high)
+{
+    double last = high, at_last = at_high, now = low, at_now = at_low;
+    for (int turn = 0; turn < 80 && high - low > 1e-15; turn++) {
+        double next = now - at_now * (last - now) / (at_last - at_now);
+        if (!(next > low && next < high)) {
+            next = 0.5 * (low + high);
+        }
+        last = now;
+        at_last = at_now;
+        now = next;
+        at_now = rig_excess_at(r, th, x, now, kappa);
+        if (fabs(at_now) < 1e-11) {
+            return now;
+        }
+        if (at_now > 0.0) {
+            low = now;
+        } else {
+            high = now;
+        }
+    }
+    return high;
+}
+
 /* Where a crack that runs from `from` stops: the first place at which the drive is spent. */
 double rig_stop_of_run(rig *r, double th, double x, double from, double kappa)
 {
@@ -124,23 +155,7 @@ double rig_stop_of_run(rig *r, double th, double x, double from, double kappa)
             at_low = at_high;
             continue;
         }
-        for (int turn = 0; turn < 60 && high - low > 1e-15; turn++) { /* Illinois */
-            const double middle = low + (high - low) * at_low / (at_low - at_high);
-            const double at_middle = rig_excess_at(r, th, x, middle, kappa);
-            if (fabs(at_middle) < 1e-12) {
-                return middle;
-            }
-            if (at_middle > 0.0) {
-                low = middle;
-                at_low = at_middle;
-                at_high *= 0.5;
-            } else {
-                high = middle;
-                at_high = at_middle;
-                at_low *= 0.5;
-            }
-        }
-        return high;
+        return spent_between(r, th, x, kappa, low, at_low, high, at_high);
     }
 }
 

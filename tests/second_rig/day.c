@@ -145,6 +145,7 @@ int rig_run(const rig_parameters *p, const rig_inputs *in, rig_row *rows, rig_ju
     r.p = p;
     r.in = in;
     r.sheet = -1;
+    r.beta = NAN;
     r.station = 0.5 * p->edge_length;
     r.jumps = jumps;
     r.jump_room = jump_room;

@@ -39,7 +39,7 @@ class _Path:
         self.here = there
 
     def rest(self, seconds: float) -> None:
-        self.move(*self.here, seconds)
+        self.move(float(self.here[0]), float(self.here[1]), seconds)
 
 
 def hand_timeline(rig: Rig, plan: Plan, rng: np.random.Generator) -> Timeline:

@@ -17,7 +17,12 @@ HEADERS = ("rig.h", "rig_internal.h")
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
 BUILD = HERE.parents[1] / "build" / "second_rig"
 
-PARAMETERS = tuple(
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
+PARAMETERS = _names(
     """tick_s step_s inertia coulomb_pos coulomb_neg viscous_pos viscous_neg stribeck stribeck_rate
     angle_slope angle_curvature angle_center presliding load_share offset cogging cogging_periods
     cogging_phase mass sledge_coulomb sledge_viscous sledge_presliding delay_ticks lag_s
@@ -26,23 +31,18 @@ PARAMETERS = tuple(
     sledge_observer_hz moving edge_offset edge_slope edge_curvature edge_cubic edge_length
     tip_radius upper_face law force reference exponent knee knee_ratio damping fracture kappa
     sheet_length grid_step radius hand_stiffness hand_damping hand_strength hand_push hand_drag
-    hand_reach""".split()
+    hand_reach"""
 )
 
-ROW = np.dtype(
-    [
-        (name, "<f8")
-        for name in """opening rate advance advance_rate crack motor_torque sledge_force handle_force
-        cut_torque friction_torque indentation measured_opening measured_advance torque_command
-        force_command kinetic stored fracture arrest motor_work sledge_motor_work cogging_work
-        offset_work hand_work sledge_hand_work friction_work sledge_friction_work cut_work
-        sledge_cut_work damping_work""".split()
-    ]
+ROW_NAMES = _names(
+    """opening rate advance advance_rate crack motor_torque sledge_force handle_force cut_torque
+    friction_torque indentation measured_opening measured_advance torque_command force_command
+    kinetic stored fracture arrest motor_work sledge_motor_work cogging_work offset_work hand_work
+    sledge_hand_work friction_work sledge_friction_work cut_work sledge_cut_work damping_work"""
 )
-
-JUMP = np.dtype(
-    [(name, "<f8") for name in "time opening advance start end toughness drive_after sheet".split()]
-)
+JUMP_NAMES = _names("time opening advance start end toughness drive_after sheet")
+ROW = np.dtype([(name, "<f8") for name in ROW_NAMES])
+JUMP = np.dtype([(name, "<f8") for name in JUMP_NAMES])
 
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 _INTS = ctypes.POINTER(ctypes.c_int32)
@@ -75,7 +75,7 @@ def library() -> ctypes.CDLL:
     library.rig_sizes.restype = ctypes.c_double
     library.rig_run.restype = ctypes.c_int
     sizes = [library.rig_sizes(which) for which in range(4)]
-    known = [len(PARAMETERS), len(ROW), len(JUMP), ctypes.sizeof(Inputs) / 8]
+    known = [len(PARAMETERS), len(ROW_NAMES), len(JUMP_NAMES), ctypes.sizeof(Inputs) / 8]
     if sizes != known:
         raise RuntimeError(f"rig.h and library.py disagree about layouts: {sizes} and {known}.")
     return library

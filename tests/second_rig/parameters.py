@@ -92,10 +92,10 @@ class Servo:
     sledge's in N/m, N s/m and N/(m s). ``feed_*`` is what the servo believes of the mechanism.
     """
 
-    rate_gain: float = 0.045
+    rate_gain: float = 0.06
     position_gain: float = 45.0
     integral_gain: float = 1.2
-    observer_hz: float = 200.0
+    observer_hz: float = 300.0
     feed_inertia_kg_m2: float = 2.0e-4
     feed_coulomb_Nm: float = 0.012
     feed_viscous_Nm_s_per_rad: float = 0.002
@@ -182,7 +182,7 @@ class Rig:
     servo: Servo = Servo()
     blades: Blades = Blades()
     hand: Hand = field(default_factory=Hand)
-    step_s: float = 1.0e-4
+    step_s: float = 2.0e-4
 
     @property
     def moving_blades(self) -> int:

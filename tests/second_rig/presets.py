@@ -55,7 +55,7 @@ def pad(**changes: object) -> Material:
 
 
 def coarse(material: Material | None = None) -> Rig:
-    """A rig that is hard to fit: few counts, cogging, presliding, load share, bent edge, late motor."""
+    """A rig that is hard to fit: few counts, a late motor, presliding, load share, a bent edge."""
     return Rig(
         material or paper(),
         Mechanism(friction=Friction(presliding_rad=3e-3, load_share=0.1)),

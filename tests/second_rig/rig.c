@@ -117,10 +117,11 @@ static state step_of(rig *r, const state *y0, double dt)
     static const double reach[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
     double a[2] = {0.0, 0.0}, power[WORKS], sum_v[2] = {0.0, 0.0}, sum_a[2] = {0.0, 0.0};
     double rates[2] = {0.0, 0.0};
+    const double half = lag_keeps(r->p->lag_s, 0.5 * dt);
     state y = *y0, end = *y0;
     for (int i = 0; i < 4; i++) {
         const double h = reach[i] * dt;
-        const double keep = h == 0.0 ? 1.0 : lag_keeps(r->p->lag_s, h);
+        const double keep = i == 0 ? 1.0 : i == 3 ? half * half : half;
         y.th = y0->th + h * rates[0];
         y.x = y0->x + h * rates[1];
         y.w = y0->w + h * a[0];

@@ -27,6 +27,7 @@ typedef struct {
     const rig_inputs *in;
     const double *toughness, *integral; /* of the sheet in place, NULL without one */
     int severed, mode;
+    double beta, sine, cosine; /* of the last blade angle */
     double station; /* where Newton's method found the last contact on the blade */
     double torque_target, thrust_target;
     int64_t tick;

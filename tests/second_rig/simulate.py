@@ -69,14 +69,14 @@ class Books:
     sheet: Integers
 
     @property
-    def sheet_fracture_energy_N(self) -> Array:
-        """Mean toughness J_c h of each sheet over its length, (sheets,)."""
+    def sheet_fracture_energy(self) -> Array:
+        """Mean toughness J_c h of each sheet over its length, in N, (sheets,)."""
         cells = 0.5 * (self.toughness[:, 1:] + self.toughness[:, :-1])
         return np.asarray(cells.mean(axis=1))
 
     @property
-    def imbalance_J(self) -> Array:
-        """Energy that came from nowhere, (n,): zero but for the integrator's error."""
+    def imbalance(self) -> Array:
+        """Energy that came from nowhere, in J, (n,): zero but for the integrator's error."""
         r = self.rows
         given = (
             r["motor_work"] + r["sledge_motor_work"] + r["hand_work"] + r["sledge_hand_work"]
@@ -94,8 +94,8 @@ def run(rig: Rig, timeline: Timeline, rng: np.random.Generator) -> Books:
     """
     sheets = int(timeline.sheet.max()) + 1
     toughness = toughness_of(rig.material, max(sheets, 1), rng)
-    steps = 0.5 * GRID_M * (toughness[:, 1:] + toughness[:, :-1])
-    integral = np.concatenate([np.zeros((len(toughness), 1)), np.cumsum(steps, axis=1)], axis=1)
+    integral = np.zeros_like(toughness)
+    integral[:, 1:] = np.cumsum(0.5 * GRID_M * (toughness[:, 1:] + toughness[:, :-1]), axis=1)
     rows = np.zeros(len(timeline), ROW)
     jumps = np.zeros(JUMP_ROOM, JUMP)
     count = ctypes.c_int64()
@@ -134,7 +134,7 @@ def run(rig: Rig, timeline: Timeline, rng: np.random.Generator) -> Books:
     )
     if failure:
         raise RuntimeError(FAILURES[failure])
-    time = np.arange(len(timeline)) * rig.tick_s + np.cumsum(timeline.gap_s)
+    time = np.asarray(np.arange(len(timeline)) * rig.tick_s + np.cumsum(timeline.gap_s))
     return Books(
         rows,
         jumps[: count.value].copy(),

@@ -70,14 +70,16 @@ def response(rig: Rig, indentation: ArrayLike) -> tuple[Array, Array]:
     delta = np.asarray(indentation, dtype=np.float64)
     ratio, n = delta / sheet.reference_m, sheet.exponent
     if sheet.law == "power":
-        force = sheet.force_N * ratio**n
-        return force, n * force / delta
+        force = np.asarray(sheet.force_N * ratio**n)
+        return force, np.asarray(n * force / delta)
     if sheet.law == "exponential":
         scale = sheet.force_N / np.expm1(n)
-        return scale * np.expm1(n * ratio), scale * n / sheet.reference_m * np.exp(n * ratio)
+        grown = np.asarray(scale * np.expm1(n * ratio))
+        return grown, np.asarray(n / sheet.reference_m * (grown + scale))
     more = sheet.knee_ratio - 1.0
     stiffness = sheet.force_N / (
         sheet.reference_m + more * max(sheet.reference_m - sheet.knee_m, 0.0)
     )
     beyond = np.maximum(delta - sheet.knee_m, 0.0)
-    return stiffness * (delta + more * beyond), stiffness * (1.0 + more * (beyond > 0.0))
+    force = np.asarray(stiffness * (delta + more * beyond))
+    return force, np.asarray(stiffness * (1.0 + more * (beyond > 0.0)))
