@@ -58,10 +58,10 @@ def coarse(material: Material | None = None) -> Rig:
     """A rig that is hard to fit: few counts, a late motor, presliding, load share, a bent edge."""
     return Rig(
         material or paper(),
-        Mechanism(friction=Friction(presliding_rad=3e-3, load_share=0.1)),
+        Mechanism(friction=Friction(presliding_rad=1.5e-3, load_share=0.1)),
         Motor(delay_ticks=1.1, lag_ticks=0.4, cogging_Nm=6e-4),
         Sensors(counts_per_turn=20_000, sledge_step_m=5e-6),
-        Servo(rate_gain=0.03, position_gain=30.0, integral_gain=0.8, observer_hz=120.0),
+        Servo(rate_gain=0.022, position_gain=35.0, integral_gain=0.8, observer_hz=350.0),
         Blades(curvature_per_m=0.35),
     )
 
