@@ -15,6 +15,9 @@ SLEDGE_SPEED = 0.07
 OPENING_SPEED = 0.9
 BACK_S = 1.2
 SETTLE_S = 0.6
+LEAD_M = 2e-3
+SAG_RAD = 0.03
+"""How much less than it means to the hand closes, for it holds the handles as through a spring."""
 PEAK = 1.875
 """Peak over mean rate of a minimum-jerk movement."""
 
@@ -58,12 +61,15 @@ def hand_timeline(rig: Rig, plan: Plan, rng: np.random.Generator) -> Timeline:
     for segment in plan.segments:
         begun = sum(len(part) for part in path.places)
         strokes = [s for s in plan.strokes if s.kind in ("closing", "press")]
+        seen = np.inf  # how far the sheet seems to be cut, once a stroke has been made
         for stroke in strokes:
             ticks = np.flatnonzero(segment.reference.stroke == stroke.index)
             if len(ticks) == 0:
                 continue
             top, bottom = segment.reference.opening[ticks[[0, -1]]]
-            place = segment.reference.advance[ticks[0]] - abs(hand.aim_m * rng.standard_normal())
+            place = float(segment.reference.advance[ticks[0]])
+            place = min(place, seen - crossing(rig, start[0]) - LEAD_M)
+            place -= abs(hand.aim_m * rng.standard_normal())
             top = min(top + 0.5 * abs(hand.turn_rad * rng.standard_normal()), start[0])
             bottom += abs(hand.turn_rad * rng.standard_normal())
             speed = stroke.speed * np.exp(hand.unevenness * rng.standard_normal())
@@ -74,6 +80,8 @@ def hand_timeline(rig: Rig, plan: Plan, rng: np.random.Generator) -> Timeline:
             path.rest(PAUSE_S)
             path.move(start[0], place, PEAK * (top - bottom) / OPENING_SPEED)
             path.rest(PAUSE_S)
+            if stroke.kind == "closing":
+                seen = place + crossing(rig, bottom + SAG_RAD)
         path.rest(SETTLE_S)
         made = sum(len(part) for part in path.places) - begun
         sheets.append(np.full(made, segment.sheet))
@@ -93,6 +101,16 @@ def hand_timeline(rig: Rig, plan: Plan, rng: np.random.Generator) -> Timeline:
         np.concatenate(sheets).astype(np.int32),
         np.zeros(count),
     )
+
+
+def crossing(rig: Rig, opening: float) -> float:
+    """Distance from the pivot (m) at which the edge crosses the sheet's upper face."""
+    blades, beta = rig.blades, opening / rig.moving_blades
+    s = np.linspace(0.0, blades.length_m, 4001)
+    e = blades.offset_m + s * np.tan(blades.taper_rad)
+    e += 0.5 * blades.curvature_per_m * s**2 + blades.cubic_per_m2 * s**3
+    x, y = s * np.cos(beta) - e * np.sin(beta), s * np.sin(beta) + e * np.cos(beta)
+    return float(np.interp(rig.upper_face_m, y, x))
 
 
 def _tremor(rig: Rig, count: int, rng: np.random.Generator) -> Array:
