@@ -14,7 +14,17 @@ import numpy as np
 HERE = Path(__file__).parent
 SOURCES = ("contact.c", "rig.c", "day.c")
 HEADERS = ("rig.h", "rig_internal.h")
-FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
+FLAGS = (
+    "-std=c99",
+    "-O3",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-fPIC",
+    "-shared",
+)
 BUILD = HERE.parents[1] / "build" / "second_rig"
 
 
@@ -24,7 +34,8 @@ def _names(text: str) -> tuple[str, ...]:
 
 PARAMETERS = _names(
     """tick_s step_s inertia coulomb_pos coulomb_neg viscous_pos viscous_neg stribeck stribeck_rate
-    angle_slope angle_curvature angle_center presliding load_share offset cogging cogging_periods
+    angle_slope angle_curvature angle_center presliding presliding_shape
+    load_share offset cogging cogging_periods
     cogging_phase mass sledge_coulomb sledge_viscous sledge_presliding delay_ticks lag_s
     torque_limit force_limit brake opening_step advance_step rate_gain position_gain integral_gain
     observer_hz feed_inertia feed_coulomb feed_viscous sledge_kp sledge_kd sledge_ki

@@ -20,8 +20,9 @@ class Friction:
     """Dry and viscous friction of the opening axis, with memory and with load.
 
     F = [u (Fc + S exp(-(w / w_s)^2)) + Fv w] [1 + a (th - c) + b (th - c)^2] + u mu |tau_cut|,
-    levels by direction. u follows the path: du/dth = (sgn(w) - u) / presliding_rad for w > 0 (Dahl
-    1968), so that a reversal takes that way to build the friction up again.
+    levels by direction. u follows the path: the distance |sgn(w) - u| falls by its power
+    ``presliding_shape`` over ``presliding_rad`` of way (1 is Dahl's law of 1968, larger ones take
+    longer at the end), so that a reversal takes some way to build the friction up again.
     """
 
     coulomb_opening_Nm: float = 0.0135
@@ -34,6 +35,7 @@ class Friction:
     angle_curvature_per_rad2: float = 0.1
     angle_center_rad: float = math.radians(30.0)
     presliding_rad: float = RIGID_RAD
+    presliding_shape: float = 1.0
     load_share: float = 0.0
 
 

@@ -15,15 +15,20 @@ static int cracks(const rig *r)
     return rig_is_loaded(r) && r->p->fracture > 0.5;
 }
 
-/* Share of the dry friction borne after a path of `way`: it approaches the path's direction. */
-static double after_path(double share, double way, double length)
+/* Share of the dry friction borne after a path of `way`: it approaches the path's direction, its
+ * distance from there falling as d' = -d^shape / length. */
+static double after_path(double share, double way, double length, double shape)
 {
     if (way == 0.0) {
         return share;
     }
     const double toward = way > 0.0 ? 1.0 : -1.0;
-    const double far = fabs(way) / length;
-    return far > 40.0 ? toward : toward + (share - toward) * exp(-far);
+    const double far = fabs(way) / length, left = fabs(toward - share);
+    if (shape > 1.0) {
+        const double root = left > 1e-12 ? pow(left, 1.0 - shape) + (shape - 1.0) * far : INFINITY;
+        return toward * (1.0 - pow(root, 1.0 / (1.0 - shape)));
+    }
+    return far > 40.0 ? toward : toward * (1.0 - left * exp(-far));
 }
 
 static double dry_friction(const rig_parameters *p, double th, double w, double u, double load)
@@ -58,8 +63,8 @@ void rig_stage(rig *r, const state *y0, state *y, double into, double accelerati
 {
     const rig_parameters *p = r->p;
     double cut = 0.0, along = 0.0, damped = 0.0, damped_along = 0.0, handle = 0.0, push = 0.0, energy;
-    y->u = after_path(y0->u, y->th - y0->th, p->presliding);
-    y->ux = after_path(y0->ux, y->x - y0->x, p->sledge_presliding);
+    y->u = after_path(y0->u, y->th - y0->th, p->presliding, p->presliding_shape);
+    y->ux = after_path(y0->ux, y->x - y0->x, p->sledge_presliding, 1.0);
     y->crack = y0->crack;
     r->indentation = 0.0;
     if (rig_is_loaded(r)) {
@@ -145,8 +150,8 @@ static state step_of(rig *r, const state *y0, double dt)
     end.v += dt * sum_a[1];
     end.torque = y.torque;
     end.thrust = y.thrust;
-    end.u = after_path(y0->u, end.th - y0->th, r->p->presliding);
-    end.ux = after_path(y0->ux, end.x - y0->x, r->p->sledge_presliding);
+    end.u = after_path(y0->u, end.th - y0->th, r->p->presliding, r->p->presliding_shape);
+    end.ux = after_path(y0->ux, end.x - y0->x, r->p->sledge_presliding, 1.0);
     if (cracks(r) && r->p->kappa >= 1.0) {
         end.crack = rig_stop_of_run(r, end.th, end.x, y0->crack, 1.0);
     }

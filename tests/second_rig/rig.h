@@ -12,7 +12,7 @@ enum { RIG_PRESS = 0, RIG_CRACK = 1 };
 typedef struct {
     double tick_s, step_s;
     double inertia, coulomb_pos, coulomb_neg, viscous_pos, viscous_neg, stribeck, stribeck_rate;
-    double angle_slope, angle_curvature, angle_center, presliding, load_share, offset;
+    double angle_slope, angle_curvature, angle_center, presliding, presliding_shape, load_share, offset;
     double cogging, cogging_periods, cogging_phase;
     double mass, sledge_coulomb, sledge_viscous, sledge_presliding;
     double delay_ticks, lag_s, torque_limit, force_limit, brake;

@@ -53,11 +53,12 @@ class Books:
     """The truth at every tick of a capture.
 
     ``rows`` (n,) has the fields of library.ROW: motion, crack, forces, and cumulative works and
-    energies in joules (``cut_work`` is what the sheet does on the blades' opening, so a cut makes
-    it negative; friction and damping are losses). ``jumps`` has each run of a rippled crack:
-    time (s), opening, advance, start and end (m, plate frame), toughness there (N) and the drive
-    after it. ``toughness`` (sheets, grid) is J(X) on a grid of ``grid_m``; ``stroke`` and
-    ``sheet`` (n,) are the labels.
+    energies in joules. ``cut_work`` is what the sheet's elastic force does on the blades' opening,
+    so a cut makes it negative; ``cut_torque`` holds the rate damping too, whose work is booked in
+    ``damping_work``. Friction, damping, ``fracture`` (kappa J per metre) and ``arrest`` are losses.
+    ``jumps`` has each run of a rippled crack: time (s), opening, advance, start and end (m, plate
+    frame), toughness there (N), the drive after it, and the sheet. ``toughness`` (sheets, grid) is
+    J(X) on a grid of ``grid_m``; ``time_s``, ``stroke`` and ``sheet`` (n,) are the rows' labels.
     """
 
     rows: NDArray[np.void]
@@ -135,9 +136,11 @@ def run(rig: Rig, timeline: Timeline, rng: np.random.Generator) -> Books:
     if failure:
         raise RuntimeError(FAILURES[failure])
     time = np.asarray(np.arange(len(timeline)) * rig.tick_s + np.cumsum(timeline.gap_s))
+    jumps = jumps[: count.value].copy()
+    jumps["time"] += np.cumsum(timeline.gap_s)[(jumps["time"] / rig.tick_s).astype(int)]
     return Books(
         rows,
-        jumps[: count.value].copy(),
+        jumps,
         toughness,
         GRID_M,
         time,
@@ -198,6 +201,7 @@ def core_parameters(rig: Rig) -> list[float]:
         "angle_curvature": friction.angle_curvature_per_rad2,
         "angle_center": friction.angle_center_rad,
         "presliding": friction.presliding_rad,
+        "presliding_shape": friction.presliding_shape,
         "load_share": friction.load_share,
         "offset": mechanism.torque_offset_Nm,
         "cogging": motor.cogging_Nm,

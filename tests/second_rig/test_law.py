@@ -1,6 +1,7 @@
 """The cut of the second rig against closed forms, written here apart from its core."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -42,7 +43,9 @@ def steadily_running(crack: Array) -> NDArray[np.bool_]:
 
 
 @pytest.mark.parametrize("moving", ["both", "upper"])
-def test_smooth_torque_is_toughness_times_what_the_contact_moves(moving: str) -> None:
+def test_smooth_torque_is_toughness_times_what_the_contact_moves(
+    moving: Literal["both", "upper"],
+) -> None:
     rig = fine(paper(kappa=1.0, variation=0.0))
     rig = replace(rig, blades=replace(rig.blades, moving=moving))
     rows = cut(rig).rows
@@ -61,7 +64,9 @@ def test_smooth_torque_is_toughness_times_what_the_contact_moves(moving: str) ->
 
 
 @pytest.mark.parametrize("moving", ["both", "upper"])
-def test_an_edge_through_the_pivot_has_the_published_torque(moving: str) -> None:
+def test_an_edge_through_the_pivot_has_the_published_torque(
+    moving: Literal["both", "upper"],
+) -> None:
     rig = fine(paper(kappa=1.0, variation=0.0, thickness_m=8e-3))
     rig = replace(rig, blades=replace(rig.blades, moving=moving, offset_m=0.0, taper_rad=0.0))
     opening = np.concatenate([np.full(200, 0.9), np.linspace(0.9, 0.25, 2000)])

@@ -73,12 +73,15 @@ def test_it_shares_no_code_with_what_it_judges() -> None:
         assert "sc_" not in path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("presliding_rad", [4e-6, 2e-3])
-def test_friction_needs_its_way_to_build_up_after_a_reversal(presliding_rad: float) -> None:
+@pytest.mark.parametrize(("presliding_rad", "shape"), [(4e-6, 1.0), (2e-3, 1.0), (2e-3, 1.5)])
+def test_friction_needs_its_way_to_build_up_after_a_reversal(
+    presliding_rad: float, shape: float
+) -> None:
     rig = fine()
     friction = replace(
         rig.mechanism.friction,
         presliding_rad=presliding_rad,
+        presliding_shape=shape,
         stribeck_Nm=0.0,
         angle_slope_per_rad=0.0,
         angle_curvature_per_rad2=0.0,
@@ -92,11 +95,13 @@ def test_friction_needs_its_way_to_build_up_after_a_reversal(presliding_rad: flo
     force = rows["friction_torque"][turn + 1 : turn + 300]
     low, high = -friction.coulomb_closing_Nm, friction.coulomb_opening_Nm
     share = 1.0 - 2.0 * np.exp(-way / presliding_rad)
+    if shape > 1.0:
+        share = 1.0 - (2.0**-0.5 + 0.5 * way / presliding_rad) ** -2
     law = np.where(share > 0, high, -low) * share
     assert np.allclose(force[5:], law[5:], atol=2e-4)
     built = way[np.flatnonzero(force > 0.9 * high)[0]]
-    assert built == pytest.approx(3.0 * presliding_rad, rel=0.1) or presliding_rad < 1e-5
-    assert built < 4.0 * presliding_rad + 2e-4
+    expected = 3.0 if shape == 1.0 else 2.0 * (10.0**0.5 - 0.5**0.5)
+    assert built == pytest.approx(expected * presliding_rad, rel=0.1, abs=2e-4)
 
 
 @pytest.mark.parametrize("load_share", [0.0, 0.1])

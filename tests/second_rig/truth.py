@@ -20,7 +20,8 @@ def true_parameters(
     Friction's levels hold at ``angle_center`` (rad); ``response_force`` is the force at the
     reference indentation, and for two slopes ``response_exponent`` is d ln g / d ln delta there.
     ``fracture_energy`` is the J_c h of the material that starts the crack; each sheet's own mean
-    is in the books. ``symmetric`` gives means of both directions.
+    is in the books. ``symmetric`` gives means of both directions. A law without an offset of its
+    own has coulomb_pos + offset and coulomb_neg - offset for its levels.
     """
     friction, mechanism, sheet = rig.mechanism.friction, rig.mechanism, rig.material
     center = friction.angle_center_rad if angle_center is None else angle_center
@@ -47,6 +48,7 @@ def true_parameters(
     }[sheet.law]
     truth = {
         "inertia": mechanism.inertia_kg_m2,
+        "delay": held_torque_delay_s(rig),
         "offset": mechanism.torque_offset_Nm,
         **levels,
         "stribeck": friction.stribeck_Nm * factor,
@@ -55,6 +57,7 @@ def true_parameters(
         "angle_curvature": bend / factor,
         "load_share": friction.load_share,
         "presliding_length": friction.presliding_rad,
+        "presliding_share": 1.0,
         "response_force": force,
         "response_exponent": exponent,
     }
@@ -62,6 +65,29 @@ def true_parameters(
         truth["fracture_energy"] = sheet.fracture_energy_N
         truth["kappa"] = sheet.kappa
     return truth
+
+
+def held_torque_delay_s(rig: Rig) -> float:
+    """How late the measured torque is against a straight line from sample to sample, in s.
+
+    The mean torque between samples i and i + 1 is tau_i + (1/2 + delay / tick) (tau_{i+1} - tau_i):
+    torque is held from tick to tick, and read just before the next command arrives. With part of a
+    tick's delay and a lag it is the regression over commands that wander.
+    """
+    share, lag = rig.motor.delay_ticks % 1.0, rig.motor.lag_ticks
+    commands = np.cumsum(np.random.default_rng(1).standard_normal(20_000))
+    ends, means = np.zeros(len(commands)), np.zeros(len(commands))
+    now = before = 0.0
+    for tick, command in enumerate(commands):
+        total = 0.0
+        for target, span in ((before, share), (command, 1.0 - share)):
+            keep = np.exp(-span / lag) if lag else 0.0
+            total += target * span + (now - target) * lag * (1.0 - keep)
+            now = target + (now - target) * (keep if span else 1.0)
+        before = command
+        ends[tick], means[tick] = now, total
+    change, more = np.diff(ends), means[1:] - ends[:-1]
+    return float((change @ more / (change @ change) - 0.5) * rig.tick_s)
 
 
 def response(rig: Rig, indentation: ArrayLike) -> tuple[Array, Array]:
