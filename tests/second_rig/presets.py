@@ -54,11 +54,11 @@ def pad(**changes: object) -> Material:
     return replace(sheet, **changes)  # type: ignore[arg-type]
 
 
-def coarse(material: Material | None = None) -> Rig:
+def coarse(material: Material | None = None, load_share: float = 0.1) -> Rig:
     """A rig that is hard to fit: few counts, a late motor, presliding, load share, a bent edge."""
     return Rig(
         material or paper(),
-        Mechanism(friction=Friction(presliding_rad=1.5e-3, load_share=0.1)),
+        Mechanism(friction=Friction(presliding_rad=1.5e-3, load_share=load_share)),
         Motor(delay_ticks=1.1, lag_ticks=0.4, cogging_Nm=6e-4),
         Sensors(counts_per_turn=20_000, sledge_step_m=5e-6),
         Servo(rate_gain=0.022, position_gain=35.0, integral_gain=0.8, observer_hz=350.0),
@@ -66,9 +66,13 @@ def coarse(material: Material | None = None) -> Rig:
     )
 
 
-def fine(material: Material | None = None) -> Rig:
-    """A rig with 500,000 counts a turn, a quick motor, little cogging, no load share."""
-    return Rig(material or paper(), motor=Motor(delay_ticks=0.25, lag_ticks=0.25, cogging_Nm=2e-4))
+def fine(material: Material | None = None, load_share: float = 0.0) -> Rig:
+    """A rig with 500,000 counts a turn, a quick motor, little cogging, rigid friction."""
+    return Rig(
+        material or paper(),
+        Mechanism(friction=Friction(load_share=load_share)),
+        Motor(delay_ticks=0.25, lag_ticks=0.25, cogging_Nm=2e-4),
+    )
 
 
 def smooth(rig: Rig) -> Rig:

@@ -156,6 +156,18 @@ def test_a_lag_follows_its_exponential_and_cogging_its_sine() -> None:
     assert np.allclose(rows["cogging_work"], energy, atol=1e-10)
 
 
+@pytest.mark.parametrize(("delay_ticks", "lag_ticks"), [(0.0, 1.0), (1.1, 0.4), (0.25, 0.25)])
+def test_a_held_torque_is_as_late_as_stated(delay_ticks: float, lag_ticks: float) -> None:
+    rig = coarse()
+    rig = replace(rig, motor=replace(rig.motor, delay_ticks=delay_ticks, lag_ticks=lag_ticks))
+    rows = run(rig, there_and_back(rig), np.random.default_rng(1)).rows
+    torque, way = rows["motor_torque"], np.diff(rows["opening"])
+    more = np.diff(rows["motor_work"]) - (torque[:-1] + 0.5 * np.diff(torque)) * way
+    column = np.diff(torque) * way
+    late = (column @ more) / (column @ column) * rig.tick_s
+    assert true_parameters(rig)["delay"] == pytest.approx(late, abs=3e-5)
+
+
 def test_a_seed_gives_the_same_day_and_another_seed_another() -> None:
     rig = coarse()
     recipe = recipe_for(rig, sheets=1, strokes_per_sheet=1)
