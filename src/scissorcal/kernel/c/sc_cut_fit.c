@@ -1,0 +1,383 @@
+#include "sc_cut_fit.h"
+
+#include <math.h>
+#include <stddef.h>
+
+static const double TINY = 1e-300;
+static const double LEAST_DEPTH = 1e-12;
+static const double LEAST_SLOPE = 1e-6;
+/* A sawtooth's integral over a random part of its cycle, in shares of height times length: the
+ * standard deviation of (u^2 - 1/4) / 2 for u even in (-1/2, 1/2). */
+static const double PARTIAL_CYCLE = 0.037267799624996496;
+/* Steps of the crack's place towards its highest density are held to this share of a cycle. */
+static const double REST_REACH_M = 3e-5;
+
+typedef struct {
+    double t, t2, t3;
+} cell;
+
+static int32_t locate(const sc_response_table *table, double log_depth, cell *inside)
+{
+    double place = (log_depth - table->first) / table->step;
+    int32_t index = (int32_t)floor(place);
+    if (index < 0) index = 0;
+    if (index > table->size - 2) index = table->size - 2;
+    inside->t = place - (double)index;
+    inside->t2 = inside->t * inside->t;
+    inside->t3 = inside->t2 * inside->t;
+    return index;
+}
+
+static double hermite(double y0, double y1, double m0, double m1, const cell *c)
+{
+    return (2.0 * c->t3 - 3.0 * c->t2 + 1.0) * y0 + (c->t3 - 2.0 * c->t2 + c->t) * m0 +
+           (3.0 * c->t2 - 2.0 * c->t3) * y1 + (c->t3 - c->t2) * m1;
+}
+
+double sc_response_log_force(const sc_response_table *table, double log_depth, double *slope)
+{
+    int32_t last = table->size - 1;
+    double end = table->first + table->step * (double)last;
+    if (log_depth <= table->first) {
+        *slope = table->force_slope[0];
+        return table->log_force[0] + *slope * (log_depth - table->first);
+    }
+    if (log_depth >= end) {
+        *slope = table->force_slope[last];
+        return table->log_force[last] + *slope * (log_depth - end);
+    }
+    cell c;
+    int32_t i = locate(table, log_depth, &c);
+    double m0 = table->force_slope[i] * table->step, m1 = table->force_slope[i + 1] * table->step;
+    double y0 = table->log_force[i], y1 = table->log_force[i + 1];
+    *slope = ((6.0 * c.t2 - 6.0 * c.t) * (y0 - y1) + (3.0 * c.t2 - 4.0 * c.t + 1.0) * m0 +
+              (3.0 * c.t2 - 2.0 * c.t) * m1) /
+             table->step;
+    return hermite(y0, y1, m0, m1, &c);
+}
+
+/* d(log energy)/d(log depth) = depth * force / energy, known at the knots. */
+static double energy_slope(const sc_response_table *table, int32_t i)
+{
+    double log_depth = table->first + table->step * (double)i;
+    return exp(log_depth + table->log_force[i] - table->log_energy[i]);
+}
+
+double sc_response_log_energy(const sc_response_table *table, double log_depth)
+{
+    int32_t last = table->size - 1;
+    double end = table->first + table->step * (double)last;
+    if (log_depth <= table->first)
+        return table->log_energy[0] + energy_slope(table, 0) * (log_depth - table->first);
+    if (log_depth >= end)
+        return table->log_energy[last] + energy_slope(table, last) * (log_depth - end);
+    cell c;
+    int32_t i = locate(table, log_depth, &c);
+    return hermite(table->log_energy[i], table->log_energy[i + 1],
+                   energy_slope(table, i) * table->step, energy_slope(table, i + 1) * table->step,
+                   &c);
+}
+
+double sc_response_log_depth(const sc_response_table *table, double log_force)
+{
+    int32_t last = table->size - 1, low = 0, high = last;
+    double end = table->first + table->step * (double)last;
+    if (log_force <= table->log_force[0])
+        return table->first + (log_force - table->log_force[0]) / table->force_slope[0];
+    if (log_force >= table->log_force[last])
+        return end + (log_force - table->log_force[last]) / table->force_slope[last];
+    while (high - low > 1) {
+        int32_t middle = (low + high) / 2;
+        if (table->log_force[middle] <= log_force) low = middle;
+        else high = middle;
+    }
+    double left = table->first + table->step * (double)low;
+    double rise = table->log_force[high] - table->log_force[low];
+    double place = left + table->step * (log_force - table->log_force[low]) / rise;
+    for (int32_t k = 0; k < 6; k++) {
+        double slope, value = sc_response_log_force(table, place, &slope);
+        double step = (log_force - value) / slope;
+        place += step;
+        if (place < left) place = left;
+        if (place > left + table->step) place = left + table->step;
+        if (fabs(step) < 1e-14) break;
+    }
+    return place;
+}
+
+void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, double slope,
+                  double *start_depth, double *stop_depth, double *mean_share)
+{
+    const sc_response_table *table = &parameters->response;
+    double tangent = slope > LEAST_SLOPE ? slope : LEAST_SLOPE;
+    double log_peak = log(parameters->energy / (moving_blades * tangent));
+    double log_start = sc_response_log_depth(table, log_peak);
+    *start_depth = exp(log_start);
+    if (parameters->fracture != SC_CUT_RIPPLED) {
+        *stop_depth = *start_depth;
+        *mean_share = 1.0;
+        return;
+    }
+    double log_stop = sc_response_log_depth(table, log_peak + log(parameters->kappa));
+    *stop_depth = exp(log_stop);
+    double travel = *start_depth - *stop_depth;
+    if (travel < 1e-9 * *start_depth) {
+        *mean_share = 0.5 * (1.0 + parameters->kappa);
+        return;
+    }
+    double gained = exp(sc_response_log_energy(table, log_start)) -
+                    exp(sc_response_log_energy(table, log_stop));
+    *mean_share = gained / travel / exp(log_peak);
+}
+
+static double departure(const double *gradient, const double *edge, int32_t count)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < count; i++) sum += gradient[i] * edge[i];
+    return sum;
+}
+
+static double damped(double damping, double sinking)
+{
+    double factor = 1.0 + damping * sinking;
+    return factor > 0.0 ? factor : 0.0;
+}
+
+/* Torque (N m) of the response averaged over a segment's nodes, and its derivative by the crack's
+ * place, with the crack `moved` from where the nodes were expanded. */
+static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p, int32_t segment,
+                             double moved, double *by_place)
+{
+    double torque = 0.0;
+    *by_place = 0.0;
+    for (int32_t node = segment * SC_CUT_NODES; node < (segment + 1) * SC_CUT_NODES; node++) {
+        const double *de = data->depth_de + (ptrdiff_t)node * data->edge_count;
+        const double *le = data->lever_de + (ptrdiff_t)node * data->edge_count;
+        double depth = data->depth[node] + data->depth_dx[node] * moved +
+                       departure(de, p->edge, data->edge_count);
+        if (depth <= LEAST_DEPTH) continue;
+        double lever = data->lever[node] + data->lever_dx[node] * moved +
+                       departure(le, p->edge, data->edge_count);
+        double power, force = exp(sc_response_log_force(&p->response, log(depth), &power));
+        force *= damped(p->damping, data->sinking[node]);
+        torque += force * lever;
+        *by_place += force * (power / depth * data->depth_dx[node] * lever + data->lever_dx[node]);
+    }
+    *by_place /= SC_CUT_NODES;
+    return torque / SC_CUT_NODES;
+}
+
+/* Whitened residuals and their derivatives by the place for all elastic segments, and by rest the
+ * sums that a Gauss-Newton step needs. */
+static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, const double *places,
+                         double *residuals, double *z, double *zx, double *curvature, double *pull)
+{
+    double scale = 1.0 / p->noise_scale;
+    for (int32_t r = 0; r < data->rests; r++) curvature[r] = pull[r] = 0.0;
+    for (int32_t i = 0; i < data->pieces; i++) {
+        int32_t low = data->piece_first[i], high = data->piece_first[i + 1];
+        int32_t rest = data->piece_rest[i];
+        double moved = places[rest] - data->rest_place[rest];
+        double gain = data->piece_closing[i] ? 1.0 + p->load : 1.0 - p->load;
+        double offset = data->piece_closing[i] ? p->offset_closing : p->offset_opening;
+        const double *row = data->whitener + data->white_first[i];
+        for (int32_t k = low; k < high; k++) {
+            double slope, torque = elastic_torque(data, p, k, moved, &slope);
+            residuals[k] = data->torque[k] - p->delay * data->late[k] - gain * torque - offset;
+            zx[k] = -gain * slope;
+        }
+        for (int32_t k = high - 1; k >= low; k--) {
+            const double *line = row + (ptrdiff_t)(k - low) * (k - low + 1) / 2;
+            double value = 0.0, by_place = 0.0;
+            for (int32_t j = low; j <= k; j++) {
+                value += line[j - low] * residuals[j];
+                by_place += line[j - low] * zx[j];
+            }
+            z[k] = scale * value;
+            zx[k] = scale * by_place;
+            curvature[rest] += zx[k] * zx[k];
+            pull[rest] += zx[k] * z[k];
+        }
+    }
+}
+
+static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
+                      double *residuals, double *expected, double *places, double *work)
+{
+    int32_t count = data->piece_first[data->pieces];
+    double *z = work, *zx = work + count, *curvature = work + 2 * (ptrdiff_t)count;
+    double *pull = curvature + data->rests, *centre = pull + data->rests;
+    double *spread = centre + data->rests;
+    for (int32_t r = 0; r < data->rests; r++) {
+        places[r] = data->rest_place[r];
+        if (data->rest_known[r]) {
+            centre[r] = 0.0;
+            spread[r] = data->known_sd;
+            places[r] = 0.0;
+            continue;
+        }
+        double start, stop, share;
+        double tangent = data->rest_slope[r];
+        sc_cut_cycle(p, data->moving_blades, tangent, &start, &stop, &share);
+        double cycle = (start - stop) / tangent;
+        double power, depth = stop + p->rest_phase * (start - stop);
+        sc_response_log_force(&p->response, log(start), &power);
+        double uneven = p->variation * start / (power * tangent);
+        const double *de = data->rest_de + (ptrdiff_t)r * data->edge_count;
+        centre[r] = data->rest_at_reference[r] - (depth - data->reference_depth) / tangent +
+                    departure(de, p->edge, data->edge_count);
+        spread[r] = sqrt(p->rest_spread * p->rest_spread * cycle * cycle + uneven * uneven + 4e-12);
+    }
+    for (int32_t step = 0;; step++) {
+        elastic_pass(data, p, places, residuals, z, zx, curvature, pull);
+        double largest = 0.0;
+        for (int32_t r = 0; r < data->rests; r++) {
+            if (data->rest_known[r] && data->known_sd <= 0.0) continue;
+            double weight = 1.0 / (spread[r] * spread[r]);
+            curvature[r] += weight;
+            pull[r] += weight * (places[r] - centre[r]);
+            double move = -pull[r] / curvature[r];
+            if (move > REST_REACH_M) move = REST_REACH_M;
+            if (move < -REST_REACH_M) move = -REST_REACH_M;
+            if (fabs(move) > largest) largest = fabs(move);
+            if (step < SC_CUT_REST_STEPS) places[r] += move;
+        }
+        if (step >= SC_CUT_REST_STEPS || largest < 1e-12) break;
+    }
+    double sum = 0.0, log_scale = log(p->noise_scale);
+    for (int32_t i = 0; i < data->pieces; i++) {
+        int32_t low = data->piece_first[i];
+        const double *row = data->whitener + data->white_first[i];
+        for (int32_t k = low; k < data->piece_first[i + 1]; k++) {
+            double diagonal = row[(ptrdiff_t)(k - low) * (k - low + 1) / 2 + (k - low)];
+            terms[k] = -0.5 * z[k] * z[k] + log(diagonal) - log_scale;
+            if (expected) expected[k] = data->torque[k] - p->delay * data->late[k] - residuals[k];
+            sum += terms[k];
+        }
+    }
+    /* What a rest's place adds goes to the first segment of its first piece. */
+    for (int32_t i = data->pieces - 1; i >= 0; i--) {
+        int32_t rest = data->piece_rest[i];
+        int first = 1;
+        for (int32_t j = 0; j < i; j++)
+            if (data->piece_rest[j] == rest) first = 0;
+        if (!first || (data->rest_known[rest] && data->known_sd <= 0.0)) continue;
+        double away = (places[rest] - centre[rest]) / spread[rest];
+        double added = -0.5 * away * away - log(spread[rest]) - 0.5 * log(curvature[rest]);
+        terms[data->piece_first[i]] += added;
+        sum += added;
+    }
+    return sum;
+}
+
+/* Means and covariance of (unevenness, sheet, work at the segment's start, at its end). */
+typedef struct {
+    double mean[4];
+    double cov[4][4];
+} filter;
+
+static void forget(filter *f, int32_t index, double variance)
+{
+    for (int32_t j = 0; j < 4; j++) f->cov[index][j] = f->cov[j][index] = 0.0;
+    f->mean[index] = 0.0;
+    f->cov[index][index] = variance;
+}
+
+static void decay(filter *f, double keep)
+{
+    f->mean[0] *= keep;
+    for (int32_t j = 1; j < 4; j++) f->cov[0][j] = f->cov[j][0] = keep * f->cov[0][j];
+    f->cov[0][0] = keep * keep * f->cov[0][0] + (1.0 - keep * keep);
+}
+
+/* Move the work at the end to the place of the work at the start. */
+static void step_on(filter *f)
+{
+    f->mean[2] = f->mean[3];
+    for (int32_t j = 0; j < 2; j++) f->cov[2][j] = f->cov[j][2] = f->cov[3][j];
+    f->cov[2][2] = f->cov[3][3];
+}
+
+static double observe(filter *f, const double *row, double residual, double noise)
+{
+    double gain[4], variance = noise, innovation = residual;
+    for (int32_t i = 0; i < 4; i++) {
+        gain[i] = 0.0;
+        for (int32_t j = 0; j < 4; j++) gain[i] += f->cov[i][j] * row[j];
+        innovation -= row[i] * f->mean[i];
+    }
+    for (int32_t i = 0; i < 4; i++) variance += row[i] * gain[i];
+    for (int32_t i = 0; i < 4; i++) {
+        f->mean[i] += gain[i] / variance * innovation;
+        for (int32_t j = 0; j < 4; j++) f->cov[i][j] -= gain[i] * gain[j] / variance;
+    }
+    return -0.5 * innovation * innovation / variance - 0.5 * log(variance);
+}
+
+static double running(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
+                      double *residuals, double *expected, double *line_log_period)
+{
+    double sum = 0.0, line = 0.0, blades = data->moving_blades;
+    for (int32_t sheet = 0; sheet < data->sheets; sheet++) {
+        filter f;
+        for (int32_t i = 0; i < 4; i++) forget(&f, i, 0.0);
+        f.cov[0][0] = 1.0;
+        f.cov[1][1] = p->sheet_variation * p->sheet_variation;
+        for (int32_t k = data->run_first[sheet]; k < data->run_first[sheet + 1]; k++) {
+            const double *le = data->run_lever_de + (ptrdiff_t)k * data->edge_count;
+            const double *se = data->run_slope_de + (ptrdiff_t)k * data->edge_count;
+            double by_edge = departure(se, p->edge, data->edge_count);
+            double start, stop, share, slope = data->run_slope[k] + by_edge;
+            sc_cut_cycle(p, blades, slope, &start, &stop, &share);
+            double away = 0.5 * (start + stop) - data->reference_depth;
+            slope += data->run_slope_dd[k] * away;
+            sc_cut_cycle(p, blades, slope, &start, &stop, &share);
+            double lever = data->run_lever[k] + data->run_lever_dd[k] * away +
+                           departure(le, p->edge, data->edge_count);
+            double peak = p->energy * lever / (blades * slope) *
+                          damped(p->damping, data->run_sinking[k]);
+            double torque = (1.0 + p->load) * share * peak;
+            double period = 0.0;
+            if (p->fracture == SC_CUT_RIPPLED) {
+                double power;
+                sc_response_log_force(&p->response, log(start), &power);
+                double turn = 0.5 * (start + stop) * (1.0 + slope * slope) / (power * slope);
+                period = blades * (start - stop) / (lever - turn);
+                if (data->line_weight[k] > 0.0)
+                    line += data->line_weight[k] * log(period > TINY ? period : TINY);
+            }
+            double tooth = PARTIAL_CYCLE * (1.0 - p->kappa) * peak * period;
+            tooth *= p->fracture == SC_CUT_RIPPLED ? tooth : 0.0;
+            int fresh = k == data->run_first[sheet] || !data->joined[k];
+            if (k > data->run_first[sheet]) {
+                double gone = fabs(data->run_place[k] - data->run_place[k - 1]);
+                decay(&f, exp(-gone / p->variation_length));
+            }
+            if (fresh) forget(&f, 2, data->start_noise[k] + tooth);
+            else step_on(&f);
+            forget(&f, 3, data->end_noise[k] + tooth);
+            double each = 1.0 / data->run_step[k];
+            double row[4] = {p->variation * torque, torque, -each, each};
+            residuals[k] = data->run_torque[k] - p->delay * data->run_late[k] - torque -
+                           p->offset_closing;
+            if (expected) expected[k] = torque + p->offset_closing;
+            terms[k] = observe(&f, row, residuals[k], data->run_noise[k]);
+            sum += terms[k];
+        }
+    }
+    *line_log_period = line;
+    return sum;
+}
+
+double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *parameters,
+                             double *terms, double *residuals, double *expected, double *places,
+                             double *line_log_period, double *work)
+{
+    ptrdiff_t count = data->piece_first[data->pieces];
+    double sum = elastic(data, parameters, terms, residuals, expected, places, work);
+    *line_log_period = 0.0;
+    if (parameters->fracture != SC_CUT_PRESSED && data->sheets > 0)
+        sum += running(data, parameters, terms + count, residuals + count,
+                       expected ? expected + count : NULL, line_log_period);
+    return isfinite(sum) && isfinite(*line_log_period) ? sum : -HUGE_VAL;
+}
