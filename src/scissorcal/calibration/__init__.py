@@ -1,8 +1,6 @@
 """One file per thing that is fitted: recording + model + inference -> result."""
 
-from scissorcal.calibration.cut import cut_experiment, fit_cut
-from scissorcal.calibration.cut_data import cutting_from
-from scissorcal.calibration.cut_experiment import CutExperiment
+from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
 from scissorcal.calibration.experiment import Experiment
 from scissorcal.calibration.friction import fit_friction, friction_experiment
 from scissorcal.calibration.friction_experiment import FrictionExperiment, friction_law

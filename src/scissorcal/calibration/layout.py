@@ -82,9 +82,9 @@ class Layout:
     def fitted(self, u_draws: Array) -> tuple[FittedParameter, ...]:
         """Summaries of posterior draws (n, p) as people read them."""
         rows = []
+        natural = self.columns(u_draws)
         for index, parameter in enumerate(self.parameters):
-            u = u_draws[:, index]
-            x = parameter.natural(u)
+            u, x = u_draws[:, index], natural[:, index]
             q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
             rows.append(
                 FittedParameter(

@@ -1,5 +1,6 @@
 """The C core and its thin binding: wire frames, tables, the model's step, the servo loop."""
 
+from scissorcal.kernel.cut_fit import CutFitData, CutFitParameters, cut_log_likelihood
 from scissorcal.kernel.frames import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -46,6 +47,8 @@ __all__ = [
     "ConfigEcho",
     "ConfigKey",
     "ConfigStatus",
+    "CutFitData",
+    "CutFitParameters",
     "EnergyLedger",
     "FrameDecoder",
     "Hello",
@@ -69,6 +72,7 @@ __all__ = [
     "Table",
     "c_sources",
     "crc16",
+    "cut_log_likelihood",
     "decode",
     "encode",
     "encode_frame",

@@ -271,6 +271,9 @@ class FitCut(Section):
     priors: so ``"auto"`` compares the power law and the exponential, ``"auto+spline"`` all three.
     ``rate_damping = "fit"`` lets the force at the edge grow with the speed at which the blade sinks
     in, ``"auto"`` compares laws with and without; ``rate_damping_s_per_m`` is its prior.
+    ``load_share`` does the same for friction of the pivot that grows with the cut's torque.
+    ``lack_of_fit_percent`` is by how much the law may be wrong in each kind of segment (loading,
+    unloading, running, teeth) without the data showing it; it widens every interval.
     """
 
     response: Literal["auto", "power", "exponential", "spline", "auto+spline"] = "auto"
@@ -279,6 +282,8 @@ class FitCut(Section):
     response_force_N: LogNormalPrior = LogNormalPrior(median=2.0, factor_90=20.0)
     response_exponent: LogNormalPrior = LogNormalPrior(median=1.5, factor_90=3.0)
     rate_damping: Literal["none", "fit", "auto"] = "none"
+    load_share: Literal["none", "fit", "auto"] = "auto"
+    lack_of_fit_percent: Annotated[float, Field(ge=0, le=20, allow_inf_nan=False)] = 0.2
     rate_damping_s_per_m: LogNormalPrior = LogNormalPrior(median=3.0, factor_90=20.0)
     toughness_J_per_m2: LogNormalPrior | None = None
     critic: bool = True

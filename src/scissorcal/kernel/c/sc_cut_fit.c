@@ -6,9 +6,6 @@
 static const double TINY = 1e-300;
 static const double LEAST_DEPTH = 1e-12;
 static const double LEAST_SLOPE = 1e-6;
-/* A sawtooth's integral over a random part of its cycle, in shares of height times length: the
- * standard deviation of (u^2 - 1/4) / 2 for u even in (-1/2, 1/2). */
-static const double PARTIAL_CYCLE = 0.037267799624996496;
 /* Steps of the crack's place towards its highest density are held to this share of a cycle. */
 static const double REST_REACH_M = 3e-5;
 
@@ -202,7 +199,7 @@ static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, co
 }
 
 static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
-                      double *residuals, double *expected, double *places, double *work)
+                      double *residuals, double *scaled, double *places, double *work)
 {
     int32_t count = data->piece_first[data->pieces];
     double *z = work, *zx = work + count, *curvature = work + 2 * (ptrdiff_t)count;
@@ -251,7 +248,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
         for (int32_t k = low; k < data->piece_first[i + 1]; k++) {
             double diagonal = row[(ptrdiff_t)(k - low) * (k - low + 1) / 2 + (k - low)];
             terms[k] = -0.5 * z[k] * z[k] + log(diagonal) - log_scale;
-            if (expected) expected[k] = data->torque[k] - p->delay * data->late[k] - residuals[k];
+            if (scaled) scaled[k] = z[k];
             sum += terms[k];
         }
     }
@@ -298,7 +295,8 @@ static void step_on(filter *f)
     f->cov[2][2] = f->cov[3][3];
 }
 
-static double observe(filter *f, const double *row, double residual, double noise)
+static double observe(filter *f, const double *row, double residual, double noise,
+                      double *standard)
 {
     double gain[4], variance = noise, innovation = residual;
     for (int32_t i = 0; i < 4; i++) {
@@ -311,11 +309,12 @@ static double observe(filter *f, const double *row, double residual, double nois
         f->mean[i] += gain[i] / variance * innovation;
         for (int32_t j = 0; j < 4; j++) f->cov[i][j] -= gain[i] * gain[j] / variance;
     }
-    return -0.5 * innovation * innovation / variance - 0.5 * log(variance);
+    *standard = innovation / sqrt(variance);
+    return -0.5 * *standard * *standard - 0.5 * log(variance);
 }
 
 static double running(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
-                      double *residuals, double *expected, double *line_log_period)
+                      double *residuals, double *scaled, double *line_log_period)
 {
     double sum = 0.0, line = 0.0, blades = data->moving_blades;
     for (int32_t sheet = 0; sheet < data->sheets; sheet++) {
@@ -346,22 +345,21 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
                 if (data->line_weight[k] > 0.0)
                     line += data->line_weight[k] * log(period > TINY ? period : TINY);
             }
-            double tooth = PARTIAL_CYCLE * (1.0 - p->kappa) * peak * period;
-            tooth *= p->fracture == SC_CUT_RIPPLED ? tooth : 0.0;
             int fresh = k == data->run_first[sheet] || !data->joined[k];
             if (k > data->run_first[sheet]) {
                 double gone = fabs(data->run_place[k] - data->run_place[k - 1]);
                 decay(&f, exp(-gone / p->variation_length));
             }
-            if (fresh) forget(&f, 2, data->start_noise[k] + tooth);
+            if (fresh) forget(&f, 2, data->start_noise[k]);
             else step_on(&f);
-            forget(&f, 3, data->end_noise[k] + tooth);
+            forget(&f, 3, data->end_noise[k]);
             double each = 1.0 / data->run_step[k];
             double row[4] = {p->variation * torque, torque, -each, each};
             residuals[k] = data->run_torque[k] - p->delay * data->run_late[k] - torque -
                            p->offset_closing;
-            if (expected) expected[k] = torque + p->offset_closing;
-            terms[k] = observe(&f, row, residuals[k], data->run_noise[k]);
+            double standard;
+            terms[k] = observe(&f, row, residuals[k], data->run_noise[k], &standard);
+            if (scaled) scaled[k] = standard;
             sum += terms[k];
         }
     }
@@ -370,14 +368,14 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
 }
 
 double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *parameters,
-                             double *terms, double *residuals, double *expected, double *places,
+                             double *terms, double *residuals, double *scaled, double *places,
                              double *line_log_period, double *work)
 {
     ptrdiff_t count = data->piece_first[data->pieces];
-    double sum = elastic(data, parameters, terms, residuals, expected, places, work);
+    double sum = elastic(data, parameters, terms, residuals, scaled, places, work);
     *line_log_period = 0.0;
     if (parameters->fracture != SC_CUT_PRESSED && data->sheets > 0)
         sum += running(data, parameters, terms + count, residuals + count,
-                       expected ? expected + count : NULL, line_log_period);
+                       scaled ? scaled + count : NULL, line_log_period);
     return isfinite(sum) && isfinite(*line_log_period) ? sum : -HUGE_VAL;
 }

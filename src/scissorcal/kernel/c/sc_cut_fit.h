@@ -38,8 +38,8 @@ typedef struct {
  *
  * Running segments: sheet j has run_first[j] to run_first[j + 1] - 1, in order of time. Lever and
  * slope of the edge are expanded in depth about reference_depth and in the edge's parameters;
- * joined[k] is 1 where segment k begins where k - 1 ended. edge_noise (k) is the variance of the
- * work at the segment's start, end_noise at its end, less what the teeth add. line_weight sums to 1
+ * joined[k] is 1 where segment k begins where k - 1 ended. start_noise[k] is the variance of the work
+ * at the segment's start, end_noise[k] at its end. line_weight sums to 1
  * over the segments that show the line, or is 0 throughout. */
 typedef struct {
     int32_t pieces;
@@ -122,12 +122,12 @@ void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, dou
                   double *start_depth, double *stop_depth, double *mean_share);
 
 /* Log-likelihood of every segment, elastic ones first and then running ones, up to a constant, with
- * residuals (measured less expected) and expected torques of the same order where those are not
- * null. places (rests) gets where each crack rests, at the highest density. line_log_period gets
+ * residuals (measured less expected, N m) and, unless scaled is null, residuals that are standard
+ * normal if the model is true, in the same order. places (rests) gets where each crack rests, at the highest density. line_log_period gets
  * the weighted mean of the logarithm of the teeth's period in opening. Returns the sum; -HUGE_VAL
  * where a number is not finite. work has 4 * elastic segments + 4 * rests values. */
 double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *parameters,
-                             double *terms, double *residuals, double *expected, double *places,
+                             double *terms, double *residuals, double *scaled, double *places,
                              double *line_log_period, double *work);
 
 #endif

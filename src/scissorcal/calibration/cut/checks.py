@@ -1,0 +1,99 @@
+"""Verdicts and notes that only a cut's fit has."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.cut.lack_of_fit import Budget
+from scissorcal.calibration.cut.scout import Scouted
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.sensors import Sensors
+from scissorcal.verdicts import Verdict, failed
+
+Array = NDArray[np.float64]
+
+SUBHARMONIC = 0.3
+"""Power at a half or a third of the line's frequency over its own; a harmonic has more than 1."""
+BIASED = 5.0
+"""Median residual of a kind of segment in standard errors, beyond which the law misses it."""
+
+
+def cut_verdicts(
+    friction: FitResult,
+    edge_verdicts: tuple[Verdict, ...],
+    scouted: Scouted,
+    design: CutExperiment,
+    point: Array,
+    sensors: Sensors,
+) -> tuple[Verdict, ...]:
+    """Judge what the fit builds on, its sensors, and its line."""
+    return (
+        _foundations(friction, edge_verdicts),
+        Verdict(
+            "fit.cut",
+            sensors.verdict.check,
+            sensors.verdict.status,
+            sensors.verdict.value,
+            sensors.verdict.threshold,
+            sensors.verdict.why,
+        ),
+        *_line(scouted),
+    )
+
+
+def line_notes(
+    scouted: Scouted, design: CutExperiment, point: Array, budget: Budget
+) -> tuple[str, ...]:
+    """What the teeth say, what each sheet's toughness was, and what lack of fit was allowed for."""
+    notes = []
+    if scouted.believed and scouted.line is not None:
+        speeds = ", ".join(f"{speed:.2g}" for speed, _, share in scouted.line.speeds if share > 0.3)
+        notes.append(
+            f"The teeth of the running crack show as a line whose period is known to "
+            f"{scouted.line.sd:.2%}, at stroke speeds of {speeds} rad/s; without it kappa would be "
+            f"{scouted.without:.2g} +- {scouted.without_sd:.2g}."
+        )
+    elif design.law.fracture == "rippled":
+        notes.append(f"kappa is open: {scouted.reason}")
+    names = design.layout.names
+    shown = [
+        f"{name} {sd:.2%}"
+        for name, sd in zip(names, budget.sd, strict=True)
+        if name in ("response_force", "response_exponent", "fracture_energy")
+    ]
+    if budget.share > 0 and shown:
+        notes.append(
+            f"A lack of fit of {budget.share:.2%} in each kind of segment was allowed for: it adds "
+            f"{', '.join(shown)} to the standard deviations."
+        )
+    return tuple(notes)
+
+
+def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Verdict:
+    """Whether what the fit builds on may be used at all."""
+    wrong = [*friction.rejected, *failed(edge_verdicts)]
+    if not wrong:
+        why = "The fits that this one builds on passed their verdicts."
+        return Verdict("fit.cut", "foundations", "pass", 0.0, 0.0, why)
+    said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
+    why = f"A fit that this one builds on failed a verdict ({said}): mend that first."
+    return Verdict("fit.cut", "foundations", "fail", float(len(wrong)), 0.0, why)
+
+
+def _line(scouted: Scouted) -> tuple[Verdict, ...]:
+    """A line at a multiple of the teeth's frequency would put kappa off by tens of percent."""
+    line = scouted.line
+    if line is None or not scouted.believed:
+        return ()
+    worst = max(line.half, line.third)
+    if worst < SUBHARMONIC:
+        why = (
+            f"At a half and a third of the teeth's frequency there is {worst:.1%} of the line's "
+            "power at most, so the line is the teeth's own."
+        )
+        return (Verdict("fit.cut", "teeth", "pass", worst, SUBHARMONIC, why),)
+    why = (
+        f"There is {worst:.0%} of the line's power at a half or a third of its frequency: it may "
+        "be a multiple of the teeth's, and kappa is then wrong. Capture slower strokes."
+    )
+    return (Verdict("fit.cut", "teeth", "fail", worst, SUBHARMONIC, why),)

@@ -1,0 +1,257 @@
+"""Fit the material's response and fracture to strokes through it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.cut.checks import cut_verdicts, line_notes
+from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.lack_of_fit import budget_of
+from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
+from scissorcal.calibration.cut.scout import (
+    Scouted,
+    belief_geometry,
+    make_experiment,
+    scout,
+)
+from scissorcal.calibration.cut.structure import edge_of
+from scissorcal.calibration.cut.toughness import with_toughness
+from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
+from scissorcal.calibration.ladder import Climbed, choose, climb
+from scissorcal.calibration.path import PathMotion, path_motion
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.sensors import inspect_sensors
+from scissorcal.errors import InputError
+from scissorcal.inference import infer
+from scissorcal.model import EdgeBelief
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Verdict
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+DRAWS = 2000
+STANDARD_BUDGET = 12_000
+"""Evaluations of the likelihood, a third of a millisecond each, that standard effort may take."""
+FELT_SDS = 5.0
+FEWEST_FELT_RAD = 0.02
+KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99
+
+
+def fit_cut(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    *,
+    effort: Effort,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+    edge: EdgeBelief | None = None,
+    edge_verdicts: tuple[Verdict, ...] = (),
+    checkpoint: Path | None = None,
+) -> FitResult:
+    """Identify response, fracture energy and ripple from cuts (or presses), over their path.
+
+    A crack's law does not know time, so what is compared is the material's mean torque between
+    openings: of standing cracks that the blades load and let go, of running cracks, and of the
+    line that the teeth of a running crack leave in its own phase (docs/model.md). Friction,
+    inertia, cogging and noise are those of ``friction``; what the empty sweeps left open widens
+    what is said of the material.
+
+    ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
+    friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
+    interrupted goes on. Raises InputError where the blades hardly touched the material.
+    """
+    tell = progress or (lambda done, sentence: None)
+    geometry = belief_geometry(recipe, edge or edge_of(recipe))
+    known = KnownFriction.of(friction)
+    sensors = inspect_sensors(recordings)
+    motions = path_motion(recordings, known.inertia, sensors.usable)
+    _refuse_no_contact(motions, known, recordings)
+    laws = allowed_laws(recipe)
+    tell(0.05, "cut: finding where cracks wait and run")
+    scouted = _scouted(motions, known, recipe, geometry, laws, recordings)
+    climbed = _climb(scouted, geometry, recipe, laws, known, tell)
+    chosen = choose([one for one, _ in climbed])
+    design = next(d for c, d in climbed if c.rung.name == chosen.rung.name)
+    tell(0.5, f"cut: inferring {chosen.rung.name}")
+    posterior = infer(
+        chosen.rung.problem(design.series),
+        effort,
+        rng,
+        count=DRAWS,
+        optimum=chosen.optimum,
+        budget=STANDARD_BUDGET if effort == "standard" else None,
+        checkpoint=checkpoint,
+        progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
+    )
+    u = chosen.optimum.point
+    share = 0.01 * recipe.fit.cut.lack_of_fit_percent
+    budget = budget_of(design, u, posterior.covariance, share)
+    posterior = replace(posterior, draws=budget.widen(posterior.draws, rng))
+    fit = assemble(
+        what="cut",
+        effort=effort,
+        posterior=posterior,
+        climbed=[one for one, _ in climbed],
+        chosen=chosen,
+        structure=design.key,
+        bins=design.bins,
+        strokes=design.strokes,
+        measured=design.observed,
+        contact=design.contact(u),
+        recordings=recordings,
+        joint=recordings[0].joint,
+        inputs_hash=fit_inputs_hash(
+            "cut",
+            recordings,
+            settings_of(recipe),
+            effort,
+            cut_upstream(friction.inputs_hash, edge),
+        ),
+        nuisance=NUISANCE,
+        rng=rng,
+        critic=recipe.fit.cut.critic,
+        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, design, u, sensors),
+        extra_notes=(*sensors.notes, *line_notes(scouted, design, u, budget)),
+    )
+    return with_toughness(fit, recipe, rng)
+
+
+def cut_experiment(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    fit: FitResult,
+    edge: EdgeBelief | None = None,
+) -> CutExperiment:
+    """Give the design of a finished fit: its law and priors over its own segments.
+
+    All but ``fit`` are what the fit was made of; its law is taken from ``fit.structure``. A search
+    over other outcomes begins where the fit ended.
+    """
+    geometry = belief_geometry(recipe, edge or edge_of(recipe))
+    known = KnownFriction.of(friction)
+    motions = path_motion(recordings, known.inertia, inspect_sensors(recordings).usable)
+    law = CutLaw.of(fit.structure)
+    scouted = _scouted(motions, known, recipe, geometry, [law], recordings)
+    ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
+    ended |= {p.name: p.mean for p in fit.nuisance}
+    return make_experiment(scouted.segments, geometry, recipe, law, known, ended, scouted.datum)
+
+
+def settings_of(recipe: Recipe) -> str:
+    """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
+    return recipe.model_dump_json(
+        include={
+            "rig": {"joint", "moving", "handle_radius_mm", "edge"},
+            "material": {"thickness_mm", "thickness_sd_mm"},
+            "scene": {"cut", "closure"},
+            "fit": {"cut", "friction"},
+        }
+    )
+
+
+def _scouted(
+    motions: tuple[PathMotion, ...],
+    known: KnownFriction,
+    recipe: Recipe,
+    geometry: Geometry,
+    laws: Sequence[CutLaw],
+    recordings: tuple[Recording, ...],
+) -> Scouted:
+    richest = max(("none", "smooth", "rippled").index(law.fracture) for law in laws)
+    try:
+        return scout(motions, known, recipe, geometry, ("none", "smooth", "rippled")[richest])
+    except ValueError as error:
+        raise InputError(
+            f"{_names(recordings)}: no stroke shows the blades letting go of the material again, "
+            "so its response cannot be told from friction. Check that rig.edge and the sheet's "
+            "place are right, and let every stroke open the blades wide."
+        ) from error
+
+
+def _climb(
+    scouted: Scouted,
+    geometry: Geometry,
+    recipe: Recipe,
+    laws: Sequence[CutLaw],
+    known: KnownFriction,
+    tell: Progress,
+) -> list[tuple[Climbed, CutExperiment]]:
+    """Fit every law to the same segments; each begins where the scouting ended."""
+    found: list[tuple[Climbed, CutExperiment]] = []
+    values = dict(scouted.values)
+    for index, law in enumerate(laws):
+        tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
+        begin = dict(values)
+        if law.response != "power":
+            begin.pop("response_exponent", None)
+        if law.response == "spline":
+            law = replace(law, knots_m=_knots(scouted, geometry, values))
+            begin["response_exponent"] = values["response_exponent"]
+        if law.fracture == "smooth":
+            begin["fracture_energy"] *= 0.5 * (1.0 + begin.get("kappa", 1.0))
+        design = make_experiment(
+            scouted.segments, geometry, recipe, law, known, begin, scouted.datum
+        )
+        rung = design.rung(design.observed)
+        found.append((climb(rung, design.series, design.strokes), design))
+    return found
+
+
+def _knots(scouted: Scouted, geometry: Geometry, values: dict[str, float]) -> tuple[float, ...]:
+    """Knots (m) of a spline over the indentations that data reach, evenly in the logarithm.
+
+    Up to the deepest (the 99 % quantile of elastic segments) from an eighth of it: below, a
+    response bears little that is felt.
+    """
+    segments = scouted.segments
+    depths = []
+    for piece in segments.pieces:
+        motion = segments.motions[piece.motion]
+        opening = motion.opening[piece.ends]
+        contact = segments.rests[piece.rest].place - motion.advance[piece.ends]
+        depths.append(geometry.depth_and_lever(geometry.edge, opening, contact)[0])
+    every = np.concatenate(depths)
+    pressed = every[every > 0.0]
+    deepest = float(np.quantile(pressed, DEEPEST)) if len(pressed) else geometry.reference_m
+    return tuple(float(f"{knot:.4g}") for knot in np.geomspace(deepest / SPAN, deepest, KNOTS))
+
+
+def _refuse_no_contact(
+    motions: tuple[PathMotion, ...], known: KnownFriction, recordings: tuple[Recording, ...]
+) -> None:
+    """Refuse recordings in which no sheet is marked, or the blades met hardly any torque."""
+    names = _names(recordings)
+    if not any(np.any(motion.sheet >= 0) for motion in motions):
+        raise InputError(
+            f"{names}: no stroke through material is marked in it; capture cuts with "
+            "'scissorcal capture cut', or mark strokes and sheets when importing."
+        )
+    least = FELT_SDS * float(np.hypot(known.noise.white_Nm, known.noise.slow_Nm))
+    felt = 0.0
+    for motion in motions:
+        material = known.material(motion)
+        stride = max(1, round(0.02 / motion.tick_s))
+        path = np.diff(motion.opening[::stride])
+        moved = np.abs(path) > 1e-3
+        torque = np.diff(material.work[::stride])[moved] / path[moved]
+        felt += float(np.abs(path[moved][torque > least]).sum())
+    if felt < FEWEST_FELT_RAD:
+        raise InputError(
+            f"{names}: the blades hardly touched the material (torque beyond friction over "
+            f"{felt:.2g} rad of closing). Check that the sheet lay between the blades and "
+            "that advance was zero at its near edge, then capture again."
+        )
+
+
+def _names(recordings: tuple[Recording, ...]) -> str:
+    return ", ".join(recording.source or "the recording" for recording in recordings)

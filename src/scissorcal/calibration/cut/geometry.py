@@ -1,0 +1,171 @@
+"""The edge over the sheet, expanded about where a crack is thought to be."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.model import Edge, EdgeBelief, edge_height
+
+Array = NDArray[np.float64]
+
+NEWTON_STEPS = 12
+STEP_M = 1e-6
+"""Step of the derivatives by the crack's place: the second derivative is below 1 /m over 1 mm."""
+EDGE_STEP_SDS = 0.1
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Indentation and lever at places (k,), and their derivatives by the crack's place and edge.
+
+    ``depth_de`` and ``lever_de`` (k, q) are by the believed parameters of the edge. ``sinking``
+    (m/s) is how fast the edge sinks in.
+    """
+
+    depth: Array
+    depth_dx: Array
+    lever: Array
+    lever_dx: Array
+    sinking: Array
+    depth_de: Array
+    lever_de: Array
+
+
+@dataclass(frozen=True)
+class Running:
+    """Lever and slope (k,) where the indentation is the reference's, and their derivatives.
+
+    ``_dd`` are by the indentation, ``_de`` (k, q) by the edge; ``place`` is the contact (m).
+    """
+
+    place: Array
+    lever: Array
+    lever_dd: Array
+    slope: Array
+    slope_dd: Array
+    lever_de: Array
+    slope_de: Array
+    place_de: Array
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The believed edge, the sheet and which lever the closure has.
+
+    ``upper_face_m`` is y_top, ``reference_m`` the indentation that places are expanded about.
+    """
+
+    belief: EdgeBelief
+    upper_face_m: float
+    moving_blades: int
+    reference_m: float
+    closure: Literal["work", "eq4"] = "work"
+
+    @property
+    def edge(self) -> Edge:
+        """The edge that is believed most."""
+        return self.belief.edge
+
+    def depth_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
+        """Indentation (m) at a contact, and the lever (m) by which force becomes torque."""
+        view = edge_height(edge, contact, opening / self.moving_blades)
+        depth = self.upper_face_m - view.height
+        if self.closure == "work":
+            return depth, view.lever
+        return depth, contact / np.sqrt(1.0 + edge.slope_at(view.station) ** 2)
+
+    def slope(self, opening: Array, contact: Array) -> Array:
+        """Slope tan(psi) of the edge at a contact."""
+        return edge_height(self.edge, contact, opening / self.moving_blades).slope
+
+    def place(self, opening: ArrayLike, depth: ArrayLike, edge: Edge | None = None) -> Array:
+        """Contact (m) at which the indentation is ``depth`` (m); both broadcast."""
+        edge = self.edge if edge is None else edge
+        theta, wanted = np.broadcast_arrays(
+            np.asarray(opening, dtype=np.float64), np.asarray(depth, dtype=np.float64)
+        )
+        sine, cosine = np.sin(theta / self.moving_blades), np.cos(theta / self.moving_blades)
+        station = np.full(theta.shape, 0.5 * edge.length_m)
+        for _ in range(NEWTON_STEPS):
+            height = station * sine + edge.offset_at(station) * cosine
+            rise = sine + edge.slope_at(station) * cosine
+            rise = np.where(np.abs(rise) > 1e-9, rise, 1e-9)
+            step = (self.upper_face_m - wanted - height) / rise
+            station = np.clip(station + step, -edge.length_m, 3.0 * edge.length_m)
+            if np.all(np.abs(step) < 1e-14):
+                break
+        return np.asarray(station * cosine - edge.offset_at(station) * sine)
+
+    def nodes(self, opening: Array, rate: Array, contact: Array) -> Nodes:
+        """Expand about contacts (k,), at openings (k,) that change at ``rate`` (k,)."""
+        depth, lever = self.depth_and_lever(self.edge, opening, contact)
+        ahead = self.depth_and_lever(self.edge, opening, contact + STEP_M)
+        behind = self.depth_and_lever(self.edge, opening, contact - STEP_M)
+        by_edge = [
+            self.depth_and_lever(self.edge_off(i, 1), opening, contact) for i in self._believed
+        ]
+        below = [
+            self.depth_and_lever(self.edge_off(i, -1), opening, contact) for i in self._believed
+        ]
+        arm = edge_height(self.edge, contact, opening / self.moving_blades).lever
+        return Nodes(
+            depth=depth,
+            depth_dx=(ahead[0] - behind[0]) / (2 * STEP_M),
+            lever=lever,
+            lever_dx=(ahead[1] - behind[1]) / (2 * STEP_M),
+            sinking=-arm * rate / self.moving_blades,
+            depth_de=self._by_edge([a[0] - b[0] for a, b in zip(by_edge, below, strict=True)]),
+            lever_de=self._by_edge([a[1] - b[1] for a, b in zip(by_edge, below, strict=True)]),
+        )
+
+    def running(self, opening: Array) -> Running:
+        """Expand about the reference's indentation at openings (k,)."""
+        place, lever, slope = self._at_depth(self.edge, opening, self.reference_m)
+        step = 0.01 * self.reference_m
+        high = self._at_depth(self.edge, opening, self.reference_m + step)
+        low = self._at_depth(self.edge, opening, self.reference_m - step)
+        above = [
+            self._at_depth(self.edge_off(i, 1), opening, self.reference_m) for i in self._believed
+        ]
+        below = [
+            self._at_depth(self.edge_off(i, -1), opening, self.reference_m) for i in self._believed
+        ]
+        pairs = list(zip(above, below, strict=True))
+        return Running(
+            place=place,
+            lever=lever,
+            lever_dd=(high[1] - low[1]) / (2 * step),
+            slope=slope,
+            slope_dd=(high[2] - low[2]) / (2 * step),
+            lever_de=self._by_edge([a[1] - b[1] for a, b in pairs]),
+            slope_de=self._by_edge([a[2] - b[2] for a, b in pairs]),
+            place_de=self._by_edge([a[0] - b[0] for a, b in pairs]),
+        )
+
+    def edge_off(self, index: int, sign: int) -> Edge:
+        """The edge with one believed parameter off by a share of its standard deviation."""
+        values = self.belief.mean.copy()
+        values[index] += sign * self._edge_steps[index]
+        return self.belief.with_values(values)
+
+    @property
+    def _believed(self) -> range:
+        return range(len(self.belief.names))
+
+    @cached_property
+    def _edge_steps(self) -> Array:
+        return np.asarray(EDGE_STEP_SDS * np.sqrt(np.diag(self.belief.covariance)))
+
+    def _by_edge(self, differences: list[Array]) -> Array:
+        if not differences:
+            return np.zeros((0, 0))
+        return np.stack(differences, axis=-1) / (2.0 * self._edge_steps)
+
+    def _at_depth(self, edge: Edge, opening: Array, depth: float) -> tuple[Array, Array, Array]:
+        place = self.place(opening, depth, edge)
+        _, lever = self.depth_and_lever(edge, opening, place)
+        view: Any = edge_height(edge, place, opening / self.moving_blades)
+        return place, lever, view.slope

@@ -1,0 +1,226 @@
+"""A first estimate of response and fracture, good enough to find where cracks wait and run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.path import Material, PathMotion, mean_torque
+from scissorcal.model import Response
+
+Array = NDArray[np.float64]
+
+LEAST_DEPTH_M = 1e-9
+
+
+PROFILE_RAD = 1e-3
+LONGEST_PROFILE = 80
+RELEASED = 0.05
+LEAST_TORQUE = 4.0
+"""A turn counts from so many times the scatter of the free motion after it."""
+RUNNING_PROFILE_RAD = 10e-3
+PLACE_M = 1e-4
+"""Unit of the places' corrections in the least squares."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Response and mean fracture energy (J/m), with the peak's ratio to that mean.
+
+    ``mean_energy`` is what running costs on average; a crack starts at ``peak_ratio`` times that.
+    """
+
+    response: Response
+    mean_energy: float
+    peak_ratio: float = 1.14
+
+    def critical_depth(self, slope: Array, moving_blades: int) -> Array:
+        """Indentation (m) at which a crack starts where the edge has a slope."""
+        tangent = np.maximum(slope, 1e-6)
+        return self.response.indentation_at(
+            self.mean_energy * self.peak_ratio / (moving_blades * tangent)
+        )
+
+    def cut_off_tooth(self, geometry: Geometry, opening: Array) -> float:
+        """Standard deviation (J) of the work in a part of a tooth, less the part's mean work.
+
+        A sawtooth of height H and period p: H p / sqrt(720), from the variance of (u^2 - 1/4) / 2
+        over a cycle. It is taken at the guess and held, so that kappa is never told by a variance.
+        """
+        view = geometry.running(np.asarray([float(np.median(opening))]))
+        peak = self.mean_energy * self.peak_ratio / (geometry.moving_blades * view.slope)
+        kappa = 2.0 / self.peak_ratio - 1.0
+        depth = self.response.indentation_at(peak) - self.response.indentation_at(kappa * peak)
+        period = geometry.moving_blades * depth / view.lever
+        height = (1.0 - kappa) * peak * view.lever
+        return float((height * period)[0] / np.sqrt(720.0))
+
+    def torque(self, geometry: Geometry, opening: Array, contact: Array) -> tuple[Array, Array]:
+        """Torque (k,) of a standing crack, and its derivative by the crack's place."""
+        depth, lever = geometry.depth_and_lever(geometry.edge, opening, contact)
+        inside = depth > LEAST_DEPTH_M
+        held = np.where(inside, depth, LEAST_DEPTH_M)
+        force = np.where(inside, self.response.force_at(held), 0.0)
+        slope = geometry.slope(opening, contact)
+        stiffness = np.where(inside, self.response.stiffness_at(held), 0.0)
+        by_place = -stiffness * slope * lever + force * (1.0 + slope**2)
+        return force * lever, by_place
+
+    def place_at_torque(
+        self, geometry: Geometry, opening: float, advance: float, torque: float
+    ) -> float:
+        """Place (m, sheet's frame) of a crack that gives a torque (N m) at a turn."""
+        theta = np.asarray(opening)
+        contact = geometry.place(theta, 0.0)
+        for _ in range(4):
+            _, lever = geometry.depth_and_lever(geometry.edge, theta, contact)
+            depth = self.response.indentation_at(torque / max(float(lever), 1e-4))
+            contact = geometry.place(theta, depth)
+        return float(contact) + advance
+
+
+class Span(Protocol):
+    """Samples ``low`` to ``high`` of a motion between two turns."""
+
+    @property
+    def motion(self) -> int: ...
+    @property
+    def low(self) -> int: ...
+    @property
+    def high(self) -> int: ...
+
+
+def first_guess(
+    motions: tuple[PathMotion, ...],
+    materials: tuple[Material, ...],
+    runs: Sequence[Span],
+    geometry: Geometry,
+    *,
+    cuts: bool,
+    median_exponent: float,
+    log_sd_exponent: float,
+) -> Guess:
+    """Response from unloading alone, mean fracture energy from what closing costs.
+
+    Where the blades release the sheet is seen without any model, and gives each crack's place;
+    force and exponent follow by least squares with those places free. Where nothing is cut the
+    place is the sheet's edge. Raises ValueError where no unloading was seen.
+    """
+    pulls = [_unloading(motions, materials, run, geometry, cuts) for run in runs]
+    seen = [pull for pull in pulls if pull is not None]
+    if not seen:
+        raise ValueError("no unloading was seen")
+    force, exponent = _power_law(seen, geometry, cuts, median_exponent, log_sd_exponent)
+    response = Response("power", force, exponent, geometry.reference_m)
+    if not cuts:
+        return Guess(response, np.inf)
+    return Guess(response, _running_energy(motions, materials, runs, geometry))
+
+
+@dataclass(frozen=True)
+class _Pull:
+    opening: Array
+    advance: Array
+    torque: Array
+    place: float
+
+
+def _profile(
+    motion: PathMotion, material: Material, low: int, high: int, step: float
+) -> tuple[Array, Array, Array]:
+    """Opening, advance and mean torque over even steps of a run."""
+    path = motion.opening
+    sign = np.sign(path[high] - path[low])
+    away = np.maximum.accumulate(sign * (path[low : high + 1] - path[low]))
+    ends = low + np.unique(np.searchsorted(away, np.arange(0.0, away[-1], step)))
+    if len(ends) < 2:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    torque, _ = mean_torque(motion, material.work, ends)
+    middle = 0.5 * (path[ends[1:]] + path[ends[:-1]])
+    return middle, 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]]), torque
+
+
+def _unloading(
+    motions: tuple[PathMotion, ...],
+    materials: tuple[Material, ...],
+    run: Span,
+    geometry: Geometry,
+    cuts: bool,
+) -> _Pull | None:
+    motion = motions[run.motion]
+    if motion.opening[run.high] <= motion.opening[run.low]:
+        return None
+    opening, advance, torque = _profile(
+        motion, materials[run.motion], run.low, run.high, PROFILE_RAD
+    )
+    opening, advance, torque = (a[:LONGEST_PROFILE] for a in (opening, advance, torque))
+    if len(torque) < 12:
+        return None
+    tail = torque[-len(torque) // 4 :]
+    torque = torque - np.median(tail)
+    top = float(torque[:2].mean())
+    released = np.flatnonzero(torque < RELEASED * top)
+    if top < LEAST_TORQUE * float(np.std(tail)) or len(released) == 0 or released[0] < 3:
+        return None
+    at = int(released[0])
+    place = 0.0
+    if cuts:
+        place = float(geometry.place(opening[at], 0.0)) + float(advance[at])
+    kept = slice(0, at + 3)
+    return _Pull(opening[kept], advance[kept], torque[kept], place)
+
+
+def _power_law(
+    pulls: list[_Pull],
+    geometry: Geometry,
+    cuts: bool,
+    median_exponent: float,
+    log_sd_exponent: float,
+) -> tuple[float, float]:
+    from scipy.optimize import least_squares
+
+    size = float(np.median([pull.torque[0] for pull in pulls]))
+    noise = 0.02 * size
+    exact = [geometry.depth_and_lever(geometry.edge, p.opening, p.place - p.advance) for p in pulls]
+    slopes = [geometry.slope(p.opening, p.place - p.advance) for p in pulls]
+
+    def misfit(u: Array) -> Array:
+        rows = [u[2:] / 3.0, [(u[1] - np.log(median_exponent)) / log_sd_exponent]]
+        for pull, (depth, lever), slope, move in zip(pulls, exact, slopes, u[2:], strict=True):
+            inside = np.maximum(depth - slope * move * PLACE_M * cuts, 0.0)
+            force = np.exp(u[0]) * (inside / geometry.reference_m) ** np.exp(u[1])
+            rows.append((force * lever - pull.torque) / noise)
+        return np.concatenate(rows)
+
+    lever = float(np.median([lever[0] for _, lever in exact]))
+    starts = [np.log([max(size / lever, 1e-6), n]) for n in (0.7, 1.5, 3.0)]
+    starts = [np.concatenate([start, np.zeros(len(pulls))]) for start in starts]
+    fits = [least_squares(misfit, start, loss="soft_l1", max_nfev=40) for start in starts]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return float(np.exp(best.x[0])), float(np.exp(best.x[1]))
+
+
+def _running_energy(
+    motions: tuple[PathMotion, ...],
+    materials: tuple[Material, ...],
+    runs: Sequence[Span],
+    geometry: Geometry,
+) -> float:
+    """Median of m t torque / lever over closing, where that is no small share of its largest."""
+    found = []
+    for run in runs:
+        motion = motions[run.motion]
+        if motion.opening[run.high] >= motion.opening[run.low]:
+            continue
+        opening, _, torque = _profile(
+            motion, materials[run.motion], run.low, run.high, RUNNING_PROFILE_RAD
+        )
+        if len(opening):
+            view = geometry.running(opening)
+            found.append(geometry.moving_blades * view.slope / view.lever * torque)
+    energy = np.concatenate(found) if found else np.zeros(1)
+    large = energy[energy > 0.3 * np.quantile(energy, 0.9)]
+    return float(max(np.median(large) if len(large) else 0.0, 1e-6))

@@ -1,0 +1,83 @@
+"""What a cut's fit takes over from the friction's: levels, inertia, cogging, noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction_experiment import friction_law
+from scissorcal.calibration.path import (
+    Material,
+    PathMotion,
+    TorqueNoise,
+    material_of,
+    torque_noise_of,
+)
+from scissorcal.calibration.result import FitResult
+from scissorcal.model import FrictionLaw, friction_torque
+
+Array = NDArray[np.float64]
+
+OFFSET_SD_FLOOR = 1e-4
+"""Least standard deviation (N m) of friction in one stroke: levels differ by stroke and speed by
+more than the empty sweeps' posterior says."""
+USUAL_RATE = 0.3
+
+
+@dataclass(frozen=True)
+class KnownFriction:
+    """Friction as the empty sweeps left it.
+
+    ``law`` and ``offset`` (N m) stand at the posterior's mean. ``closing_sd`` and ``opening_sd``
+    (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
+    single strokes differ by. ``cogging`` is (cosine, sine, periods per radian).
+    """
+
+    law: FrictionLaw
+    offset: float
+    inertia: float
+    cogging: tuple[float, float, float]
+    noise: TorqueNoise
+    closing_sd: float
+    opening_sd: float
+    stroke_sd: float
+
+    @classmethod
+    def of(cls, friction: FitResult) -> "KnownFriction":
+        """Take a finished fit of friction."""
+        means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
+        centre = float(friction.structure["angle_center"])
+        per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
+        cogging = tuple(float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin"))
+        closing, opening = (
+            max(OFFSET_SD_FLOOR, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
+        )
+        stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", OFFSET_SD_FLOOR))
+        return cls(
+            law=friction_law(_of_law(means), centre),
+            offset=float(means.get("offset", 0.0)),
+            inertia=float(means["inertia"]),
+            cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
+            noise=torque_noise_of(friction.diagnostics),
+            closing_sd=closing,
+            opening_sd=opening,
+            stroke_sd=max(OFFSET_SD_FLOOR, stroke),
+        )
+
+    def material(self, motion: PathMotion) -> Material:
+        """Work and torque of the material along a motion, friction and cogging taken off."""
+        return material_of(motion, self.law, self.offset, self.cogging)
+
+
+def _of_law(values: dict[str, Array]) -> dict[str, Array]:
+    """Parameters that a friction law has, without those of the drive and the noise."""
+    others = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
+    return {name: value for name, value in values.items() if name not in others}
+
+
+def _spread(friction: FitResult, centre: float, rate: float) -> float:
+    """Standard deviation of friction and offset together at one rate, over the posterior."""
+    draws = {p.name: friction.column(p.name) for p in friction.parameters}
+    law = friction_law(_of_law(draws), centre)
+    level = friction_torque(law, centre, rate) + draws.get("offset", np.asarray(0.0))
+    return float(np.std(level))

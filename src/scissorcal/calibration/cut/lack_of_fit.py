@@ -1,0 +1,89 @@
+"""A stated budget of lack of fit, carried from the segments into the parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.inference.curvature import gradient, natural_step
+
+Array = NDArray[np.float64]
+
+PERTURBATION = 1e-3
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How far each kind of segment would move the parameters if the law were wrong in it.
+
+    ``shifts`` has by kind the change (p,) of the unconstrained parameters for a relative error of
+    one; ``share`` is the relative error that is allowed for in each kind.
+    """
+
+    share: float
+    shifts: Mapping[str, Array]
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation (p,) that the budget adds, in unconstrained parameters."""
+        rows = list(self.shifts.values())
+        return np.asarray(self.share * np.sqrt(np.sum(np.square(rows), axis=0)))
+
+    def widen(self, draws: Array, rng: np.random.Generator) -> Array:
+        """Draws (n, p) with an error of every kind's own added to each."""
+        wider = draws.copy()
+        for shift in self.shifts.values():
+            wider += self.share * rng.standard_normal((len(draws), 1)) * shift
+        return wider
+
+
+def budget_of(design: CutExperiment, point: Array, covariance: Array, share: float) -> Budget:
+    """Work out what an error of each kind does to the optimum at ``point`` (p,).
+
+    A relative error e of a kind's torques (of the line's period) moves the optimum by
+    C d(score)/de, with C the covariance (p, p) of the normal approximation. A law that is wrong in
+    the same way in every stroke leaves no trace in residuals, so no statistic of them could tell
+    its size: it is stated in the recipe.
+    """
+    problem = design.rung(design.observed).problem(design.series)
+    step = 0.1 * natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
+    shifts = {}
+    for kind, changed in _changed(design).items():
+        if changed is None:
+            continue
+        other = changed.rung(changed.observed).problem(changed.series)
+
+        def gained(u: Array, other: object = other, problem: object = problem) -> Array:
+            return np.array([other.log_likelihood(u) - problem.log_likelihood(u)])  # type: ignore[attr-defined]
+
+        score = gradient(gained, point, step)[0] / PERTURBATION
+        shifts[kind] = covariance @ score
+    return Budget(share, shifts)
+
+
+def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
+    """Designs in which one kind of segment was measured larger by ``PERTURBATION``."""
+    segments = design.likelihood.segments
+    kinds = [np.full(len(p.torque), p.kind == "unloading") for p in segments.pieces]
+    unloading = np.concatenate([*kinds, np.zeros(0, dtype=bool)])
+    elastic, count = len(unloading), len(design.observed)
+    masks = {
+        "loading": np.concatenate([~unloading, np.zeros(count - elastic, dtype=bool)]),
+        "unloading": np.concatenate([unloading, np.zeros(count - elastic, dtype=bool)]),
+        "running": np.arange(count) >= elastic,
+    }
+    found: dict[str, CutExperiment | None] = {}
+    for kind, mask in masks.items():
+        measured = np.where(mask, 1.0 + PERTURBATION, 1.0) * design.likelihood.torque
+        found[kind] = (
+            replace(design, likelihood=replace(design.likelihood, measured=measured), _last={})
+            if np.any(mask)
+            else None
+        )
+    line = design.likelihood.line
+    if line is not None:
+        moved = replace(line, log_period=line.log_period + PERTURBATION)
+        found["line"] = replace(design, likelihood=replace(design.likelihood, line=moved), _last={})
+    return found

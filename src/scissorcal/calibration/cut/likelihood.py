@@ -1,0 +1,289 @@
+"""The likelihood of a cut's segments, evaluated in C."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.segments import Segments
+from scissorcal.kernel import CutFitData, CutFitParameters, cut_log_likelihood
+from scissorcal.model import Response
+
+Array = NDArray[np.float64]
+
+GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
+TABLE_SIZE = 97
+TABLE_SPAN = (2e-3, 30.0)
+"""Knots of the response's table, evenly in the logarithm of the indentation from and to so many
+times the reference. A power law is exact, an exponential within 1e-8 of its value."""
+KNOWN_SD_M = 0.0
+"""A fresh sheet's near edge stands at 0 exactly, as the capture asks for."""
+
+
+class Evaluation(NamedTuple):
+    """Log-likelihood by segment (n,), residuals (N m), standardised ones, and places of rests.
+
+    ``log_period`` is the weighted mean logarithm of the teeth's period (rad).
+    """
+
+    total: float
+    terms: Array
+    residuals: Array
+    standardised: Array
+    places: Array
+    log_period: float
+
+
+@dataclass(frozen=True)
+class LineDatum:
+    """What the line says: mean logarithm of the period over stretches, and its error."""
+
+    log_period: float
+    sd: float
+    stretches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CutLikelihood:
+    """Segments with their geometry, ready to be compared with parameters by name.
+
+    Elastic segments come first, piece by piece, then running ones, stretch by stretch; all arrays
+    by segment have that order. ``line`` adds one normal term, spread over the segments that show
+    it. ``fracture`` is "none", "smooth" or "rippled".
+    """
+
+    segments: Segments
+    geometry: Geometry
+    fracture: str
+    line: LineDatum | None = None
+    measured: Array | None = field(default=None, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave C structs out of a pickle; they are made again."""
+        return {name: value for name, value in self.__dict__.items() if name != "data"}
+
+    def evaluate(self, values: Mapping[str, Array], response: Response) -> Evaluation:
+        """Compare with parameters by name (scalars) and a response."""
+        found = Evaluation(*cut_log_likelihood(self.data, self._parameters(values, response)))
+        if self.line is None:
+            return found
+        away = (found.log_period - self.line.log_period) / self.line.sd
+        share = -0.5 * away**2 * self.data.line_weight
+        terms = found.terms.copy()
+        terms[self.elastic_count :] += share
+        return found._replace(total=found.total - 0.5 * away**2, terms=terms)
+
+    @cached_property
+    def elastic_count(self) -> int:
+        """Elastic segments."""
+        return sum(len(piece.torque) for piece in self.segments.pieces)
+
+    @cached_property
+    def torque(self) -> Array:
+        """Mean torques (n,) as they were measured, with no delay."""
+        parts = [p.torque for p in self.segments.pieces]
+        parts += [s.torque for s in self.segments.stretches]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def torque_at(self, found: Evaluation) -> Array:
+        """Expected mean torque (n,), without the delay's part."""
+        measured = self.torque if self.measured is None else self.measured
+        return measured - found.residuals
+
+    @cached_property
+    def data(self) -> CutFitData:
+        """What C reads."""
+        return CutFitData(**self._elastic(), **self._rests(), **self._running(), **self._common())
+
+    def _common(self) -> dict[str, Any]:
+        return {
+            "moving_blades": float(self.geometry.moving_blades),
+            "reference_depth": self.geometry.reference_m,
+            "edge_count": len(self.geometry.belief.names),
+            "known_sd": KNOWN_SD_M,
+        }
+
+    def _elastic(self) -> dict[str, Any]:
+        segments, geometry = self.segments, self.geometry
+        pieces = segments.pieces
+        ends = [np.stack([p.ends[:-1], p.ends[1:]]) for p in pieces]
+        opening, contact, rate = [], [], []
+        for piece, (low, high) in zip(pieces, ends, strict=True):
+            motion = segments.motions[piece.motion]
+            middle = 0.5 * (motion.opening[high] + motion.opening[low])
+            half = 0.5 * (motion.opening[high] - motion.opening[low])
+            total = np.concatenate([[0.0], np.cumsum(motion.advance)])
+            advance = (total[high] - total[low]) / (high - low)
+            opening.append(middle[:, None] + half[:, None] * GAUSS)
+            place = segments.rests[piece.rest].place
+            contact.append(np.repeat((place - advance)[:, None], 2, axis=1))
+            rate.append(np.repeat((2 * half / ((high - low) * motion.tick_s))[:, None], 2, axis=1))
+        flat = [
+            np.concatenate(rows).ravel() if rows else np.zeros(0)
+            for rows in (opening, rate, contact)
+        ]
+        nodes = geometry.nodes(*flat)
+        whiteners = [_whitener(piece.covariance) for piece in pieces]
+        lengths = [len(w) for w in whiteners]
+        measured = self._measured(pieces, 0)
+        return {
+            "piece_first": _starts([len(p.torque) for p in pieces]),
+            "piece_rest": np.array([p.rest for p in pieces], dtype=np.int32),
+            "piece_closing": np.array([p.kind != "unloading" for p in pieces], dtype=np.int32),
+            "white_first": _starts(lengths)[:-1],
+            "whitener": _joined(whiteners),
+            "torque": measured,
+            "late": _joined([p.late for p in pieces]),
+            "depth": nodes.depth,
+            "depth_dx": nodes.depth_dx,
+            "lever": nodes.lever,
+            "lever_dx": nodes.lever_dx,
+            "sinking": nodes.sinking,
+            "depth_de": nodes.depth_de.ravel(),
+            "lever_de": nodes.lever_de.ravel(),
+        }
+
+    def _rests(self) -> dict[str, Any]:
+        rests, geometry = self.segments.rests, self.geometry
+        known = np.array([rest.fresh or self.fracture == "none" for rest in rests])
+        opening = np.array([0.5 if rest.fresh else rest.opening for rest in rests])
+        advance = np.array([0.0 if rest.fresh else rest.advance for rest in rests])
+        at = geometry.running(opening)
+        return {
+            "rest_known": known.astype(np.int32),
+            "rest_place": np.array([rest.place for rest in rests]),
+            "rest_at_reference": at.place + advance,
+            "rest_slope": at.slope,
+            "rest_de": at.place_de.ravel(),
+        }
+
+    def _running(self) -> dict[str, Any]:
+        segments, geometry = self.segments, self.geometry
+        runs = segments.stretches
+        opening, rate, place, start, end = [], [], [], [], []
+        for run in runs:
+            motion = segments.motions[run.motion]
+            low, high = run.ends[:-1], run.ends[1:]
+            middle = 0.5 * (motion.opening[high] + motion.opening[low])
+            total = np.concatenate([[0.0], np.cumsum(motion.advance)])
+            opening.append(middle)
+            rate.append(np.diff(motion.opening[run.ends]) / ((high - low) * motion.tick_s))
+            place.append(
+                geometry.place(middle, geometry.reference_m)
+                + (total[high] - total[low]) / (high - low)
+            )
+            energy = (motion.inertia * motion.rate[run.ends] * motion.rate_sd) ** 2
+            energy = energy + run.tooth_sd**2
+            start.append(energy[:-1])
+            end.append(energy[1:])
+        openings = _joined(opening)
+        view = geometry.running(openings)
+        sheets = np.array([run.sheet for run in runs], dtype=np.int64)
+        counts = [len(run.torque) for run in runs]
+        by_sheet = [
+            sum(c for c, s in zip(counts, sheets, strict=True) if s == sheet)
+            for sheet in np.unique(sheets)
+        ]
+        joined = [np.arange(count) > 0 for count in counts]
+        weights = [
+            np.abs(run.path) if self.line and index in self.line.stretches else np.zeros(count)
+            for index, (run, count) in enumerate(zip(runs, counts, strict=True))
+        ]
+        weight = _joined(weights)
+        arm = -view.lever * _joined(rate) / geometry.moving_blades
+        return {
+            "run_first": _starts(by_sheet),
+            "joined": np.concatenate(joined).astype(np.int32) if runs else np.zeros(0, np.int32),
+            "run_torque": self._measured(runs, self.elastic_count),
+            "run_late": _joined([run.late for run in runs]),
+            "run_lever": view.lever,
+            "run_lever_dd": view.lever_dd,
+            "run_slope": view.slope,
+            "run_slope_dd": view.slope_dd,
+            "run_lever_de": view.lever_de.ravel(),
+            "run_slope_de": view.slope_de.ravel(),
+            "run_sinking": arm,
+            "run_place": _joined(place),
+            "run_step": _joined([run.path for run in runs]),
+            "run_noise": _joined([run.noise for run in runs]),
+            "start_noise": _joined(start),
+            "end_noise": _joined(end),
+            "line_weight": weight / weight.sum() if weight.sum() > 0 else weight,
+        }
+
+    def _measured(self, parts: Any, first: int) -> Array:
+        if self.measured is None:
+            return _joined([part.torque for part in parts])
+        return np.ascontiguousarray(
+            self.measured[first : first + sum(len(part.torque) for part in parts)]
+        )
+
+    def _parameters(self, values: Mapping[str, Array], response: Response) -> CutFitParameters:
+        def of(name: str, default: float) -> float:
+            return float(values.get(name, default))
+
+        belief = self.geometry.belief
+        away = [
+            of(f"edge_{name}", float(mean)) - float(mean)
+            for name, mean in zip(belief.names, belief.mean, strict=True)
+        ]
+        log_depth, log_force, slope, log_energy = response_table(
+            response, self.geometry.reference_m
+        )
+        return CutFitParameters(
+            first=float(log_depth[0]),
+            step=float(log_depth[1] - log_depth[0]),
+            log_force=log_force,
+            force_slope=slope,
+            log_energy=log_energy,
+            fracture=self.fracture,
+            energy=of("fracture_energy", 1.0),
+            kappa=of("kappa", 1.0) if self.fracture == "rippled" else 1.0,
+            rest_phase=of("rest_phase", 0.5),
+            rest_spread=of("rest_spread", 0.0),
+            variation=of("variation", 0.0),
+            variation_length=of("variation_length", 1.0),
+            sheet_variation=of("sheet_variation", 0.0),
+            offset_closing=of("offset_closing", 0.0),
+            offset_opening=of("offset_opening", 0.0),
+            load=of("load_share", 0.0),
+            noise_scale=of("noise_scale", 1.0),
+            damping=of("rate_damping", 0.0),
+            delay=of("torque_delay", 0.0),
+            edge=np.array(away),
+        )
+
+
+def response_table(response: Response, reference_m: float) -> tuple[Array, Array, Array, Array]:
+    """Logarithms of depth, force, d(log force)/d(log depth) and log energy at the table's knots."""
+    log_depth = np.log(reference_m) + np.linspace(*np.log(TABLE_SPAN), TABLE_SIZE)
+    depth = np.exp(log_depth)
+    if response.family == "power":
+        exponent = float(np.asarray(response.exponent))
+        log_force = np.log(response.force) + exponent * (log_depth - np.log(reference_m))
+        slope = np.full(TABLE_SIZE, exponent)
+        return log_depth, log_force, slope, log_force + log_depth - np.log(exponent + 1.0)
+    force, energy = response.force_at(depth), response.energy_at(depth)
+    slope = response.stiffness_at(depth) * depth / force
+    return log_depth, np.log(force), np.asarray(slope), np.log(energy)
+
+
+def _whitener(covariance: Array) -> Array:
+    """Rows of the lower triangle of the inverse Cholesky factor, one after the other."""
+    from scipy.linalg import solve_triangular
+
+    root = np.linalg.cholesky(covariance)
+    inverse = solve_triangular(root, np.eye(len(root)), lower=True)
+    return np.asarray(inverse[np.tril_indices(len(root))])
+
+
+def _starts(lengths: list[int]) -> NDArray[np.int32]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
+
+
+def _joined(parts: list[Array]) -> Array:
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -1,0 +1,301 @@
+"""From a first guess to segments and a line that a fit can rest on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.experiment import CutExperiment, starting_point
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.guess import Guess, first_guess
+from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.laws import CutLaw, cut_layout
+from scissorcal.calibration.cut.likelihood import CutLikelihood, LineDatum
+from scissorcal.calibration.cut.segments import Segments, cut_into_segments, find_runs
+from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
+from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
+from scissorcal.calibration.path import Material, PathMotion
+from scissorcal.inference import Optimum, find_optimum
+from scissorcal.model import EdgeBelief, Response
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+
+ROUNDS = 2
+KAPPAS = np.linspace(0.05, 0.985, 188)
+DISAGREE = 4.0
+"""A line is refused where its period lies so many standard deviations from what the rest says."""
+
+
+@dataclass(frozen=True)
+class Scouted:
+    """Segments by a fit that placed them, and the line, with why it is or is not believed.
+
+    ``values`` are that fit's parameters by name, ``line`` is what was found, ``believed`` whether
+    it is used; ``without`` and ``without_sd`` are kappa and its standard deviation where the line
+    is left out. ``evaluations`` counts likelihoods.
+    """
+
+    segments: Segments
+    materials: tuple[Material, ...]
+    values: Mapping[str, float]
+    line: Line | None
+    believed: bool
+    without: float
+    without_sd: float
+    reason: str
+    evaluations: int
+
+    @property
+    def datum(self) -> LineDatum | None:
+        """The line as the likelihood takes it."""
+        if self.line is None or not self.believed:
+            return None
+        return LineDatum(self.line.log_period, self.line.sd, self.line.stretches)
+
+
+def scout(
+    motions: tuple[PathMotion, ...],
+    known: KnownFriction,
+    recipe: Recipe,
+    geometry: Geometry,
+    fracture: str,
+) -> Scouted:
+    """Fit a power law twice, cutting the recordings anew by its result, and look for the teeth.
+
+    Raises ValueError where no unloading was seen.
+    """
+    materials = tuple(known.material(motion) for motion in motions)
+    exponent = recipe.fit.cut.response_exponent
+    guess = first_guess(
+        motions,
+        materials,
+        find_runs(motions),
+        geometry,
+        cuts=recipe.scene.cut,
+        median_exponent=exponent.median,
+        log_sd_exponent=exponent.log_sd,
+    )
+    law = CutLaw("power", fracture)
+    values = _values_of(guess, fracture)
+    evaluations = 0
+    for _ in range(ROUNDS):
+        segments = cut_into_segments(
+            motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
+        )
+        if not segments.pieces:
+            raise ValueError("no unloading was seen")
+        design = make_experiment(segments, geometry, recipe, law, known, values)
+        optimum = find_optimum(design.rung(design.observed).problem(design.series))
+        evaluations += optimum.evaluations
+        values = _natural(design, optimum.point)
+        guess = _guess_of(design, values)
+    found = Scouted(
+        segments, materials, values, None, False, float("nan"), float("nan"), "", evaluations
+    )
+    if fracture != "rippled" or not segments.stretches:
+        return found
+    return _with_line(found, design, optimum, recipe, known, geometry)
+
+
+def make_experiment(
+    segments: Segments,
+    geometry: Geometry,
+    recipe: Recipe,
+    law: CutLaw,
+    known: KnownFriction,
+    values: Mapping[str, float],
+    line: LineDatum | None = None,
+) -> CutExperiment:
+    """One law over segments, with priors from the recipe; a search begins at ``values``."""
+    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
+    edge = edge_layout(geometry.belief)
+    whole = type(layout)((*layout.parameters, *edge.parameters))
+    precision = np.diag(1.0 / whole.sd**2)
+    count = len(edge.parameters)
+    if count:
+        precision[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+    return CutExperiment(
+        likelihood=CutLikelihood(
+            segments, geometry, law.fracture, line if law.fracture == "rippled" else None
+        ),
+        law=law,
+        key={**law.key, **geometry_of(recipe, geometry.belief.edge)},
+        layout=whole,
+        prior_precision=precision,
+        start=starting_point(whole, values),
+    )
+
+
+def tooth_periods(
+    geometry: Geometry, response: Response, values: Mapping[str, Any], opening: Array
+) -> tuple[Array, Array]:
+    """Logarithm of the teeth's period (rad) and mean torque (N m) of a running crack, (k,) each.
+
+    The crack starts at the indentation d_c of the energy J and stops at d_l of kappa J. From one
+    start to the next the opening falls by p with d_c(theta - p / 2) - d_l(theta + p / 2) =
+    p lever / m; to first order in p that is
+
+        p = m (d_c - d_l) / (lever - (d_c + d_l) / 2 (1 + t^2) / (n t)),   t = tan(psi),
+
+    n the response's exponent at d_c. Against a crack stepped exactly it is right to 0.02 %.
+    """
+    view = geometry.running(opening)
+    moving, energy, kappa = geometry.moving_blades, float(values["fracture_energy"]), 1.0
+    kappa = float(values["kappa"])
+    slope, lever = view.slope, view.lever
+    for _ in range(2):
+        peak = energy / (moving * np.maximum(slope, 1e-6))
+        start, stop = response.indentation_at(peak), response.indentation_at(kappa * peak)
+        away = 0.5 * (start + stop) - geometry.reference_m
+        slope, lever = view.slope + view.slope_dd * away, view.lever + view.lever_dd * away
+    gained = response.energy_at(start) - response.energy_at(stop)
+    mean = gained / np.maximum(start - stop, 1e-15)
+    power = response.stiffness_at(start) * start / response.force_at(start)
+    turn = 0.5 * (start + stop) * (1.0 + slope**2) / (power * slope)
+    period = moving * (start - stop) / np.maximum(lever - turn, 1e-6)
+    return np.log(np.maximum(period, 1e-12)), mean * lever
+
+
+def _with_line(
+    found: Scouted,
+    design: CutExperiment,
+    optimum: Optimum,
+    recipe: Recipe,
+    known: KnownFriction,
+    geometry: Geometry,
+) -> Scouted:
+    """Look for the teeth, ask whether they agree with the rest, and fit again with them."""
+    sd_period, sd_kappa = _uncertainty(design, optimum.point)
+    kappa = found.values["kappa"]
+    first = _line(found, geometry, design)
+    found = replace(found, without=kappa, without_sd=sd_kappa)
+    if first is None:
+        return replace(found, reason="No stroke shows the teeth of a running crack as a line.")
+    if not first.at_two_speeds:
+        return replace(
+            found, line=first, reason="The line of the teeth does not show at two stroke speeds."
+        )
+    away = abs(np.log(first.ratio)) / float(np.hypot(sd_period, first.sd))
+    if away > DISAGREE:
+        reason = (
+            f"The line's period lies {away:.1f} standard deviations from what the rest of the "
+            "data say, as encoder counts that alias with the samples do."
+        )
+        return replace(found, line=first, reason=reason)
+    values, line, evaluations = dict(found.values), first, found.evaluations
+    for _ in range(ROUNDS):
+        values["kappa"] = _kappa_at(values, geometry, found, line.log_period, line.stretches)
+        datum = LineDatum(line.log_period, line.sd, line.stretches)
+        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
+        optimum = find_optimum(design.rung(design.observed).problem(design.series))
+        evaluations += optimum.evaluations
+        values = _natural(design, optimum.point)
+        again = _line(replace(found, values=values), geometry, design)
+        if again is None:
+            break
+        line = again
+    return replace(found, values=values, line=line, believed=True, evaluations=evaluations)
+
+
+def _line(found: Scouted, geometry: Geometry, design: CutExperiment) -> Line | None:
+    response = response_from(design.key, {k: np.asarray(v) for k, v in found.values.items()})
+    rows = [
+        tooth_periods(geometry, response, found.values, _middles(found, index))
+        for index in range(len(found.segments.stretches))
+    ]
+    gain = 1.0 + float(found.values.get("load_share", 0.0))
+    growth = 1.0 / float(np.asarray(response.exponent))
+    periods, torques = [row[0] for row in rows], [gain * row[1] for row in rows]
+    signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
+    return find_line(signals, periods, [s.path for s in found.segments.stretches])
+
+
+def _middles(found: Scouted, index: int) -> Array:
+    stretch = found.segments.stretches[index]
+    opening = found.segments.motions[stretch.motion].opening
+    return 0.5 * (opening[stretch.ends[1:]] + opening[stretch.ends[:-1]])
+
+
+def _kappa_at(
+    values: Mapping[str, float],
+    geometry: Geometry,
+    found: Scouted,
+    log_period: float,
+    stretches: tuple[int, ...],
+) -> float:
+    """The kappa that gives a mean period while the mean energy stays as it is."""
+    mean = values["fracture_energy"] * (1.0 + values["kappa"]) / 2.0
+    response = Response(
+        "power", values["response_force"], values["response_exponent"], geometry.reference_m
+    )
+    opening = np.concatenate([_middles(found, index) for index in stretches])[::7]
+    misses = []
+    for kappa in KAPPAS:
+        tried = {**values, "kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}
+        logs, _ = tooth_periods(geometry, response, tried, opening)
+        misses.append(abs(float(logs.mean()) - log_period))
+    return float(KAPPAS[int(np.argmin(misses))])
+
+
+def _uncertainty(design: CutExperiment, point: Array) -> tuple[float, float]:
+    """Standard deviations of the mean log period and of kappa, by the curvature at ``point``."""
+    from scissorcal.inference.curvature import hessian, natural_step
+
+    likelihood = replace(
+        design.likelihood,
+        line=LineDatum(0.0, np.inf, tuple(range(len(design.likelihood.segments.stretches)))),
+    )
+    design = replace(design, likelihood=likelihood, _last={})
+    problem = design.rung(design.observed).problem(design.series)
+    step = natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
+    information = -hessian(problem.log_posterior, point, step)
+    values, vectors = np.linalg.eigh(information)
+    covariance = (vectors / np.maximum(values, 1e-6 * values.max())) @ vectors.T
+    grade = np.array(
+        [
+            (design.evaluate(point + d).log_period - design.evaluate(point - d).log_period)
+            / (2 * np.abs(d).sum())
+            for d in np.diag(0.1 * step)
+        ]
+    )
+    index = design.layout.names.index("kappa")
+    kappa = float(design.layout.natural(point)["kappa"])
+    own = kappa * (1.0 - kappa) * float(np.sqrt(covariance[index, index]))
+    return float(np.sqrt(grade @ covariance @ grade)), own
+
+
+def _values_of(guess: Guess, fracture: str) -> dict[str, float]:
+    kappa = 2.0 / guess.peak_ratio - 1.0
+    return {
+        "response_force": float(np.asarray(guess.response.force)),
+        "response_exponent": float(np.asarray(guess.response.exponent)),
+        "fracture_energy": guess.mean_energy * (guess.peak_ratio if fracture == "rippled" else 1.0),
+        "kappa": kappa,
+    }
+
+
+def _guess_of(design: CutExperiment, values: Mapping[str, float]) -> Guess:
+    response = response_from(design.key, {k: np.asarray(v) for k, v in values.items()})
+    if "fracture_energy" not in values:
+        return Guess(response, np.inf)
+    kappa = values.get("kappa", 1.0)
+    mean = values["fracture_energy"] * (1.0 + kappa) / 2.0
+    return Guess(response, mean, 2.0 / (1.0 + kappa))
+
+
+def _natural(design: CutExperiment, point: Array) -> dict[str, float]:
+    return {name: float(value) for name, value in design.layout.natural(point).items()}
+
+
+def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
+    """The geometry that a recipe and a believed edge give."""
+    return Geometry(
+        belief,
+        recipe.upper_face_m,
+        recipe.rig.moving_blades,
+        recipe.fit.cut.reference_indentation_mm * 1e-3,
+        recipe.scene.closure,
+    )

@@ -1,0 +1,364 @@
+"""A recording of cuts in pieces: cracks that wait, and cracks that run.
+
+On each sheet the blades close and open again. While they open, and until they have closed far
+enough again, the crack stands: what is measured then is elastic, and one place of the crack (a
+rest) serves the way back and the way in. Beyond, the crack runs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.guess import Guess
+from scissorcal.calibration.path import (
+    Material,
+    PathMotion,
+    TorqueNoise,
+    mean_torque,
+    torque_covariance,
+    turning_points,
+)
+from scissorcal.calibration.path.work import mean_noise
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+TURN_RAD = 3e-3
+"""A turn that is undone within so much is a tremor."""
+ELASTIC_SEGMENTS = 8
+"""Segments between touching and the deepest point of an elastic piece."""
+LEAST_SEGMENT_COUNTS = 6.0
+"""An elastic segment spans at least so many steps of the encoder."""
+RUNNING_RAD = 5e-3
+LOADING_END = 0.88
+"""Share of the critical indentation at which loading ends: unevenness may start the crack sooner."""
+RUNNING_FROM = 1.6
+"""Indentation, in critical ones, a standing crack would have where a running one is trusted."""
+FREE_SHARE = 0.4
+"""What a piece has of the way without contact, in lengths of its contact: it tells the offset."""
+TURN_SHARE = 0.03
+FEWEST_SEGMENTS = 5
+LEAST_TORQUE_SDS = 5.0
+LEAST_RANGE_RAD = 1e-3
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A place at which a crack stands: ``place`` (m, sheet's frame) is a first estimate.
+
+    ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
+    cut yet, whose crack stands at 0.
+    """
+
+    sheet: int
+    fresh: bool
+    place: float
+    opening: float = float("nan")
+    advance: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Elastic segments between the samples ``ends`` (k + 1,) of a motion, all at one rest."""
+
+    kind: str
+    rest: int
+    motion: int
+    ends: Integers
+    torque: Array
+    late: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Segments between the samples ``ends`` (k + 1,) of a motion over which the crack runs.
+
+    ``torque`` (k,) is the mean over the path that the sledge's motion leaves, ``path`` (k,) that
+    path in rad; ``noise`` (k,) is the variance of the drive's noise in the mean torque. ``tooth_sd``
+    (J) is what a tooth that the segment's end cuts off leaves of its work.
+    """
+
+    sheet: int
+    motion: int
+    ends: Integers
+    torque: Array
+    late: Array
+    path: Array
+    noise: Array
+    speed: float
+    tooth_sd: float
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Everything that a likelihood of cuts is made from."""
+
+    motions: tuple[PathMotion, ...]
+    rests: tuple[Rest, ...]
+    pieces: tuple[Piece, ...]
+    stretches: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Samples ``low`` to ``high`` of a motion between two turns of the blades."""
+
+    motion: int
+    sheet: int
+    low: int
+    high: int
+
+    def closing(self, motion: PathMotion) -> bool:
+        return bool(motion.opening[self.high] < motion.opening[self.low])
+
+
+def find_runs(motions: tuple[PathMotion, ...]) -> list[Run]:
+    """Stretches between turns on each sheet, in order of time."""
+    runs: list[Run] = []
+    for index, motion in enumerate(motions):
+        bounds = np.flatnonzero(np.diff(motion.sheet)) + 1
+        edges = [0, *bounds.tolist(), len(motion.sheet)]
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            sheet = int(motion.sheet[low])
+            if sheet < 0 or high - low < 2 * FEWEST_SEGMENTS:
+                continue
+            turns = [low + t for t in turning_points(motion.opening[low:high], TURN_RAD)]
+            ends = [low, *turns, high - 1]
+            runs += [
+                Run(index, sheet, a, b)
+                for a, b in zip(ends[:-1], ends[1:], strict=True)
+                if b - a >= 2 * FEWEST_SEGMENTS
+            ]
+    return sorted(runs, key=lambda run: (motions[run.motion].recording, run.motion, run.low))
+
+
+def cut_into_segments(
+    motions: tuple[PathMotion, ...],
+    materials: tuple[Material, ...],
+    geometry: Geometry,
+    guess: Guess,
+    noise: TorqueNoise,
+    offset_sd: float,
+    cuts: bool,
+) -> Segments:
+    """Cut motions with what the material did (see :func:`material_of`) into segments.
+
+    ``guess`` says where cracks wait and how deep the edge may sink before they run; ``cuts`` is
+    false where nothing is cut. Samples that a sensor spoilt take their segment with them.
+    """
+    builder = _Builder(motions, materials, geometry, guess, noise, offset_sd, cuts)
+    sheet: tuple[int, int] | None = None
+    for run in find_runs(motions):
+        here = (motions[run.motion].recording, run.sheet)
+        if here != sheet:
+            builder.new_sheet(run.sheet)
+            sheet = here
+        if run.closing(motions[run.motion]):
+            builder.closing(run)
+        else:
+            builder.opening(run)
+    return Segments(motions, tuple(builder.rests), tuple(builder.pieces), tuple(builder.stretches))
+
+
+def split(path: Array, low: int, high: int, step: float) -> Integers:
+    """Samples from ``low`` on, each ``step`` further along the path than the last, up to ``high``."""
+    away = np.sign(path[high] - path[low]) * (path[low : high + 1] - path[low])
+    farthest = np.maximum.accumulate(away)
+    ends, at = [low], 0.0
+    while True:
+        index = int(np.searchsorted(farthest, at + step))
+        if index >= len(away):
+            return np.array(ends, dtype=np.int64)
+        ends.append(low + index)
+        at = float(away[index])
+
+
+class _Builder:
+    """Collects rests, pieces and stretches run by run."""
+
+    def __init__(
+        self,
+        motions: tuple[PathMotion, ...],
+        materials: tuple[Material, ...],
+        geometry: Geometry,
+        guess: Guess,
+        noise: TorqueNoise,
+        offset_sd: float,
+        cuts: bool,
+    ) -> None:
+        self.motions, self.materials, self.geometry = motions, materials, geometry
+        self.guess, self.noise, self.offset_sd, self.cuts = guess, noise, offset_sd, cuts
+        self.rests: list[Rest] = []
+        self.pieces: list[Piece] = []
+        self.stretches: list[Stretch] = []
+        self.sheets = 0
+        self.sheet = -1
+
+    def new_sheet(self, sheet: int) -> None:
+        self.sheet = self.sheets
+        self.sheets += 1
+        self.rests.append(Rest(self.sheet, True, 0.0))
+
+    def closing(self, run: Run) -> None:
+        """Loading of the crack that waits, then what is cut further."""
+        motion = self.motions[run.motion]
+        span = slice(run.low, run.high + 1)
+        opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
+        depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)
+        critical = np.full(len(depth), np.inf)
+        if self.cuts:
+            critical = self.guess.critical_depth(
+                self.geometry.slope(opening, contact), self.geometry.moving_blades
+            )
+        touching = np.flatnonzero(depth > 0.0)
+        if len(touching) == 0:
+            return
+        first = int(touching[0])
+        beyond = np.flatnonzero(depth > LOADING_END * critical)
+        last = int(beyond[0]) if len(beyond) else len(depth) - 1
+        length = abs(float(opening[last] - opening[first]))
+        if length > LEAST_RANGE_RAD:
+            begin = first
+            while begin > 0 and abs(opening[begin] - opening[first]) < FREE_SHARE * length:
+                begin -= 1
+            kind = "fresh" if self.rests[-1].fresh else "loading"
+            self._piece(kind, run.motion, run.low + begin, run.low + last, length)
+        beyond = np.flatnonzero(depth > RUNNING_FROM * critical)
+        if len(beyond):
+            self._stretch(run, run.low + int(beyond[0]))
+
+    def opening(self, run: Run) -> None:
+        """Unloading from where the blades turned; a crack may have come to rest there."""
+        motion = self.motions[run.motion]
+        if self.cuts:
+            found = self._place_at_turn(run)
+            if found is None:
+                return
+            turn = float(motion.opening[run.low]), float(motion.advance[run.low])
+            self.rests.append(Rest(self.sheet, False, found, *turn))
+        span = slice(run.low, run.high + 1)
+        opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
+        depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)
+        free = np.flatnonzero(depth < 0.0)
+        if len(free) == 0 or depth[0] <= 0.0:
+            return
+        length = float(opening[free[0]] - opening[0])
+        if length < LEAST_RANGE_RAD:
+            return
+        begin = int(np.argmax(opening > opening[0] + TURN_SHARE * length))
+        end = int(free[0])
+        while end < len(opening) - 1 and opening[end] < opening[free[0]] + FREE_SHARE * length:
+            end += 1
+        self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
+
+    def _place_at_turn(self, run: Run) -> float | None:
+        """Where the crack stands by the unloading alone, at the guessed response."""
+        motion, geometry = self.motions[run.motion], self.geometry
+        work = self.materials[run.motion].work
+        opening, low = motion.opening, run.low
+        turn, advance = float(opening[low]), float(motion.advance[low])
+        least = LEAST_TORQUE_SDS * float(np.hypot(self.noise.white_Nm, self.noise.slow_Nm))
+        probe = split(opening, low, run.high, LEAST_RANGE_RAD)[:3]
+        if len(probe) < 2:
+            return None
+        torque, _ = mean_torque(motion, work, probe)
+        if torque[0] < least:
+            return None
+        place = self.guess.place_at_torque(geometry, turn, advance, float(torque[0]))
+        for _ in range(10):
+            contact = np.asarray(place - advance)
+            depth, lever = geometry.depth_and_lever(geometry.edge, np.asarray(turn), contact)
+            length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
+            begin = low + int(np.argmax(opening[low : run.high + 1] > turn + TURN_SHARE * length))
+            ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, 3e-4))
+            ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
+            if len(ends) < 4:
+                return place
+            seen, _ = mean_torque(motion, work, ends)
+            middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
+            at = place - 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
+            expected, by_place = self.guess.torque(geometry, middle, at)
+            step = float(by_place @ (seen - expected)) / max(float(by_place @ by_place), 1e-12)
+            place += float(np.clip(step, -2e-4, 2e-4))
+            if abs(step) < 1e-7:
+                break
+        return place
+
+    def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
+        motion = self.motions[index]
+        step = max(length / ELASTIC_SEGMENTS, LEAST_SEGMENT_COUNTS * motion.resolution)
+        ends = split(motion.opening, low, high, step)
+        if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):
+            return
+        torque, late = mean_torque(motion, self.materials[index].work, ends)
+        covariance = torque_covariance(motion, ends, self.noise, self.offset_sd)
+        rest = len(self.rests) - 1
+        self.pieces.append(Piece(kind, rest, index, ends, torque, late, covariance))
+
+    def _stretch(self, run: Run, low: int) -> None:
+        """Running segments; those with a spoilt sample part a stretch in two."""
+        motion, geometry = self.motions[run.motion], self.geometry
+        every = split(motion.opening, low, run.high, RUNNING_RAD)
+        spoilt = np.concatenate([[0], np.cumsum(~motion.usable)])
+        for ends in _parts(every, spoilt):
+            material = self.materials[run.motion]
+            path, work = free_path(motion, material, geometry, ends)
+            turned = np.diff(motion.opening[ends])
+            _, late = mean_torque(motion, material.work, ends)
+            ticks = np.diff(ends).astype(np.float64)
+            self.stretches.append(
+                Stretch(
+                    sheet=self.sheet,
+                    motion=run.motion,
+                    ends=ends,
+                    torque=work / path,
+                    late=late * turned / path,
+                    path=path,
+                    noise=mean_noise(ticks, motion.tick_s, self.noise),
+                    speed=float(np.median(np.abs(turned) / (ticks * motion.tick_s))),
+                    tooth_sd=self.guess.cut_off_tooth(geometry, motion.opening[ends]),
+                )
+            )
+
+
+def free_path(
+    motion: PathMotion, material: Material, geometry: Geometry, ends: Integers
+) -> tuple[Array, Array]:
+    """Path (k,) in rad between samples ``ends`` with the sledge's share, and the work over it.
+
+    A tooth loads by d(delta) = -(lever d(theta) - m t d(advance)) / m, whether blades close or the
+    sledge moves on, so the path of a running crack is d(eta) = d(theta) - (m t / lever) d(advance).
+    What the sledge's part contributes to the sum of torque over that path is torque that the
+    opening's own work does not hold.
+    """
+    low, high = int(ends[0]), int(ends[-1])
+    share = sledge_share(motion, geometry, low, high)
+    moved = np.diff(motion.advance[low : high + 1]) * share
+    path = np.concatenate([[0.0], np.cumsum(np.diff(motion.opening[low : high + 1]) - moved)])
+    torque = material.torque[low : high + 1]
+    extra = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * moved)])
+    at = ends - low
+    return np.diff(path[at]), np.diff(material.work[ends]) - np.diff(extra[at])
+
+
+def sledge_share(motion: PathMotion, geometry: Geometry, low: int, high: int) -> Array:
+    """Opening (rad) that loads a running crack as one metre of advance does, (high - low,)."""
+    knots = np.unique(np.linspace(low, high, max(2, (high - low) // 50 + 2)).astype(np.int64))
+    view = geometry.running(motion.opening[knots])
+    share = geometry.moving_blades * view.slope / view.lever
+    return np.asarray(np.interp(np.arange(low, high), knots, share))
+
+
+def _parts(ends: Integers, spoilt: Integers) -> list[Integers]:
+    good = spoilt[ends[1:] + 1] == spoilt[ends[:-1]]
+    parts: list[Integers] = []
+    begin = 0
+    for index in range(len(good) + 1):
+        if index == len(good) or not good[index]:
+            if index - begin >= FEWEST_SEGMENTS:
+                parts.append(ends[begin : index + 1])
+            begin = index + 1
+    return parts

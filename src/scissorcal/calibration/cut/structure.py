@@ -1,0 +1,125 @@
+"""The discrete choices and the geometry of a cut, and the model that they and parameters make."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.model import Cutting, Edge, EdgeBelief, Response
+from scissorcal.recipe.schema import Recipe
+
+Array = NDArray[np.float64]
+
+
+def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Cutting:
+    """The model of a cut from a fit's structure and parameters by name.
+
+    ``values`` may hold scalars or arrays that broadcast with what the model is evaluated on.
+    Parameters that begin with ``edge_`` take the place of the structure's own of the edge.
+    """
+    return Cutting(
+        edge=edge_from(structure, values),
+        response=response_from(structure, values),
+        moving_blades=structure["moving_blades"],
+        upper_face_m=structure["upper_face_m"],
+        fracture_energy=values.get("fracture_energy"),
+        kappa=values.get("kappa", 1.0),
+        closure=structure["closure"],
+        rate_damping=values.get("rate_damping", 0.0),
+    )
+
+
+def response_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Response:
+    """The response of a fit's structure, with parameters by name."""
+    family, reference = structure["response"], structure["reference_indentation_m"]
+    plain = Response(family, values["response_force"], values["response_exponent"], reference)
+    if family != "spline":
+        return plain
+    knots = tuple(structure["response_knots_m"])
+    steps = [values[f"response_shape_{index}"] for index in range(1, len(knots) - 1)]
+    return replace(plain, shape=np.stack(steps, axis=-1), knots_m=knots)
+
+
+def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:
+    """The edge of a fit's structure, with the parameters among ``values`` that describe it."""
+    edge = Edge(**structure["edge"])
+    named = {name.removeprefix("edge_"): v for name, v in values.items() if _of_edge(name)}
+    if not named:
+        return edge
+    belief = EdgeBelief(edge, tuple(named), np.zeros((len(named), len(named))))
+    return belief.with_values(named)
+
+
+def edge_layout(belief: EdgeBelief) -> Layout:
+    """Parameters of an edge that is believed, with the belief as their prior."""
+    units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
+    sds = np.sqrt(np.diag(belief.covariance))
+    return Layout(
+        tuple(
+            Parameter(
+                f"edge_{name}",
+                units.get(name, "m"),
+                "identity",
+                float(mean),
+                float(sd),
+                "the blade's edge, as photographs or the recipe tell it",
+                believed=True,
+            )
+            for name, mean, sd in zip(belief.names, belief.mean, sds, strict=True)
+        )
+    )
+
+
+def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
+    """A recipe's geometry, with the edge that is believed, as the structure of a cut's fit."""
+    return {
+        "closure": recipe.scene.closure,
+        "reference_indentation_m": recipe.fit.cut.reference_indentation_mm * 1e-3,
+        "moving_blades": recipe.rig.moving_blades,
+        "upper_face_m": recipe.upper_face_m,
+        "edge": {
+            "family": edge.family,
+            "offset_m": float(edge.offset_m),
+            "taper_rad": float(edge.taper_rad),
+            "length_m": edge.length_m,
+            "curvature_per_m": float(edge.curvature_per_m),
+            **({"bend_per_m2": float(edge.bend_per_m2)} if np.any(edge.bend_per_m2) else {}),
+            **(
+                {
+                    "spline_m": tuple(np.asarray(edge.spline_m).tolist()),
+                    "spline_start_m": edge.spline_start_m,
+                }
+                if edge.family == "spline"
+                else {}
+            ),
+        },
+    }
+
+
+def edge_of(recipe: Recipe) -> EdgeBelief:
+    """The edge that a recipe states, with what it says of its uncertainty."""
+    edge = recipe.rig.edge
+    stated = Edge(
+        edge.family,
+        edge.offset_mm * 1e-3,
+        float(np.radians(edge.taper_deg)),
+        edge.length_mm * 1e-3,
+        edge.curvature_per_m,
+    )
+    sds = {
+        "offset_m": edge.offset_sd_mm * 1e-3,
+        "taper_rad": float(np.radians(edge.taper_sd_deg)),
+    }
+    open_ones = {name: sd for name, sd in sds.items() if sd > 0.0}
+    return EdgeBelief(
+        stated,
+        tuple(open_ones),
+        np.diag(np.square(list(open_ones.values()))).reshape(len(open_ones), len(open_ones)),
+    )
+
+
+def _of_edge(name: str) -> bool:
+    return name.startswith("edge_")

@@ -1,0 +1,197 @@
+"""Opening and rate at every sample, smoothed as far as the encoder's steps ask for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.conditioning import pieces_of, sheets_of
+from scissorcal.calibration.sensors import resolution_of
+from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+STRIDES = (1, 2, 4, 8, 16)
+CLEAR = 3.0
+"""The change of torque is measured at the shortest stride at which its differences exceed those
+of the encoder's steps so many times."""
+FINEST_STEP = 1e-7
+"""Encoder step in rad (m) that is assumed where positions show none."""
+HELD = 0.5
+"""Share of a tick by which a torque that follows its command is measured late, less the delay."""
+
+
+@dataclass(frozen=True)
+class PathMotion:
+    """One stretch of a recording without a gap; arrays (n,) by sample.
+
+    ``opening`` (rad) and ``rate`` (rad/s) are smoothed, ``advance`` (m) is as measured. ``drive``
+    (N m) is the mean drive from each sample to the next, had it been measured without delay;
+    ``drive_step`` its change over that tick, by which a delay of one tick would lower it.
+    ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
+    unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor
+    spoilt a sample. ``rate_sd`` is the error of the rate, ``resolution`` the encoder's step.
+    """
+
+    recording: int
+    start: int
+    time_s: Array
+    opening: Array
+    rate: Array
+    advance: Array
+    drive: Array
+    drive_step: Array
+    torque: Array
+    stroke: Integers
+    sheet: Integers
+    usable: Mask
+    tick_s: float
+    inertia: float
+    rate_sd: float
+    resolution: float
+
+
+def path_motion(
+    recordings: tuple[Recording, ...], inertia: float, usable: tuple[Mask, ...] | None = None
+) -> tuple[PathMotion, ...]:
+    """Smooth the motion of recordings, one stretch without a gap after the other.
+
+    ``inertia`` (kg m^2) ties position and drive together: what is unknown is only the torque that
+    neither explains, which is taken as a random walk. The positions that are most probable then
+    follow the measured drive exactly, and the encoder as closely as its steps deserve (a Kalman
+    smoother, Rauch, Tung and Striebel 1965, doi:10.2514/3.3166, solved as one banded system). The
+    walk's size comes from the data: a fine encoder is hardly smoothed, a coarse one much.
+    """
+    found: list[PathMotion] = []
+    offset = 0
+    for index, recording in enumerate(recordings):
+        good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
+        sheets = sheets_of(recording)
+        for low, high in pieces_of(recording):
+            found.append(_piece(recording, index, (low, high), inertia, good, sheets, offset))
+        offset += len(recording.strokes)
+    return tuple(found)
+
+
+def _piece(
+    recording: Recording,
+    index: int,
+    bounds: tuple[int, int],
+    inertia: float,
+    usable: Mask,
+    sheets: Integers,
+    stroke_offset: int,
+) -> PathMotion:
+    part = slice(*bounds)
+    samples, time = recording.samples[part], recording.device_time_s[part]
+    tick_s = float((time[-1] - time[0]) / (len(time) - 1))
+    position = np.asarray(samples["opening"], dtype=np.float64)
+    measured = np.asarray(recording.drive_effort[part], dtype=np.float64)
+    step = np.append(np.diff(measured), 0.0)
+    drive = measured + HELD * step
+    seen = resolution_of(position)
+    resolution = seen if np.isfinite(seen) else FINEST_STEP
+    walk = _torque_walk(position, drive, tick_s, inertia, resolution)
+    smooth = _most_probable(position, drive, tick_s, inertia, resolution, walk)
+    rough = np.zeros_like(position)
+    mean_drive = 0.5 * (drive[1:-1] + drive[:-2])
+    rough[1:-1] = inertia * np.diff(position, 2) / tick_s**2 - mean_drive
+    stroke = np.asarray(samples["stroke"], dtype=np.int64)
+    return PathMotion(
+        recording=index,
+        start=bounds[0],
+        time_s=time,
+        opening=smooth,
+        rate=np.gradient(smooth) / tick_s,
+        advance=np.asarray(samples["advance"], dtype=np.float64),
+        drive=drive,
+        drive_step=step,
+        torque=rough,
+        stroke=np.where(stroke >= 0, stroke + stroke_offset, -1),
+        sheet=sheets[part],
+        usable=usable[part],
+        tick_s=tick_s,
+        inertia=inertia,
+        rate_sd=_rate_sd(tick_s, inertia, resolution, walk),
+        resolution=resolution,
+    )
+
+
+def turning_points(opening: Array, least: float) -> list[int]:
+    """Samples at which the opening turns, leaving out turns that are undone within ``least``."""
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    for index, value in enumerate(opening.tolist()):
+        if direction >= 0 and value > opening[high]:
+            high = index
+        if direction <= 0 and value < opening[low]:
+            low = index
+        if direction >= 0 and value < opening[high] - least:
+            turns.append(high)
+            direction, low = -1, index
+        elif direction <= 0 and value > opening[low] + least:
+            turns.append(low)
+            direction, high = 1, index
+    return turns
+
+
+def _torque_walk(
+    position: Array, drive: Array, tick_s: float, inertia: float, resolution: float
+) -> float:
+    """Standard deviation (N m) by which the unexplained torque changes from sample to sample."""
+    walk = 0.0
+    for stride in STRIDES:
+        places = position[::stride]
+        count = len(places)
+        if count < 16:
+            break
+        mean = np.add.reduceat(drive, np.arange(0, len(drive), stride))[:count] / stride
+        gain = inertia / (stride * tick_s) ** 2
+        change = gain * np.diff(places, 3) - np.diff(0.5 * (mean[1:-1] + mean[:-2]))
+        seen = float(np.mean(change**2))
+        steps = gain**2 * 20.0 * resolution**2 / 12.0
+        walk = float(np.sqrt(max(seen - steps, 0.2 * seen) / stride))
+        if seen > CLEAR * steps:
+            break
+    return max(walk, 1e-12)
+
+
+def _system(
+    count: int, tick_s: float, inertia: float, resolution: float, walk: float
+) -> tuple[Array, Array]:
+    """Banded precision (4, n) of the positions, upper form, and a row of the dynamics (4,)."""
+    row = np.array([-1.0, 3.0, -3.0, 1.0]) * inertia / tick_s**2 / walk
+    band = np.zeros((4, count))
+    for a in range(4):
+        for b in range(a, 4):
+            band[3 - (b - a), b : b + count - 3] += row[a] * row[b]
+    band[3] += 12.0 / resolution**2
+    return band, row
+
+
+def _most_probable(
+    position: Array, drive: Array, tick_s: float, inertia: float, resolution: float, walk: float
+) -> Array:
+    from scipy.linalg import solveh_banded
+
+    band, row = _system(len(position), tick_s, inertia, resolution, walk)
+    known = np.diff(0.5 * (drive[1:-1] + drive[:-2])) / walk
+    right = position * 12.0 / resolution**2
+    for a in range(4):
+        right[a : a + len(known)] += row[a] * known
+    return np.asarray(solveh_banded(band, right))
+
+
+def _rate_sd(
+    tick_s: float, inertia: float, resolution: float, walk: float, count: int = 401
+) -> float:
+    """Error of a smoothed rate far from the ends of a piece."""
+    from scipy.linalg import solveh_banded
+
+    band, _ = _system(count, tick_s, inertia, resolution, walk)
+    weights = np.zeros(count)
+    weights[count // 2 + 1], weights[count // 2 - 1] = 0.5 / tick_s, -0.5 / tick_s
+    return float(np.sqrt(weights @ solveh_banded(band, weights)))

@@ -1,0 +1,124 @@
+"""Work of the material between openings, and how well it is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.path.motion import PathMotion
+from scissorcal.model import FrictionLaw, friction_torque, presliding_state
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+DEFAULT_SLOW_TIME_S = 0.012
+
+
+@dataclass(frozen=True)
+class TorqueNoise:
+    """Noise of the measured drive: white, plus a slow part with an exponential memory.
+
+    Gamma_ij = white^2 delta_ij + slow^2 exp(-|t_i - t_j| / slow_time).
+    """
+
+    white_Nm: float
+    slow_Nm: float
+    slow_time_s: float
+
+
+def torque_noise_of(diagnostics: Mapping[str, Any]) -> TorqueNoise:
+    """The noise that a friction fit measured; its residual as white noise where it did not."""
+    if "noise_white_Nm" in diagnostics:
+        return TorqueNoise(
+            float(diagnostics["noise_white_Nm"]),
+            float(diagnostics["noise_slow_Nm"]),
+            float(diagnostics["noise_slow_time_s"]),
+        )
+    rms = float(diagnostics["residual_rms"])
+    return TorqueNoise(rms, rms, DEFAULT_SLOW_TIME_S)
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the material does to the opening at each sample (n,).
+
+    ``work`` (J) is what it did so far, ``torque`` (N m) what it does now: the former is summed and
+    exact, the latter carries the noise of an acceleration.
+    """
+
+    work: Array
+    torque: Array
+
+
+def material_of(
+    motion: PathMotion,
+    friction: FrictionLaw,
+    offset: float,
+    cogging: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Material:
+    """Work and torque of the material along a motion.
+
+    W = I omega^2 / 2 + sum of (F + offset - cog - drive) d(theta), so that between two samples the
+    material's mean torque over the path is the difference of W over that of the opening. No
+    acceleration enters, and it does not matter how fast the path was gone. ``cogging`` is
+    (cosine, sine, periods per radian) of a motor torque that is not in the measured drive.
+    """
+    path = motion.opening
+    step = np.diff(path)
+    middle = 0.5 * (path[1:] + path[:-1])
+    state = None
+    if np.any(friction.presliding_share):
+        built = presliding_state(path, float(friction.presliding_length))
+        state = 0.5 * (built[1:] + built[:-1])
+    law = friction_torque(friction, middle, step / motion.tick_s, 0.0, state)
+    gone = (law + offset - motion.drive[:-1]) * step
+    work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
+    cosine, sine, per_rad = cogging
+    if per_rad:
+        work = work - (cosine * np.sin(per_rad * path) - sine * np.cos(per_rad * path)) / per_rad
+    torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
+    torque[:-1] += law + offset
+    return Material(np.asarray(work), np.asarray(torque))
+
+
+def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:
+    """Mean torque (k,) between samples ``ends`` (k + 1,), and its fall for one tick of delay."""
+    path = np.diff(motion.opening[ends])
+    late = np.concatenate([[0.0], np.cumsum(motion.drive_step[:-1] * np.diff(motion.opening))])
+    return np.diff(work[ends]) / path, np.diff(late[ends]) / path
+
+
+def torque_covariance(
+    motion: PathMotion, ends: Integers, noise: TorqueNoise, offset_sd: float
+) -> Array:
+    """Covariance (k, k) of the mean torques between samples ``ends`` (k + 1,).
+
+    The drive's noise summed along the path, the rate's error in the kinetic energy at both ends of
+    a segment (shared by neighbours), and an offset that all segments have in common.
+    """
+    low, high = int(ends[0]), int(ends[-1])
+    count = len(ends) - 1
+    step = np.diff(motion.opening[low : high + 1])
+    rows = np.zeros((count, high - low))
+    for k in range(count):
+        inside = slice(int(ends[k]) - low, int(ends[k + 1]) - low)
+        rows[k, inside] = step[inside]
+    times = np.arange(high - low) * motion.tick_s
+    memory = np.exp(-np.abs(times[:, None] - times[None, :]) / noise.slow_time_s)
+    gamma = noise.slow_Nm**2 * memory + noise.white_Nm**2 * np.eye(high - low)
+    covariance = rows @ gamma @ rows.T
+    energy = (motion.inertia * motion.rate[ends] * motion.rate_sd) ** 2
+    energy = energy + (0.5 * motion.inertia * motion.rate_sd**2) ** 2
+    difference = np.eye(count, count + 1, 1) - np.eye(count, count + 1)
+    covariance += (difference * energy) @ difference.T
+    path = np.diff(motion.opening[ends])
+    return np.asarray(covariance / np.outer(path, path) + offset_sd**2)
+
+
+def mean_noise(ticks: Array, tick_s: float, noise: TorqueNoise) -> Array:
+    """Variance of the drive's noise averaged over ``ticks`` samples, same shape."""
+    ratio = ticks * tick_s / noise.slow_time_s
+    kept = 2.0 / ratio * (1.0 - (1.0 - np.exp(-ratio)) / ratio)
+    return np.asarray(noise.white_Nm**2 / ticks + noise.slow_Nm**2 * kept)

@@ -1,0 +1,162 @@
+"""A cut's likelihood in C: arrays in, arrays out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.kernel._kernel import ffi, lib
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int32]
+
+_FRACTURE: Mapping[str, int] = {
+    "none": lib.SC_CUT_PRESSED,
+    "smooth": lib.SC_CUT_SMOOTH,
+    "rippled": lib.SC_CUT_RIPPLED,
+}
+
+
+@dataclass(frozen=True)
+class CutFitData:
+    """Measured segments and their geometry, as ``sc_cut_data`` of sc_cut_fit.h describes them.
+
+    Integer arrays are int32, the others float64, all contiguous; ``edge_count`` is the number of
+    the edge's parameters.
+    """
+
+    moving_blades: float
+    reference_depth: float
+    edge_count: int
+    known_sd: float
+    piece_first: Integers
+    piece_rest: Integers
+    piece_closing: Integers
+    white_first: Integers
+    whitener: Array
+    torque: Array
+    late: Array
+    depth: Array
+    depth_dx: Array
+    lever: Array
+    lever_dx: Array
+    sinking: Array
+    depth_de: Array
+    lever_de: Array
+    rest_known: Integers
+    rest_place: Array
+    rest_at_reference: Array
+    rest_slope: Array
+    rest_de: Array
+    run_first: Integers
+    joined: Integers
+    run_torque: Array
+    run_late: Array
+    run_lever: Array
+    run_lever_dd: Array
+    run_slope: Array
+    run_slope_dd: Array
+    run_lever_de: Array
+    run_slope_de: Array
+    run_sinking: Array
+    run_place: Array
+    run_step: Array
+    run_noise: Array
+    start_noise: Array
+    end_noise: Array
+    line_weight: Array
+    _c: Any = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        struct, keep = ffi.new("sc_cut_data *"), []
+        struct.pieces, struct.rests = len(self.piece_rest), len(self.rest_place)
+        struct.sheets = len(self.run_first) - 1
+        for entry in fields(self):
+            if entry.name == "_c":
+                continue
+            value = getattr(self, entry.name)
+            if isinstance(value, np.ndarray):
+                kind = "int32_t[]" if value.dtype == np.int32 else "double[]"
+                value = ffi.from_buffer(kind, np.ascontiguousarray(value))
+                keep.append(value)
+            setattr(struct, entry.name, value)
+        object.__setattr__(self, "_c", (struct, keep))
+
+    @property
+    def segments(self) -> int:
+        """Elastic and running segments together."""
+        return len(self.torque) + len(self.run_torque)
+
+
+@dataclass(frozen=True)
+class CutFitParameters:
+    """Parameters as ``sc_cut_parameters`` of sc_cut_fit.h describes them; the table's arrays first.
+
+    ``fracture`` is "none", "smooth" or "rippled".
+    """
+
+    first: float
+    step: float
+    log_force: Array
+    force_slope: Array
+    log_energy: Array
+    fracture: str
+    energy: float
+    kappa: float
+    rest_phase: float
+    rest_spread: float
+    variation: float
+    variation_length: float
+    sheet_variation: float
+    offset_closing: float
+    offset_opening: float
+    load: float
+    noise_scale: float
+    damping: float
+    delay: float
+    edge: Array
+
+
+def cut_log_likelihood(
+    data: CutFitData, parameters: CutFitParameters
+) -> tuple[float, Array, Array, Array, Array, float]:
+    """Evaluate: total, terms (n,), residuals (n,) in N m, standardised (n,), places, log period.
+
+    Segments stand in the data's order, elastic ones first. The total is -inf where any number is
+    not finite.
+    """
+    struct, keep = _parameters(parameters)
+    count, rests = data.segments, len(data.rest_place)
+    terms, residuals, scaled = (np.zeros(count) for _ in range(3))
+    places, work = np.zeros(max(rests, 1)), np.zeros(4 * len(data.torque) + 4 * rests + 1)
+    period = ffi.new("double *")
+    total = lib.sc_cut_log_likelihood(
+        data._c[0],
+        struct,
+        *(ffi.from_buffer("double[]", a) for a in (terms, residuals, scaled, places)),
+        period,
+        ffi.from_buffer("double[]", work),
+    )
+    del keep
+    return float(total), terms, residuals, scaled, places[:rests], float(period[0])
+
+
+def _parameters(given: CutFitParameters) -> tuple[Any, list[Any]]:
+    struct = ffi.new("sc_cut_parameters *")
+    arrays = {
+        name: ffi.from_buffer("double[]", np.ascontiguousarray(getattr(given, name)))
+        for name in ("log_force", "force_slope", "log_energy", "edge")
+    }
+    table = struct.response
+    table.size, table.first, table.step = len(given.log_force), given.first, given.step
+    table.log_force, table.force_slope = arrays["log_force"], arrays["force_slope"]
+    table.log_energy = arrays["log_energy"]
+    for entry in fields(given):
+        if entry.name in ("first", "step", "log_force", "force_slope", "log_energy", "edge"):
+            continue
+        value = getattr(given, entry.name)
+        setattr(struct, entry.name, _FRACTURE[value] if entry.name == "fracture" else value)
+    struct.edge = arrays["edge"]
+    return struct, list(arrays.values())
