@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.blade_ladder import EdgeRung, fit_edge_rungs
+from scissorcal.calibration.blade_ladder import EdgeLadder, Progress, climb_edge_ladder
 from scissorcal.calibration.blade_points import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.blade_result import Band, BladeFit, PhotographRow, RungRow
 from scissorcal.errors import InputError
@@ -19,7 +19,7 @@ from scissorcal.vision.blade import BladeMeasurement
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
-ALGORITHM = 2
+ALGORITHM = 3
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 PLACES = 41
@@ -36,6 +36,7 @@ def fit_blade(
     rng: np.random.Generator,
     name: str = "blade",
     length_m: float | None = None,
+    progress: Progress | None = None,
 ) -> BladeFit:
     """Fit one blade's edge to its measurements, one for each photograph.
 
@@ -54,8 +55,7 @@ def fit_blade(
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    rungs, chosen = fit_edge_rungs(cells, length, effort, rng)
-    best = rungs[chosen]
+    best = climb_edge_ladder(cells, length, effort, rng, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -70,7 +70,7 @@ def fit_blade(
         name,
         best.belief,
         best.draws,
-        _rung_rows(rungs, chosen),
+        _rung_rows(best),
         station,
         _band(edges.offset_at(station)),
         _band(np.arctan(edges.slope_at(station))),
@@ -88,18 +88,18 @@ def fit_blade(
     return replace(fit, verdicts=_verdicts(fit))
 
 
-def _rung_rows(rungs: Sequence[EdgeRung], chosen: int) -> tuple[RungRow, ...]:
+def _rung_rows(ladder: EdgeLadder) -> tuple[RungRow, ...]:
     return tuple(
         RungRow(
             rung.family,
             rung.evidence,
-            index == chosen,
+            index == ladder.chosen,
             rung.noise_factor,
             rung.roughness_m,
             rung.roughness_length_m,
             rung.between_m,
         )
-        for index, rung in enumerate(rungs)
+        for index, rung in enumerate(ladder.scores)
     )
 
 
@@ -173,7 +173,7 @@ def _no_height() -> tuple[Array, Array, Band | None]:
 
 
 def _rows(
-    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeRung
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeLadder
 ) -> tuple[PhotographRow, ...]:
     rows = []
     begin = 0
@@ -194,7 +194,7 @@ def _rows(
                 own.spoilt,
                 one.length,
                 float(residual.mean()),
-                float(np.hypot(spread, best.between_m)),
+                float(np.hypot(spread, best.best.between_m)),
                 one.uncertainty,
                 tuple(own.station.tolist()),
                 tuple(residual.tolist()),
@@ -250,7 +250,7 @@ def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -
     return Verdict(scope, check, status, value, threshold, why)
 
 
-def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -> tuple[str, ...]:
+def _notes(measured: Sequence[BladeMeasurement], best: EdgeLadder, metric: bool) -> tuple[str, ...]:
     notes = list(dict.fromkeys(one.uncertainty for one in measured))
     if not metric:
         notes.append(
@@ -261,5 +261,5 @@ def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -
         "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
         "of its length; the rig's opening must count from where the blades' centrelines meet."
     )
-    notes.append(best.status)
+    notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)
