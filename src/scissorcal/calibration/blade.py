@@ -6,11 +6,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.blade_ladder import EdgeLadder, Progress, climb_edge_ladder
+from scissorcal.calibration.blade_ladder import (
+    MOST_EVALUATIONS,
+    EdgeLadder,
+    Progress,
+    climb_edge_ladder,
+)
 from scissorcal.calibration.blade_points import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.blade_result import Band, BladeFit, PhotographRow, RungRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort
+from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Status, Verdict
@@ -25,6 +30,15 @@ ALGORITHM = 3
 PLACES = 41
 MOST_SPOILT = 0.15
 MOST_DISAGREEMENT = 3.5
+MOST_APART = 0.005
+"""Shares of the blade's length by which photographs of one blade may differ."""
+
+UNTRUSTED = (
+    SamplingStatus.HEAVY_WEIGHTS,
+    SamplingStatus.DISAGREEING,
+    SamplingStatus.BUDGET_USED_UP,
+    SamplingStatus.STUCK,
+)
 HEIGHT_DRAWS = 400
 
 
@@ -85,7 +99,7 @@ def fit_blade(
         (),
         _notes(sized, best, metric),
     )
-    return replace(fit, verdicts=_verdicts(fit))
+    return replace(fit, verdicts=_verdicts(fit, best, effort))
 
 
 def _rung_rows(ladder: EdgeLadder) -> tuple[RungRow, ...]:
@@ -203,7 +217,7 @@ def _rows(
     return tuple(rows)
 
 
-def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
+def _verdicts(fit: BladeFit, best: EdgeLadder, effort: Effort) -> tuple[Verdict, ...]:
     scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
     spoilt = max(row.spoilt_share for row in fit.photographs)
     worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
@@ -217,32 +231,56 @@ def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
             f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
         )
     ]
-    if len(fit.photographs) < 2:
+    checks.append(_agreement(fit, scope))
+    if best.status in UNTRUSTED:
         checks.append(
             Verdict(
                 scope,
-                "photographs agree",
-                "not_evaluated",
+                "sizes of the errors",
+                "fail",
                 None,
                 None,
-                "One photograph says nothing on how far others of the same blade would agree.",
-            )
-        )
-    else:
-        spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
-        scale = [max(row.away_sd, spread) for row in fit.photographs]
-        value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-        checks.append(
-            _verdict(
-                scope,
-                "photographs agree",
-                float(value),
-                MOST_DISAGREEMENT,
-                f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
-                f"away; {MOST_DISAGREEMENT:g} are allowed.",
+                f"{best.sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
+                f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
             )
         )
     return tuple(checks)
+
+
+def _agreement(fit: BladeFit, scope: str) -> Verdict:
+    """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
+    check = "photographs agree"
+    if len(fit.photographs) < 2:
+        return Verdict(
+            scope,
+            check,
+            "not_evaluated",
+            None,
+            None,
+            "One photograph says nothing on how far others of the same blade would agree.",
+        )
+    apart = next(rung.between_m for rung in fit.rungs if rung.chosen) / fit.belief.edge.length_m
+    if apart > MOST_APART:
+        return _verdict(
+            scope,
+            check,
+            apart,
+            MOST_APART,
+            f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
+            f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
+            "above where there is no mat.",
+        )
+    spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
+    scale = [max(row.away_sd, spread) for row in fit.photographs]
+    value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
+    return _verdict(
+        scope,
+        check,
+        float(value),
+        MOST_DISAGREEMENT,
+        f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
+        f"away; {MOST_DISAGREEMENT:g} are allowed.",
+    )
 
 
 def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -> Verdict:

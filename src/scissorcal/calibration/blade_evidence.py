@@ -136,7 +136,7 @@ class EdgeEvidence:
         # photographs on the mat agree to micrometres, those of two blades may differ by a tenth
         # of the length: the prior must hold both, or the optimum lies on a bound
         if data.several:
-            rows.append(("between_m", 7e-5 * data.length, 2.0))
+            rows.append(("between_m", 7e-5 * data.length, 1.5))
         if basis.bent is not None:
             rows.append(("bending_per_m", 0.1 / data.length, 2.0))
         self.names = tuple(row[0] for row in rows)

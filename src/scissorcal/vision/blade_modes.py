@@ -78,8 +78,10 @@ def edge_modes(
     still = np.zeros(2)
     rough = GRAIN_SHARE * float(np.median(seen.edge.sd_px))
     along = np.linspace(-1.0, 1.0, len(edge))
-    for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0):
-        rows.append(response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still))
+    rows += [
+        response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still)
+        for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0)
+    ]
     behind = GRAIN_SHARE * float(np.median(seen.back.sd_px))
     rows.append(response.to(0.0 * edge, behind * outward.back, still))
     names += ["grain"] * 4
