@@ -1,15 +1,19 @@
 """A blade in one photograph: measured to a fraction of a pixel, or refused with the reason."""
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
+from scissorcal.vision.blade import measure_blade
+from scissorcal.vision.blade_parts import lone_blade
 from scissorcal.vision.blade_photo import photograph_blade, photograph_scissors
 from scissorcal.vision.blade_picture import NickMark, as_png, blade_picture
+from scissorcal.vision.blade_view import CameraView
 from scissorcal.vision.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
+from scissorcal.vision.marker_corners import linear_light
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
 from tests.vision.blade_scenes import (
@@ -54,6 +58,48 @@ def test_points_know_their_noise_and_the_photograph_its_shared_errors(measured):
     assert {"shared mapping", "mapping", "tone", "grain", "pivot", "centreline"} <= set(named)
     together = np.sqrt(np.sum(one.modes**2, axis=1))
     assert np.median(np.abs(off)) < 2.0 * np.median(np.hypot(together, one.sd))
+
+
+@dataclass(frozen=True)
+class MovedView(CameraView):
+    """The view with its mapping moved, for all that measures through it."""
+
+    moved: tuple[float, ...] = ()
+
+    def to_sheet(self, pixels, values=None):
+        return super().to_sheet(pixels, np.array(self.moved) if values is None else values)
+
+
+def test_a_mode_is_what_measuring_again_gives_without_its_noise(measured):
+    """Each independent error of the mapping in turn moves the view, which measures once more."""
+    photo = measured[True]
+    one, view = photo.measured[0], photo.view
+    light = linear_light(photo.photo.grey)
+    parts = lone_blade(photo.outline, "blade.jpg")
+    columns = [k for k, name in enumerate(one.mode_names) if "mapping" in name]
+    sd = np.sqrt(np.diag(view.covariance))
+    own = len(sd) - view.shared
+    order = [k for k in [*range(own, len(sd)), *range(own)] if sd[k] > 0]
+    unit = np.outer(sd[order], sd[order])
+    correlation = view.covariance[np.ix_(order, order)] / unit + 1e-9 * np.eye(len(order))
+    root = sd[order, None] * np.linalg.cholesky(correlation)
+    assert len(columns) == len(order)
+    held = {field.name: getattr(view, field.name) for field in fields(view)}
+    for column, error in zip(columns, root.T, strict=True):
+        values = view.values.copy()
+        values[order] += error
+        moved = MovedView(**held, moved=tuple(values))
+        again = measure_blade(light, moved, parts, "blade.jpg")
+        low, high = again.station[[0, -1]]
+        s = one.station[(one.station > low) & (one.station < high)]
+        change = np.interp(s, again.station, again.offset) - np.interp(s, one.station, one.offset)
+        mode = np.interp(s, one.station, one.modes[:, column])
+        # a line through each: what single points do is their noise
+        along = np.linspace(-1.0, 1.0, len(s))
+        measured_line, line = np.polyfit(along, change, 1), np.polyfit(along, mode, 1)
+        assert np.abs(measured_line - line).max() < 0.1 * np.abs(line).max() + 3e-7
+    modes = one.modes[:, columns]
+    assert np.abs(np.diff(modes, 2, axis=0)).max() < 0.02 * np.abs(modes).max()
 
 
 def test_without_a_camera_the_uncertainty_is_said(measured):

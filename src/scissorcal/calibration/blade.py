@@ -6,11 +6,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.blade_ladder import EdgeRung, fit_edge_rungs
+from scissorcal.calibration.blade_ladder import (
+    MOST_EVALUATIONS,
+    EdgeLadder,
+    Progress,
+    climb_edge_ladder,
+)
 from scissorcal.calibration.blade_points import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.blade_result import Band, BladeFit, PhotographRow, RungRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort
+from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Status, Verdict
@@ -19,12 +24,21 @@ from scissorcal.vision.blade import BladeMeasurement
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
-ALGORITHM = 2
+ALGORITHM = 3
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 PLACES = 41
 MOST_SPOILT = 0.15
 MOST_DISAGREEMENT = 3.5
+MOST_APART = 0.005
+"""Shares of the blade's length by which photographs of one blade may differ."""
+
+UNTRUSTED = (
+    SamplingStatus.HEAVY_WEIGHTS,
+    SamplingStatus.DISAGREEING,
+    SamplingStatus.BUDGET_USED_UP,
+    SamplingStatus.STUCK,
+)
 HEIGHT_DRAWS = 400
 
 
@@ -36,6 +50,7 @@ def fit_blade(
     rng: np.random.Generator,
     name: str = "blade",
     length_m: float | None = None,
+    progress: Progress | None = None,
 ) -> BladeFit:
     """Fit one blade's edge to its measurements, one for each photograph.
 
@@ -54,8 +69,7 @@ def fit_blade(
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    rungs, chosen = fit_edge_rungs(cells, length, effort, rng)
-    best = rungs[chosen]
+    best = climb_edge_ladder(cells, length, effort, rng, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -70,7 +84,7 @@ def fit_blade(
         name,
         best.belief,
         best.draws,
-        _rung_rows(rungs, chosen),
+        _rung_rows(best),
         station,
         _band(edges.offset_at(station)),
         _band(np.arctan(edges.slope_at(station))),
@@ -85,21 +99,21 @@ def fit_blade(
         (),
         _notes(sized, best, metric),
     )
-    return replace(fit, verdicts=_verdicts(fit))
+    return replace(fit, verdicts=_verdicts(fit, best, effort))
 
 
-def _rung_rows(rungs: Sequence[EdgeRung], chosen: int) -> tuple[RungRow, ...]:
+def _rung_rows(ladder: EdgeLadder) -> tuple[RungRow, ...]:
     return tuple(
         RungRow(
             rung.family,
             rung.evidence,
-            index == chosen,
+            index == ladder.chosen,
             rung.noise_factor,
             rung.roughness_m,
             rung.roughness_length_m,
             rung.between_m,
         )
-        for index, rung in enumerate(rungs)
+        for index, rung in enumerate(ladder.scores)
     )
 
 
@@ -173,7 +187,7 @@ def _no_height() -> tuple[Array, Array, Band | None]:
 
 
 def _rows(
-    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeRung
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeLadder
 ) -> tuple[PhotographRow, ...]:
     rows = []
     begin = 0
@@ -194,7 +208,7 @@ def _rows(
                 own.spoilt,
                 one.length,
                 float(residual.mean()),
-                float(np.hypot(spread, best.between_m)),
+                float(np.hypot(spread, best.best.between_m)),
                 one.uncertainty,
                 tuple(own.station.tolist()),
                 tuple(residual.tolist()),
@@ -203,7 +217,7 @@ def _rows(
     return tuple(rows)
 
 
-def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
+def _verdicts(fit: BladeFit, best: EdgeLadder, effort: Effort) -> tuple[Verdict, ...]:
     scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
     spoilt = max(row.spoilt_share for row in fit.photographs)
     worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
@@ -217,32 +231,56 @@ def _verdicts(fit: BladeFit) -> tuple[Verdict, ...]:
             f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
         )
     ]
-    if len(fit.photographs) < 2:
+    checks.append(_agreement(fit, scope))
+    if best.status in UNTRUSTED:
         checks.append(
             Verdict(
                 scope,
-                "photographs agree",
-                "not_evaluated",
+                "sizes of the errors",
+                "fail",
                 None,
                 None,
-                "One photograph says nothing on how far others of the same blade would agree.",
-            )
-        )
-    else:
-        spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
-        scale = [max(row.away_sd, spread) for row in fit.photographs]
-        value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-        checks.append(
-            _verdict(
-                scope,
-                "photographs agree",
-                float(value),
-                MOST_DISAGREEMENT,
-                f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
-                f"away; {MOST_DISAGREEMENT:g} are allowed.",
+                f"{best.sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
+                f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
             )
         )
     return tuple(checks)
+
+
+def _agreement(fit: BladeFit, scope: str) -> Verdict:
+    """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
+    check = "photographs agree"
+    if len(fit.photographs) < 2:
+        return Verdict(
+            scope,
+            check,
+            "not_evaluated",
+            None,
+            None,
+            "One photograph says nothing on how far others of the same blade would agree.",
+        )
+    apart = next(rung.between_m for rung in fit.rungs if rung.chosen) / fit.belief.edge.length_m
+    if apart > MOST_APART:
+        return _verdict(
+            scope,
+            check,
+            apart,
+            MOST_APART,
+            f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
+            f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
+            "above where there is no mat.",
+        )
+    spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
+    scale = [max(row.away_sd, spread) for row in fit.photographs]
+    value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
+    return _verdict(
+        scope,
+        check,
+        float(value),
+        MOST_DISAGREEMENT,
+        f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
+        f"away; {MOST_DISAGREEMENT:g} are allowed.",
+    )
 
 
 def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -> Verdict:
@@ -250,7 +288,7 @@ def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -
     return Verdict(scope, check, status, value, threshold, why)
 
 
-def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -> tuple[str, ...]:
+def _notes(measured: Sequence[BladeMeasurement], best: EdgeLadder, metric: bool) -> tuple[str, ...]:
     notes = list(dict.fromkeys(one.uncertainty for one in measured))
     if not metric:
         notes.append(
@@ -261,5 +299,5 @@ def _notes(measured: Sequence[BladeMeasurement], best: EdgeRung, metric: bool) -
         "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
         "of its length; the rig's opening must count from where the blades' centrelines meet."
     )
-    notes.append(best.status)
+    notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)

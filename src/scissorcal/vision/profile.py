@@ -80,16 +80,20 @@ def _best_path(gain: Array) -> NDArray[np.int64]:
     """Columns (n,) of the path down ``gain`` (n, m) with the largest sum, steps of at most one."""
     rows, columns = gain.shape
     came = np.zeros((rows, columns), dtype=np.int64)
-    total = gain[0].copy()
     index = np.arange(columns)
+    # one place more on either side, from which no path comes
+    total = np.full(columns + 2, -np.inf)
+    total[1:-1] = gain[0]
+    choices = np.empty((3, columns))
     for row in range(1, rows):
-        padded = np.pad(total, 1, constant_values=-np.inf)
-        choices = np.stack([padded[:-2] - _SHIFT_COST, total, padded[2:] - _SHIFT_COST])
+        np.subtract(total[:-2], _SHIFT_COST, out=choices[0])
+        choices[1] = total[1:-1]
+        np.subtract(total[2:], _SHIFT_COST, out=choices[2])
         taken = choices.argmax(axis=0)
         came[row] = index + taken - 1
-        total = choices[taken, index] + gain[row]
+        np.add(choices[taken, index], gain[row], out=total[1:-1])
     path = np.empty(rows, dtype=np.int64)
-    path[-1] = int(np.argmax(total))
+    path[-1] = int(np.argmax(total[1:-1]))
     for row in range(rows - 1, 0, -1):
         path[row - 1] = came[row, path[row]]
     return path
@@ -110,8 +114,9 @@ def crossings(light: Light, points: Array, normals: Array, reach: float) -> Cros
     model, J = _model(state, u)
     cost = np.sum((profile - model) ** 2, axis=1)
     for _ in range(_STEPS):
-        gradient = np.einsum("nmk,nm->nk", J, profile - model)
-        normal = np.einsum("nmk,nml->nkl", J, J)
+        across = J.transpose(0, 2, 1)
+        gradient = (across @ (profile - model)[..., None])[..., 0]
+        normal = across @ J
         diagonal = np.einsum("nkk->nk", normal)
         lifted = normal + np.eye(6) * (damping[:, None] * diagonal + 1e-12)[:, None, :]
         step = np.linalg.solve(lifted, gradient[..., None])[..., 0]

@@ -251,9 +251,16 @@ def _fits(
         )
     fits = []
     for index, (name, measured) in enumerate(sides.items()):
-        tell(0.6 + 0.4 * index / len(sides), f"fitting the edge ({name})")
         rng = np.random.default_rng([seed, 3, index])
-        fits.append(fit_blade(measured, recipe, effort=effort, rng=rng, name=name, length_m=known))
+
+        def told(done: float, sentence: str, index: int = index, name: str = name) -> None:
+            tell(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
+
+        fits.append(
+            fit_blade(
+                measured, recipe, effort=effort, rng=rng, name=name, length_m=known, progress=told
+            )
+        )
     return tuple(fits)
 
 
