@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.squares import descend, has_squares
 from scissorcal.inference.status import NotFiniteError, SearchStatus, named
 
 Array = NDArray[np.float64]
@@ -149,6 +150,10 @@ class _Climb:
 def _begin(problem: Problem, start: Array) -> _Climb:
     point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
     value = problem.log_posterior(point)
+    if np.isfinite(value) and has_squares(problem):
+        descent = descend(problem, point)
+        used = descent.evaluations + 1
+        return _Climb(descent.point, descent.value, descent.promised, descent.root, used)
     root = _rounding(problem, point) if np.isfinite(value) else np.diag(problem.prior_sd)
     return _Climb(point, value, np.inf, root, 1 + 2 * len(point))
 
