@@ -18,6 +18,7 @@ DATA = Path(__file__).parents[2].parent / "shared" / "data"
 NIST = DATA / "nist_strd"
 POSTERIORDB = DATA / "posteriordb"
 
+
 def _peaks(b: Array, x: Array) -> Array:
     """An exponential and two bells, the law of Gauss1 to Gauss3."""
     decay = b[0] * np.exp(-b[1] * x)

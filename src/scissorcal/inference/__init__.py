@@ -2,6 +2,7 @@
 
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
+from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import infer
 from scissorcal.inference.information import likelihood_information
@@ -14,6 +15,7 @@ from scissorcal.inference.tails import log_density, tails_of
 __all__ = [
     "ArNoise",
     "Cluster",
+    "Counter",
     "Effort",
     "NotFiniteError",
     "Optimum",
@@ -21,6 +23,7 @@ __all__ = [
     "Problem",
     "SamplingStatus",
     "SearchStatus",
+    "Stop",
     "find_optimum",
     "fit_ar",
     "gradient",
