@@ -4,7 +4,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -133,27 +133,6 @@ def nist_problem(name: str, data: Certified, start: Array) -> Problem:
         upper=begin + 1e4 * scale,
         standardised=standardised,
         independent=True,
-    )
-
-
-def in_logarithms(problem: Problem) -> Problem:
-    """The same with the logarithms of all (positive) parameters as parameters, each 3 wide."""
-
-    def natural(u: Array) -> Array:
-        return np.append(np.exp(u[:-1]), u[-1])
-
-    start = np.append(np.log(problem.starts[0, :-1]), problem.starts[0, -1])
-    scale = np.full(len(start), 3.0)
-    normal = problem.standardised
-    assert normal is not None
-    return replace(
-        problem,
-        standardised=lambda u: normal(natural(u)),
-        log_likelihood_terms=lambda u: problem.log_likelihood_terms(natural(u)),
-        prior_sd=scale,
-        starts=start[None],
-        lower=start - 8 * scale,
-        upper=start + 8 * scale,
     )
 
 

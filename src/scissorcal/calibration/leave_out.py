@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference import Problem
+from scissorcal.inference import Counter, Problem
 
 Array = NDArray[np.float64]
 
@@ -25,12 +25,15 @@ al. 2024, JMLR 25:72, section 3.2.4)."""
 class LeftOut:
     """Log density (strokes,) of each stroke without it, and the tail index k-hat of its weights.
 
+    ``evaluations`` counts those of the likelihood.
+
     Densities count all bins in full; who compares them multiplies by the share of bins that are
     independent.
     """
 
     scores: Array
     k_hats: Array
+    evaluations: int = 0
 
     @property
     def reliable(self) -> NDArray[np.bool_]:
@@ -60,6 +63,8 @@ def leave_strokes_out(
     """
     from scipy.special import logsumexp
 
+    counter = Counter()
+    problem = counter.over(problem)
     tried: list[tuple[float, Array, Array]] = []
     centre, covariance = point, _inverse(share * information + prior_precision)
     for _ in range(ROUNDS):
@@ -79,10 +84,12 @@ def leave_strokes_out(
         away = draws[usable] - centre
         covariance = (shares * away.T) @ away + 1e-3 * covariance
     if not tried:
-        return LeftOut(np.full(len(labelled), np.nan), np.full(len(labelled), np.inf))
+        nothing = np.full(len(labelled), np.nan), np.full(len(labelled), np.inf)
+        return LeftOut(*nothing, counter.calls)
     _, every, tempered = min(tried, key=lambda one: one[0])
     weights, k_hats = _smoothed((every[:, None] - tempered).T)
-    return LeftOut(np.asarray(logsumexp(weights + tempered.T, axis=1)) / share, k_hats)
+    scores = np.asarray(logsumexp(weights + tempered.T, axis=1)) / share
+    return LeftOut(scores, k_hats, counter.calls)
 
 
 def _inverse(precision: Array) -> Array:
