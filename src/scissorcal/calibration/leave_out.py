@@ -1,13 +1,11 @@
 """Log density of each stroke by a posterior that has not seen it, by importance sampling."""
 
-import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference import Counter, Problem
+from scissorcal.inference import Counter, Problem, smooth_weights
 
 Array = NDArray[np.float64]
 
@@ -130,11 +128,5 @@ def _around(centre: Array, covariance: Array) -> tuple[Array, Array]:
 
 def _smoothed(log_ratio: Array) -> tuple[Array, Array]:
     """Pareto-smoothed normalised log weights (strokes, draws) and k-hats (strokes,)."""
-    with warnings.catch_warnings():
-        # Once a day ArviZ announces its next major version, which this project does not use.
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-
-    smooth: Any = arviz.psislw
-    weights, k_hats = smooth(log_ratio)
-    return np.asarray(weights), np.atleast_1d(np.asarray(k_hats, dtype=np.float64))
+    weights, k_hats = smooth_weights(log_ratio)
+    return weights, np.atleast_1d(k_hats)

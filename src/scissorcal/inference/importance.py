@@ -1,14 +1,13 @@
 """Importance sampling around optima, Pareto-smoothed, with its own check."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.mixture import Mixture, fit_mixture, wide_mixture
+from scissorcal.inference.pareto import smooth_weights
 
 Array = NDArray[np.float64]
 Many = Callable[[Array], Array]
@@ -157,16 +156,10 @@ def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Ge
 
 
 def _weigh(draws: Array, log_ratio: Array) -> Sampled:
-    with warnings.catch_warnings():
-        # Once a day ArviZ announces its next major version, which this project does not use.
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:
         return Sampled(draws, np.full(len(draws), 1 / len(draws)), np.inf, 0.0, len(draws))
-    smooth: Any = arviz.psislw
-    smoothed, k_hat = smooth(log_ratio[usable])
+    smoothed, k_hat = smooth_weights(log_ratio[usable])
     weights = np.zeros(len(draws))
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()

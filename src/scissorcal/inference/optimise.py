@@ -243,7 +243,9 @@ def _beside_axes(problem: Problem, climb: _Climb) -> tuple[Array, Array | None]:
     lost = climb.value - heights.reshape(2, -1).T
     for axis, side in np.argwhere(np.abs(lost) < SETTLED):
         reach = axes[axis] * (2 * side - 1)
-        while np.abs(lost[axis, side]) < SETTLED and np.any(np.abs(reach) < problem.prior_sd):
+        while np.abs(lost[axis, side]) < SETTLED and (
+            np.linalg.norm(reach / problem.prior_sd) < FARTHEST_LOOK
+        ):
             reach = reach * 10.0
             there = problem.log_posterior(_inside(problem, climb.point + reach))
             lost[axis, side] = climb.value - there
