@@ -30,6 +30,10 @@ ROUNDS_BEFORE_CHOICE = 2
 HOPELESS = 20.0
 """A start this much log-posterior below the best one after its first rounds is given up."""
 
+ROUGH = 0.05
+"""Climb promised by differences a standard deviation long from which a likelihood counts as rough,
+where short differences promise none; skewness of a smooth one stays below."""
+
 RESTARTS = 3
 """Searches begun anew from a higher point that was seen beside a supposed optimum."""
 
@@ -201,15 +205,22 @@ def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Cli
     Without squares there is no gradient to go by, and in a bent valley a round may gain nothing far
     from its end: such an end counts only where a search from a point beside it comes no higher.
     """
-    lost = np.zeros((0, 2))
+    lost, polished = np.zeros((0, 2)), False
     for _ in range(RESTARTS + 1):
         lost, higher = _beside_axes(problem, climb)
         used_up = stop is not None and stop()
         if higher is not None and not used_up:
             climb = _climb(problem, _begin(problem, higher, stop), ROUNDS, stop)
             continue
-        if used_up or climb.gained >= SETTLED or has_squares(problem):
+        if used_up or climb.gained >= SETTLED:
             break
+        if has_squares(problem):
+            if polished or _promised_from_afar(lost) < ROUGH:
+                break
+            polished = True
+            rough = replace(climb, gained=np.inf, root=_rounding(problem, climb.point))
+            climb = _climb(problem, rough, ROUNDS, stop)
+            continue
         again = _climb(problem, _begin(problem, _perturbed(problem, climb), stop), 1, stop)
         if again.value < climb.value + SETTLED:
             break
@@ -217,6 +228,14 @@ def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Cli
         if climb.gained < SETTLED:
             climb = replace(climb, gained=np.inf)
     return climb, lost
+
+
+def _promised_from_afar(lost: Array) -> float:
+    """Climb that a Newton step promises by what is lost a standard deviation beside, (axes, 2)."""
+    known = lost[np.all(np.isfinite(lost), axis=1)]
+    slope = 0.5 * (known[:, 0] - known[:, 1])
+    curvature = np.maximum(known.sum(axis=1), 1.0)
+    return float(0.5 * np.sum(slope**2 / curvature))
 
 
 def _perturbed(problem: Problem, climb: _Climb) -> Array:
