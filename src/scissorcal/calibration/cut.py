@@ -16,11 +16,12 @@ from scissorcal.calibration.cut_ladder import climb_cut_ladder, cut_design, cut_
 from scissorcal.calibration.cut_layout import CutLaw
 from scissorcal.calibration.cut_motion import CutMotion, cut_motion
 from scissorcal.calibration.cut_toughness import with_toughness
+from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import choose
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
-from scissorcal.inference import infer
+from scissorcal.inference import Stop, infer
 from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
@@ -51,6 +52,8 @@ def fit_cut(
     edge: EdgeBelief | None = None,
     edge_verdicts: tuple[Verdict, ...] = (),
     checkpoint: Path | None = None,
+    last_chosen: str | None = None,
+    stop: Stop | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses).
 
@@ -62,15 +65,20 @@ def fit_cut(
 
     ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
     friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
-    interrupted goes on. Raises InputError where the blades hardly touched the material.
+    interrupted goes on. ``last_chosen`` is the law that draft effort fits where the recipe leaves
+    several, ``stop`` says whether the time allowed is used up. Raises InputError where the blades
+    hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
     belief = edge or edge_of(recipe)
     prior = FrictionPrior.of(friction)
     motion = _motion(recordings, recipe, belief)
     _refuse_no_contact(motion, prior, recordings)
-    designs = cut_designs(motion, prior, recipe, belief)
-    climbed = climb_cut_ladder(designs, lambda done, sentence: tell(0.5 * done, f"cut: {sentence}"))
+    laws = cut_designs(motion, prior, recipe, belief)
+    designs = list(candidates_for(effort, laws, last_chosen))
+    climbed = climb_cut_ladder(
+        designs, lambda done, sentence: tell(0.5 * done, f"cut: {sentence}"), stop
+    )
     chosen = choose(climbed)
     design = next(one for one in designs if one.name == chosen.rung.name)
     tell(0.5, f"cut: inferring {chosen.rung.name}")
@@ -82,6 +90,7 @@ def fit_cut(
         optimum=chosen.optimum,
         budget=STANDARD_BUDGET if effort == "standard" else None,
         checkpoint=checkpoint,
+        stop=stop,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
     u = chosen.optimum.point
@@ -109,6 +118,7 @@ def fit_cut(
         rng=rng,
         critic=recipe.fit.cut.critic,
         extra_verdicts=(_foundations(friction, edge_verdicts),),
+        extra_notes=draft_note(effort, laws, designs),
     )
     return with_toughness(fit, recipe, rng)
 
