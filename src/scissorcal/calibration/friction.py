@@ -36,8 +36,11 @@ LAWS = (
     "stribeck+angle+presliding",
     "stribeck+angle+load+presliding",
 )
-DRAFT_LAW = "stribeck + angle, asymmetric"
-"""What draft effort fits where nothing says otherwise: all that a rig of scissors has shown."""
+DRAFT_LAWS = {
+    "rotary": "stribeck + angle, asymmetric",
+    "linear": "coulomb + viscous, symmetric",
+}
+"""What draft effort fits to a joint where nothing says otherwise."""
 
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
@@ -84,7 +87,7 @@ def fit_friction(
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
     every_law = _ladder(windows, strokes, settings, joint)
-    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAW))
+    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     climbed: list[Climbed] = []
     for index, candidate in enumerate(ladder):
         tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")

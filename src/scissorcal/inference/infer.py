@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
 from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
-from scissorcal.inference.laplace import Laplace, laplace, local_covariance, polish
+from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SamplingStatus, named
+from scissorcal.inference.status import SamplingStatus, SearchStatus, named
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 Array = NDArray[np.float64]
@@ -25,6 +25,10 @@ BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
 MIXTURE_ROUNDS = 5
+LEAST_HELD = 1e-4
+"""Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
+a normal prior alone gives one."""
+
 RIVAL = 12.0
 """Optima this far below the highest one still get a share of the draws."""
 
@@ -73,6 +77,7 @@ def infer(
     best = optimum or find_optimum(problem, stop=stop)
     tell(0.3, "measuring the curvature")
     best, shape = polish(counted, best)
+    best = _held(problem, best, shape)
     worth = (
         None if problem.independent else long_run_covariance(counted, shape.scores, shape.slopes)
     )
@@ -114,6 +119,19 @@ def infer(
         noise_orders=worth.orders if worth else (),
         dispersion=worth.dispersion if worth else 1.0,
     )
+
+
+def _held(problem: Problem, best: Optimum, shape: Shape) -> Optimum:
+    """Say of an optimum that neither data nor prior hold it, where its curvature shows that."""
+    unit = np.outer(problem.prior_sd, problem.prior_sd)
+    values, vectors = np.linalg.eigh((shape.information + shape.curvature_prior) * unit)
+    loose = values < LEAST_HELD
+    if not best.success or not np.any(loose):
+        return best
+    concerned = named(problem.names, np.asarray(np.any(vectors[:, loose] ** 2 > 0.1, axis=1)))
+    status = SearchStatus.PLATEAU
+    sentence = f"{status.value} It concerns {concerned}."
+    return replace(best, status=status, success=False, sentence=sentence)
 
 
 def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
