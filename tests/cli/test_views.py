@@ -38,9 +38,9 @@ def test_lines_are_printed_now_and_then(
 def test_work_far_beyond_its_limit_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([0.0, 50.0, 50.0, 95.0, 95.0])
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: next(clock))
-    with pytest.raises(VerdictError, match="1 min 0 s.* 40 % .*blade.*--max-minutes"):
-        with progress(limit_s=60.0) as tell:
-            tell(0.3, "reading")
+    with progress(limit_s=60.0) as tell:
+        tell(0.3, "reading")
+        with pytest.raises(VerdictError, match=r"1 min 0 s.* 40 % .*blade.*--max-minutes"):
             tell(0.4, "blade: searching")
 
 
