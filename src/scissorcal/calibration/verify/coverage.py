@@ -38,7 +38,7 @@ def judge_coverage(
 
     >>> found = judge_coverage({"force": {0.5: 150, 0.9: 250}}, 300)
     >>> [(row.level, round(row.low, 2), round(row.high, 2), row.inside) for row in found]
-    [(0.5, 0.43, 0.57, True), (0.9, 0.86, 0.94, False)]
+    [(0.5, 0.44, 0.56, True), (0.9, 0.86, 0.94, False)]
     """
     rows = [(name, level, count) for name, by in held.items() for level, count in by.items()]
     if not rows or fits < 1 or any(not 0 <= count <= fits for _, _, count in rows):
