@@ -87,15 +87,7 @@ def infer(
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
     run = _Run(problem.names, local, proposal, counter, rng, count, tell)
-    try:
-        if effort == "draft":
-            found = run.draft(problem)
-        elif effort == "standard":
-            found = run.standard(budget or BUDGET[effort], escalate, checkpoint)
-        else:
-            found = run.thorough(budget or BUDGET[effort], checkpoint)
-    except TimeUsedUpError:
-        found = run.out_of_time(problem)
+    found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     tell(1.0, found.sentence)
     return Posterior(
         names=problem.names,
@@ -177,6 +169,23 @@ class _Run:
     rng: np.random.Generator
     count: int
     tell: Progress
+
+    def at(
+        self,
+        effort: Effort,
+        problem: Problem,
+        budget: int,
+        escalate: bool,
+        checkpoint: Path | None,
+    ) -> _Found:
+        try:
+            if effort == "draft":
+                return self.draft(problem)
+            if effort == "standard":
+                return self.standard(budget, escalate, checkpoint)
+            return self.thorough(budget, checkpoint)
+        except TimeUsedUpError:
+            return self.out_of_time(problem)
 
     def draft(self, problem: Problem) -> _Found:
         draws = self.rng.multivariate_normal(
