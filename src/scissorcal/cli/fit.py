@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration import FittedParameter
     from scissorcal.workday.fits import FitOutcome
 
-GRACE = 3.0
+GRACE_S = 180.0
 """A fit that stops at its limit still measures curvature and scores; it is ended by force later."""
 
 EffortWord = Literal["draft", "standard", "thorough"]
@@ -134,7 +134,7 @@ def _fits(
     from scissorcal.workday.fits import fit_workspace
 
     ends_s = time.monotonic() + limit_s
-    with progress(limit_s, grace=GRACE) as tell:
+    with progress(limit_s, grace_s=GRACE_S) as tell:
         outcomes = fit_workspace(
             open_workspace(folder),
             wanted,

@@ -21,12 +21,12 @@ _LEAST_DONE = 0.03
 
 
 @contextmanager
-def progress(limit_s: float | None = None, grace: float = 1.0) -> Iterator[Progress]:
+def progress(limit_s: float | None = None, grace_s: float = 0.0) -> Iterator[Progress]:
     """Give a callback ``(done from 0 to 1, sentence)`` that shows how far the work has come.
 
     The time that it took so far stands behind the sentence, with the time left at the same pace.
-    Where ``limit_s`` is given, work that goes on beyond ``grace`` times that ends with a VerdictError
-    at its next call; give more grace to work that keeps to the limit by itself and needs to finish.
+    Where ``limit_s`` is given, work that goes on for ``grace_s`` longer ends with a VerdictError at
+    its next call; grace is for work that keeps to the limit by itself and then needs to finish.
 
     >>> with progress() as tell:  # doctest: +SKIP
     ...     tell(0.5, "fitting friction")
@@ -37,7 +37,7 @@ def progress(limit_s: float | None = None, grace: float = 1.0) -> Iterator[Progr
     def told(show: Progress) -> Progress:
         def tell(done: float, sentence: str) -> None:
             elapsed_s = time.monotonic() - began_s
-            if limit_s is not None and elapsed_s > grace * limit_s and done < 1.0:
+            if limit_s is not None and elapsed_s > limit_s + grace_s and done < 1.0:
                 raise VerdictError(
                     f"The time allowed ({time_words(limit_s)}) was used up at {100 * done:.0f} % "
                     f"of the work ({sentence}), and nothing was stored: allow more with "
