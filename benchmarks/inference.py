@@ -1,6 +1,6 @@
 """What each rung of effort costs: effective samples per second, optimum and Hessian included.
 
-    python benchmarks/inference.py [--case stribeck|sblri] [--data ../shared/data] [--seed 0]
+    python benchmarks/inference.py [--case stribeck|sblri|nist] [--data ../shared/data] [--seed 0]
 
 One log-posterior at a time is given to every rung of the ladder, to the rung that integrates what
 is linear, to emcee's default (32 walkers, stretch moves) and, where the extra `bench` is
@@ -12,10 +12,17 @@ come before. Errors are the largest over parameters
 against a long run of ensembles: of the mean in standard deviations, of the standard deviation, and
 of any correlation. NUTS counts gradients, the others log-posteriors; its compilation is given
 beside.
+
+The case `nist` searches every regression of NIST StRD that lies in the folder, from both of its
+starts: matching digits of the polished optimum, evaluations of the search, and what it said. Of 26
+sets (all but Nelson), 52 searches: 52 are solved to four digits, in 55 to 6,514 evaluations, half
+of them in 150 at most; BOBYQA alone solved 39, in 97 to 2,675, and took two ends on a plateau for
+settled.
 """
 
 import argparse
 import json
+import sys
 import time
 import warnings
 import zipfile
@@ -75,13 +82,15 @@ class Clock:
 def main() -> None:
     """Run one case or both and print a table each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--case", choices=("stribeck", "sblri", "both"), default="both")
+    parser.add_argument("--case", choices=("stribeck", "sblri", "nist", "both"), default="both")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     bulk_ess(np.random.default_rng(0).standard_normal((4, 100, 1)))
     if arguments.case in ("stribeck", "both"):
         run(stribeck(np.random.default_rng(arguments.seed)), arguments.seed)
+    if arguments.case == "nist":
+        nist_table(arguments.data / "nist_strd")
     archive = arguments.data / "posteriordb" / "sblri.json.zip"
     if arguments.case in ("sblri", "both"):
         if archive.is_file():
@@ -119,6 +128,34 @@ def run(case: Case, seed: int) -> None:
             f"{rate} | "
             f"{away:.3f} sd | {ratio:.1%} | {apart:.3f} | {row.remark} |"
         )
+
+
+def nist_table(folder: Path) -> None:
+    """Search every set of NIST StRD in a folder from both starts, and print what became of it."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from tests.inference import reference
+
+    reference.NIST = folder
+    print("| set | start | digits | evaluations | in all | status | sampling |")
+    print("|---|---|---|---|---|---|---|")
+    searched = []
+    for name in (name for name in reference.NIST_LAWS if (folder / f"{name}.dat").is_file()):
+        data = reference.nist(name)
+        for index, start in enumerate(data.starts):
+            problem = reference.nist_problem(name, data, start)
+            found = infer(problem, "draft", np.random.default_rng(0))
+            values = found.optimum.point[:-1]
+            digits = -np.log10(np.maximum(np.abs(values / data.values - 1), 1e-11)).min()
+            searched.append((digits > 4.0, found.optimum.evaluations))
+            print(
+                f"| {name} | {index + 1} | {digits:.1f} | {found.optimum.evaluations} | "
+                f"{found.evaluations} | {found.optimum.status.name} | {found.status.name} |"
+            )
+    counts = [evaluations for solved, evaluations in searched if solved]
+    print(
+        f"{len(counts)} of {len(searched)} solved in {min(counts)} to {max(counts)} evaluations, "
+        f"half of them in {np.median(counts):.0f} at most"
+    )
 
 
 def rung(problem: Problem, effort: Any, seed: int) -> Row:

@@ -47,10 +47,31 @@ def test_every_parameter_is_recovered_within_four_standard_deviations(fitted):
 
 
 def test_the_ladder_does_not_climb_higher_than_the_data(recording):
-    found = fit_friction((recording,), FitFriction(), effort="draft", rng=np.random.default_rng(3))
+    settings = FitFriction(critic=False)
+    found = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(3))
     assert found.rung.startswith("coulomb + viscous")
     assert [row["name"] for row in found.rungs if row["chosen"]] == [found.rung]
     assert len(found.rungs) == 10
+    assert found.diagnostics["evaluations"] > 10 * 50
+
+
+def test_draft_fits_the_law_that_was_chosen_last(recording):
+    found = fit_friction(
+        (recording,),
+        FitFriction(),
+        effort="draft",
+        rng=np.random.default_rng(3),
+        last_chosen="coulomb + viscous, asymmetric",
+    )
+    assert [row["name"] for row in found.rungs] == ["coulomb + viscous, asymmetric"]
+    assert any("Draft effort fitted one law of 10" in note for note in found.notes)
+
+
+def test_a_fit_that_runs_out_of_time_is_no_calibration(recording):
+    rng = np.random.default_rng(3)
+    found = fit_friction((recording,), SIMPLE, effort="standard", rng=rng, stop=lambda: True)
+    failed = {verdict.check for verdict in found.rejected}
+    assert {"optimum", "k-hat"} <= failed
 
 
 def test_draft_says_that_its_intervals_are_unchecked(recording):

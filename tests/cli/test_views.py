@@ -6,13 +6,14 @@ from scissorcal.cli import progress as progress_module
 from scissorcal.cli.live_view import LiveView
 from scissorcal.cli.progress import progress
 from scissorcal.device.coverage import CoverageGrid
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, VerdictError
 
 
 def test_lines_are_printed_now_and_then(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = iter([0.0, 3.0, 4.0, 5.0, 6.0, 11.0])
+    looks = (0.0, *(second for second in (0.0, 3.0, 4.0, 5.0, 6.0, 11.0) for _ in range(2)))
+    clock = iter(looks)
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: next(clock))
     with progress() as tell:
         for done, sentence in (
@@ -27,11 +28,20 @@ def test_lines_are_printed_now_and_then(
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.splitlines() == [
-        "  0 %  reading",
-        " 50 %  fitting",
-        " 70 %  judging",
-        "100 %  judging",
+        "  0 %  reading (0 s)",
+        " 50 %  fitting (4 s, about 4 s left)",
+        " 70 %  judging (6 s, about 3 s left)",
+        "100 %  judging (11 s)",
     ]
+
+
+def test_work_far_beyond_its_limit_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 50.0, 50.0, 95.0, 95.0])
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: next(clock))
+    with progress(limit_s=60.0) as tell:
+        tell(0.3, "reading")
+        with pytest.raises(VerdictError, match=r"1 min 0 s.* 40 % .*blade.*--max-minutes"):
+            tell(0.4, "blade: searching")
 
 
 def test_a_capture_says_what_it_covers(capsys: pytest.CaptureFixture[str]) -> None:

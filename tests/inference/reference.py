@@ -4,7 +4,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +18,61 @@ DATA = Path(__file__).parents[2].parent / "shared" / "data"
 NIST = DATA / "nist_strd"
 POSTERIORDB = DATA / "posteriordb"
 
+
+def _peaks(b: Array, x: Array) -> Array:
+    """An exponential and two bells, the law of Gauss1 to Gauss3."""
+    decay = b[0] * np.exp(-b[1] * x)
+    first = b[2] * np.exp(-((x - b[3]) ** 2) / b[4] ** 2)
+    return decay + first + b[5] * np.exp(-((x - b[6]) ** 2) / b[7] ** 2)
+
+
+def _waves(b: Array, x: Array) -> Array:
+    """A year's wave and two of unknown period, the law of ENSO."""
+    year, first, second = (2 * np.pi * x / period for period in (12.0, b[3], b[6]))
+    known = b[0] + b[1] * np.cos(year) + b[2] * np.sin(year)
+    known = known + b[4] * np.cos(first) + b[5] * np.sin(first)
+    return known + b[7] * np.cos(second) + b[8] * np.sin(second)
+
+
+def _cubic_ratio(b: Array, x: Array) -> Array:
+    """Cubic over cubic, the law of Hahn1 and Thurber."""
+    above = b[0] + x * (b[1] + x * (b[2] + x * b[3]))
+    return above / (1 + x * (b[4] + x * (b[5] + x * b[6])))
+
+
+def _three_decays(b: Array, x: Array) -> Array:
+    """The law of Lanczos1 to Lanczos3."""
+    first, second = b[0] * np.exp(-b[1] * x), b[2] * np.exp(-b[3] * x)
+    return first + second + b[4] * np.exp(-b[5] * x)
+
+
 NIST_LAWS: dict[str, Callable[[Array, Array], Array]] = {
+    "Bennett5": lambda b, x: b[0] * (b[1] + x) ** (-1 / b[2]),
     "BoxBOD": lambda b, x: b[0] * (1 - np.exp(-b[1] * x)),
+    "Chwirut1": lambda b, x: np.exp(-b[0] * x) / (b[1] + b[2] * x),
     "Chwirut2": lambda b, x: np.exp(-b[0] * x) / (b[1] + b[2] * x),
     "DanWood": lambda b, x: b[0] * x ** b[1],
+    "ENSO": _waves,
     "Eckerle4": lambda b, x: (b[0] / b[1]) * np.exp(-0.5 * ((x - b[2]) / b[1]) ** 2),
+    "Gauss1": _peaks,
+    "Gauss2": _peaks,
+    "Gauss3": _peaks,
+    "Hahn1": _cubic_ratio,
+    "Kirby2": lambda b, x: (b[0] + x * (b[1] + x * b[2])) / (1 + x * (b[3] + x * b[4])),
+    "Lanczos1": _three_decays,
+    "Lanczos2": _three_decays,
+    "Lanczos3": _three_decays,
     "MGH09": lambda b, x: b[0] * (x**2 + x * b[1]) / (x**2 + x * b[2] + b[3]),
+    "MGH10": lambda b, x: b[0] * np.exp(b[1] / (x + b[2])),
+    "MGH17": lambda b, x: b[0] + b[1] * np.exp(-x * b[3]) + b[2] * np.exp(-x * b[4]),
     "Misra1a": lambda b, x: b[0] * (1 - np.exp(-b[1] * x)),
+    "Misra1b": lambda b, x: b[0] * (1 - (1 + b[1] * x / 2) ** -2),
+    "Misra1c": lambda b, x: b[0] * (1 - (1 + 2 * b[1] * x) ** -0.5),
+    "Misra1d": lambda b, x: b[0] * b[1] * x / (1 + b[1] * x),
     "Rat42": lambda b, x: b[0] / (1 + np.exp(b[1] - b[2] * x)),
-    "Thurber": lambda b, x: (
-        (b[0] + x * (b[1] + x * (b[2] + x * b[3]))) / (1 + x * (b[4] + x * (b[5] + x * b[6])))
-    ),
+    "Rat43": lambda b, x: b[0] / (1 + np.exp(b[1] - b[2] * x)) ** (1 / b[3]),
+    "Roszman1": lambda b, x: b[0] - b[1] * x - np.arctan(b[2] / (x - b[3])) / np.pi,
+    "Thurber": _cubic_ratio,
 }
 
 
@@ -44,12 +88,12 @@ class Certified:
 
 
 def nist(name: str) -> Certified:
-    """Read one of the eight files."""
+    """Read one of the files."""
     lines = (NIST / f"{name}.dat").read_text(encoding="ascii").splitlines()
     rows = [
         [float(number) for number in line.split("=")[1].split()]
         for line in lines
-        if re.match(r"\s*b\d+ =", line)
+        if re.match(r"\s*b\d+ *=", line)
     ]
     table = np.array(rows)
     begin = max(i for i, line in enumerate(lines) if line.startswith("Data:")) + 1
@@ -89,27 +133,6 @@ def nist_problem(name: str, data: Certified, start: Array) -> Problem:
         upper=begin + 1e4 * scale,
         standardised=standardised,
         independent=True,
-    )
-
-
-def in_logarithms(problem: Problem) -> Problem:
-    """The same with the logarithms of all (positive) parameters as parameters, each 3 wide."""
-
-    def natural(u: Array) -> Array:
-        return np.append(np.exp(u[:-1]), u[-1])
-
-    start = np.append(np.log(problem.starts[0, :-1]), problem.starts[0, -1])
-    scale = np.full(len(start), 3.0)
-    normal = problem.standardised
-    assert normal is not None
-    return replace(
-        problem,
-        standardised=lambda u: normal(natural(u)),
-        log_likelihood_terms=lambda u: problem.log_likelihood_terms(natural(u)),
-        prior_sd=scale,
-        starts=start[None],
-        lower=start - 8 * scale,
-        upper=start + 8 * scale,
     )
 
 

@@ -94,7 +94,7 @@ def test_linear_draws_have_the_conditional_mean_and_covariance() -> None:
     )
 
 
-def test_both_ways_give_one_posterior_and_the_closed_form_takes_fewer_evaluations() -> None:
+def test_both_ways_give_one_posterior() -> None:
     linear, full = decay(np.random.default_rng(0))
     short = infer_linear(linear, "standard", np.random.default_rng(3), count=6000)
     long = infer(full, "standard", np.random.default_rng(4), count=6000)
@@ -109,8 +109,6 @@ def test_both_ways_give_one_posterior_and_the_closed_form_takes_fewer_evaluation
     )
     gaps = [short.log_posterior(u) - long.log_posterior(u) for u in long.draws[:20]]
     assert np.ptp(gaps) < 1e-8
-    searched = [found.optimum.evaluations for found in (short, long)]
-    assert searched[0] < searched[1]
 
 
 def test_a_design_that_overflows_is_impossible_rather_than_an_error() -> None:

@@ -63,7 +63,8 @@ def assemble(
     natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     series = _series(chosen, posterior, bins, strokes, measured, contact)
-    diagnostics = _diagnostics(chosen, posterior, bins, measured)
+    rungs = rung_table(climbed, chosen)
+    diagnostics = _diagnostics(climbed, chosen, posterior, bins, measured)
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, load, joint, rng)
@@ -81,7 +82,7 @@ def assemble(
         map_point=layout.columns(chosen.optimum.point)[wanted],
         series=series,
         held_out=held_out,
-        rungs=rung_table(climbed, chosen),
+        rungs=rungs,
         diagnostics=diagnostics,
         verdicts=(*trust, *extra_verdicts),
         effort_unit=joint.effort_unit,
@@ -106,15 +107,18 @@ def assemble(
 
 
 def _diagnostics(
-    chosen: Climbed, posterior: Posterior, bins: Bins, measured: Array
+    climbed: list[Climbed], chosen: Climbed, posterior: Posterior, bins: Bins, measured: Array
 ) -> dict[str, Any]:
+    """Plain numbers and strings; ``evaluations`` are those of the whole ladder and of sampling."""
     likelihood, point = chosen.rung.likelihood, chosen.optimum.point
     white = ljung_box(likelihood.standardised(point), bins.series)
     residuals = likelihood.residuals(point)
     return {
         "k_hat": posterior.k_hat,
         "effective_samples": posterior.effective,
-        "evaluations": chosen.optimum.evaluations,
+        "evaluations": sum(candidate.evaluations for candidate in climbed)
+        + posterior.evaluations
+        - posterior.optimum.evaluations,
         "observations": len(residuals),
         "independent_share": white.share,
         "whiteness_p": white.p_value,

@@ -13,7 +13,7 @@ from scissorcal.calibration.cut_layout import CutLaw, material_layout
 from scissorcal.calibration.cut_motion import CutMotion
 from scissorcal.calibration.ladder import Climbed, Rung, climb
 from scissorcal.calibration.layout import Layout
-from scissorcal.inference import find_optimum
+from scissorcal.inference import Stop, find_optimum
 from scissorcal.model import EdgeBelief, edge_height
 from scissorcal.recipe.schema import Recipe
 
@@ -81,7 +81,9 @@ def cut_design(
     )
 
 
-def climb_cut_ladder(designs: list[CutExperiment], progress: Progress) -> list[Climbed]:
+def climb_cut_ladder(
+    designs: list[CutExperiment], progress: Progress, stop: Stop | None = None
+) -> list[Climbed]:
     """Fit every law to its own data; each begins where the law nearest to it ended."""
     climbed: list[Climbed] = []
     for index, design in enumerate(designs):
@@ -89,7 +91,7 @@ def climb_cut_ladder(designs: list[CutExperiment], progress: Progress) -> list[C
         neighbour = _nearest(design, climbed)
         rung = design.rung(design.observed)
         begun = _with_kappas(_from_neighbour(rung, neighbour) if neighbour else rung, neighbour)
-        climbed.append(climb(begun, design.series, design.strokes))
+        climbed.append(climb(begun, design.series, design.strokes, stop))
     return climbed
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.friction_experiment import FrictionExperiment, design
 from scissorcal.calibration.friction_layout import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
@@ -18,7 +19,7 @@ from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.windows import Windows, next_cutoff, weigh
 from scissorcal.errors import InputError
-from scissorcal.inference import Posterior, find_optimum, infer, tails_of
+from scissorcal.inference import Posterior, Stop, find_optimum, infer, tails_of
 from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
@@ -35,6 +36,12 @@ LAWS = (
     "stribeck+angle+presliding",
     "stribeck+angle+load+presliding",
 )
+DRAFT_LAWS = {
+    "rotary": "stribeck + angle, asymmetric",
+    "linear": "coulomb + viscous, symmetric",
+}
+"""What draft effort fits to a joint where nothing says otherwise."""
+
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
 place of normal noise; milder tails are left to the widening by the scores."""
@@ -51,6 +58,8 @@ def fit_friction(
     rng: np.random.Generator,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
+    last_chosen: str | None = None,
+    stop: Stop | None = None,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -65,6 +74,8 @@ def fit_friction(
 
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
     InputError where the recordings hold too little motion, and says what is missing.
+    ``last_chosen`` is the law that draft effort fits where the recipe leaves several; ``stop`` says
+    whether the time allowed is used up.
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
@@ -75,11 +86,12 @@ def fit_friction(
     _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
-    ladder = _ladder(windows, strokes, settings, joint)
+    every_law = _ladder(windows, strokes, settings, joint)
+    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     climbed: list[Climbed] = []
     for index, candidate in enumerate(ladder):
         tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
-        climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes))
+        climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes, stop))
     chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
     chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
     law = next(design for design in ladder if design.name == chosen.rung.name)
@@ -90,6 +102,7 @@ def fit_friction(
         rng,
         checkpoint=checkpoint,
         optimum=chosen.optimum,
+        stop=stop,
         progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
     )
     return assemble(
@@ -115,7 +128,11 @@ def fit_friction(
             _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
             sensors.verdict,
         ),
-        extra_notes=(*sensors.notes, *_notes(every, windows, posterior, joint)),
+        extra_notes=(
+            *sensors.notes,
+            *_notes(every, windows, posterior, joint),
+            *draft_note(effort, every_law, ladder),
+        ),
     )
 
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
+    Counter,
     Optimum,
     Problem,
+    Stop,
     find_optimum,
     gradient,
     likelihood_information,
@@ -127,6 +129,7 @@ class Climbed:
     likelihood's at the optimum, ``share`` the share of bins that are independent.
     ``series`` and ``strokes`` (n,) label the bins. ``alike`` names the rungs, its own among them,
     that cannot be told from the best one; :func:`choose` fills it in for the rung that it takes.
+    ``climbing`` counts the evaluations of :func:`climb`.
     """
 
     rung: Rung
@@ -139,6 +142,13 @@ class Climbed:
     series: Integers
     strokes: Integers
     alike: tuple[str, ...] = ()
+    climbing: int = 0
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the likelihood so far: search, scores, and strokes left out."""
+        left_out = self.__dict__.get("left_out")
+        return self.climbing + (left_out.evaluations if left_out is not None else 0)
 
     @cached_property
     def left_out(self) -> LeftOut:
@@ -164,16 +174,17 @@ class Climbed:
         return float(np.sqrt(np.nanmean(self.held_out_residuals**2)))
 
 
-def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
+def climb(rung: Rung, series: Integers, strokes: Integers, stop: Stop | None = None) -> Climbed:
     """Fit one rung to all bins, and judge it on strokes that it has not seen.
 
     ``series`` and ``strokes`` (n,) label bins. Whole strokes are held out, a quarter at a time,
     never single bins, because neighbours share their errors. The fit without them is reached
     from the full one by a Newton step (the approximate cross-validation of Beirami et al. 2017,
-    arXiv:1711.05305).
+    arXiv:1711.05305). ``stop`` says whether the time allowed for the search is used up.
     """
-    problem = rung.problem(series)
-    optimum = find_optimum(problem)
+    counter = Counter()
+    problem = counter.over(rung.problem(series))
+    optimum = find_optimum(problem, stop=stop)
     point = optimum.point
     white = ljung_box(rung.likelihood.standardised(point), series)
     step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
@@ -181,7 +192,7 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
     labels = np.unique(strokes)
     labelled = tuple(strokes == label for label in labels)
     folds = [np.isin(strokes, fold) for fold in split_strokes(labels)]
-    points = _without(rung, problem, point, folds, information, step)
+    points = _without(rung, problem, point, folds, information, step, counter)
     residuals = np.full(len(series), np.nan)
     densities = np.full(len(series), np.nan)
     for unseen, reached in zip(folds, points, strict=True):
@@ -197,6 +208,7 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
         share=white.share,
         series=series,
         strokes=strokes,
+        climbing=counter.calls,
     )
 
 
@@ -213,6 +225,7 @@ def _without(
     folds: list[NDArray[np.bool_]],
     information: Array,
     step: Array,
+    counter: Counter,
 ) -> list[Array]:
     """Optima without each fold's bins, one Newton step away from the full optimum."""
     if len(folds) < 2:
@@ -226,7 +239,8 @@ def _without(
         slope = scores[~unseen].sum(axis=0) + slope_prior
         values, vectors = np.linalg.eigh(precision)
         move = vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max()))
-        reached.append(_step_uphill(rung.problem(problem.series, ~unseen), point, move))
+        others = counter.over(rung.problem(problem.series, ~unseen))
+        reached.append(_step_uphill(others, point, move))
     return reached
 
 

@@ -1,13 +1,11 @@
 """Log density of each stroke by a posterior that has not seen it, by importance sampling."""
 
-import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference import Problem
+from scissorcal.inference import Counter, Problem, smooth_weights
 
 Array = NDArray[np.float64]
 
@@ -25,12 +23,15 @@ al. 2024, JMLR 25:72, section 3.2.4)."""
 class LeftOut:
     """Log density (strokes,) of each stroke without it, and the tail index k-hat of its weights.
 
+    ``evaluations`` counts those of the likelihood.
+
     Densities count all bins in full; who compares them multiplies by the share of bins that are
     independent.
     """
 
     scores: Array
     k_hats: Array
+    evaluations: int = 0
 
     @property
     def reliable(self) -> NDArray[np.bool_]:
@@ -60,6 +61,8 @@ def leave_strokes_out(
     """
     from scipy.special import logsumexp
 
+    counter = Counter()
+    problem = counter.over(problem)
     tried: list[tuple[float, Array, Array]] = []
     centre, covariance = point, _inverse(share * information + prior_precision)
     for _ in range(ROUNDS):
@@ -79,10 +82,12 @@ def leave_strokes_out(
         away = draws[usable] - centre
         covariance = (shares * away.T) @ away + 1e-3 * covariance
     if not tried:
-        return LeftOut(np.full(len(labelled), np.nan), np.full(len(labelled), np.inf))
+        nothing = np.full(len(labelled), np.nan), np.full(len(labelled), np.inf)
+        return LeftOut(*nothing, counter.calls)
     _, every, tempered = min(tried, key=lambda one: one[0])
     weights, k_hats = _smoothed((every[:, None] - tempered).T)
-    return LeftOut(np.asarray(logsumexp(weights + tempered.T, axis=1)) / share, k_hats)
+    scores = np.asarray(logsumexp(weights + tempered.T, axis=1)) / share
+    return LeftOut(scores, k_hats, counter.calls)
 
 
 def _inverse(precision: Array) -> Array:
@@ -123,11 +128,5 @@ def _around(centre: Array, covariance: Array) -> tuple[Array, Array]:
 
 def _smoothed(log_ratio: Array) -> tuple[Array, Array]:
     """Pareto-smoothed normalised log weights (strokes, draws) and k-hats (strokes,)."""
-    with warnings.catch_warnings():
-        # Once a day ArviZ announces its next major version, which this project does not use.
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-
-    smooth: Any = arviz.psislw
-    weights, k_hats = smooth(log_ratio)
-    return np.asarray(weights), np.atleast_1d(np.asarray(k_hats, dtype=np.float64))
+    weights, k_hats = smooth_weights(log_ratio)
+    return weights, np.atleast_1d(k_hats)

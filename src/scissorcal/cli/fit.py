@@ -1,5 +1,6 @@
 """``scissorcal fit``"""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +14,9 @@ from scissorcal.cli.progress import progress
 if TYPE_CHECKING:
     from scissorcal.calibration import FittedParameter
     from scissorcal.workday.fits import FitOutcome
+
+GRACE_S = 180.0
+"""A fit that stops at its limit still measures curvature and scores; it is ended by force later."""
 
 EffortWord = Literal["draft", "standard", "thorough"]
 
@@ -29,6 +33,13 @@ EffortWord = Literal["draft", "standard", "thorough"]
     "goes on where it was interrupted. The recipe's if not given.",
 )
 @click.option("--force", is_flag=True, help="Fit again even where nothing changed.")
+@click.option(
+    "--max-minutes",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="Time after which each fit ends with what it has, and says that it is not finished.",
+)
 @seed_option
 @workspace_option
 @command
@@ -36,13 +47,15 @@ def fit(
     what: Literal["friction", "cut", "camera", "blade", "plate", "all"],
     effort: EffortWord | None,
     force: bool,
+    max_minutes: float,
     seed: int,
     folder: Path | None,
 ) -> Answer:
     """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
 
     A fit whose recordings, photographs and settings have not changed is not done again. Camera
-    and plate have one effort.
+    and plate have one effort. How long it took and the time left are shown; no fit goes on for
+    more than --max-minutes (a stage that is under way is brought to its end).
 
     \b
     Example:
@@ -55,31 +68,44 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
+    limit_s = 60.0 * max_minutes
     if what == "camera" or what == "blade" or what == "plate":
-        return _geometry(what, folder, effort=effort, seed=seed, force=force)
+        return _geometry(what, folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
     if what == "all":
         from scissorcal.recipe.requirements import requirements
 
         needed = requirements(open_workspace(folder).recipe()).geometry
         before = [
-            (item.name, _geometry(item.name, folder, effort=effort, seed=seed, force=force))
+            (
+                item.name,
+                _geometry(
+                    item.name, folder, effort=effort, seed=seed, force=force, limit_s=limit_s
+                ),
+            )
             for item in needed
         ]
-        return _together(before, _fits((), folder, effort=effort, seed=seed, force=force))
-    return _fits((what,), folder, effort=effort, seed=seed, force=force)
+        last = _fits((), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
+        return _together(before, last)
+    return _fits((what,), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
 
 
 def _geometry(
-    what: str, folder: Path | None, *, effort: EffortWord | None, seed: int, force: bool
+    what: str,
+    folder: Path | None,
+    *,
+    effort: EffortWord | None,
+    seed: int,
+    force: bool,
+    limit_s: float,
 ) -> Answer:
     if what == "camera":
         from scissorcal.cli.fit_camera import fit_camera
 
-        return fit_camera(folder, seed=seed, force=force)
+        return fit_camera(folder, seed=seed, force=force, limit_s=limit_s)
     if what == "blade":
         from scissorcal.cli.fit_blade import fit_blade
 
-        return fit_blade(folder, effort=effort, seed=seed, force=force)
+        return fit_blade(folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
     from scissorcal.cli.fit_plate import fit_plate
 
     return fit_plate(folder, force=force)
@@ -103,12 +129,20 @@ def _fits(
     effort: EffortWord | None,
     seed: int,
     force: bool,
+    limit_s: float,
 ) -> Answer:
     from scissorcal.workday.fits import fit_workspace
 
-    with progress() as tell:
+    ends_s = time.monotonic() + limit_s
+    with progress(limit_s, grace_s=GRACE_S) as tell:
         outcomes = fit_workspace(
-            open_workspace(folder), wanted, effort=effort, seed=seed, force=force, progress=tell
+            open_workspace(folder),
+            wanted,
+            effort=effort,
+            seed=seed,
+            force=force,
+            progress=tell,
+            stop=lambda: time.monotonic() > ends_s,
         )
     fits = [
         {

@@ -18,12 +18,13 @@ def fit_blade(
     effort: Literal["draft", "standard", "thorough"] | None,
     seed: int,
     force: bool,
+    limit_s: float | None = None,
 ) -> Answer:
     """Fit a workspace's blade, where its photographs changed, and say what its edge is."""
     from scissorcal.calibration.blade_result import blade_facts
     from scissorcal.workday.blades import fit_workspace_blade
 
-    with progress() as tell:
+    with progress(limit_s) as tell:
         outcome = fit_workspace_blade(
             open_workspace(folder), effort=effort, seed=seed, force=force, progress=tell
         )

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
 _WORST = 3
 
 
-def fit_camera(folder: Path | None, *, seed: int, force: bool) -> Answer:
+def fit_camera(
+    folder: Path | None, *, seed: int, force: bool, limit_s: float | None = None
+) -> Answer:
     """Fit a workspace's camera, where its photographs changed, and say how well it is known."""
     from scissorcal.workday.cameras import fit_workspace_camera
 
     workspace = open_workspace(folder)
-    with progress() as tell:
+    with progress(limit_s) as tell:
         outcome = fit_workspace_camera(workspace, seed=seed, force=force, progress=tell)
     files = () if outcome.cached else (outcome.path, *outcome.pictures)
     return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 
 import click
 
+from scissorcal.errors import VerdictError
+
 Progress = Callable[[float, str], None]
 
 _LINE_EVERY_S = 5.0
@@ -14,31 +16,72 @@ _NEW_SENTENCE_AFTER_S = 2.0
 _LINES_APART_S = 1.0
 
 
+_LEAST_DONE = 0.03
+"""Share of the work below which nothing is said of the time left."""
+
+
 @contextmanager
-def progress() -> Iterator[Progress]:
+def progress(limit_s: float | None = None, grace_s: float = 0.0) -> Iterator[Progress]:
     """Give a callback ``(done from 0 to 1, sentence)`` that shows how far the work has come.
+
+    The time that it took so far stands behind the sentence, with the time left at the same pace.
+    Where ``limit_s`` is given, work that goes on for ``grace_s`` longer ends with a VerdictError at
+    its next call; grace is for work that keeps to the limit by itself and then needs to finish.
 
     >>> with progress() as tell:  # doctest: +SKIP
     ...     tell(0.5, "fitting friction")
-     50 %  fitting friction
+     50 %  fitting friction (12 s, about 12 s left)
     """
+    began_s = time.monotonic()
+
+    def told(show: Progress) -> Progress:
+        def tell(done: float, sentence: str) -> None:
+            elapsed_s = time.monotonic() - began_s
+            if limit_s is not None and elapsed_s > limit_s + grace_s and done < 1.0:
+                raise VerdictError(
+                    f"The time allowed ({time_words(limit_s)}) was used up at {100 * done:.0f} % "
+                    f"of the work ({sentence}), and nothing was stored: allow more with "
+                    "--max-minutes, use --effort draft, or give it less data."
+                )
+            show(done, f"{sentence} ({pace(done, elapsed_s)})")
+
+        return tell
+
     if sys.stderr.isatty():
-        with _bar() as tell:
-            yield tell
+        with _bar() as show:
+            yield told(show)
     else:
-        yield _Lines()
+        yield told(_Lines())
+
+
+def pace(done: float, elapsed_s: float) -> str:
+    """Say how long work took so far, and how long the rest takes at that pace.
+
+    >>> pace(0.25, 20.0)
+    '20 s, about 1 min 0 s left'
+    >>> pace(0.01, 2.0)
+    '2 s'
+    """
+    if not _LEAST_DONE <= done < 1.0:
+        return time_words(elapsed_s)
+    return f"{time_words(elapsed_s)}, about {time_words(elapsed_s * (1.0 - done) / done)} left"
+
+
+def time_words(seconds: float) -> str:
+    """Seconds as people say them: 42 s, 3 min 5 s."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
 @contextmanager
 def _bar() -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
     from rich.progress import Progress as RichProgress
 
     columns = (
         BarColumn(bar_width=30),
         TaskProgressColumn(),
-        TimeElapsedColumn(),
         TextColumn("{task.description}", markup=False),
     )
     with RichProgress(*columns, console=Console(stderr=True), transient=True) as bar:
@@ -55,8 +98,9 @@ class _Lines:
 
     def __call__(self, done: float, sentence: str) -> None:
         now = time.monotonic()
-        wait = _LINE_EVERY_S if sentence == self._last else _NEW_SENTENCE_AFTER_S
+        stage = sentence.rpartition(" (")[0]
+        wait = _LINE_EVERY_S if stage == self._last else _NEW_SENTENCE_AFTER_S
         if now - self._printed_s < wait:
             return
-        self._last, self._printed_s = sentence, now
+        self._last, self._printed_s = stage, now
         click.echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)

@@ -2,10 +2,12 @@
 
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
+from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import infer
 from scissorcal.inference.information import likelihood_information
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum, scattered_starts
+from scissorcal.inference.pareto import smooth_weights
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
@@ -14,6 +16,7 @@ from scissorcal.inference.tails import log_density, tails_of
 __all__ = [
     "ArNoise",
     "Cluster",
+    "Counter",
     "Effort",
     "NotFiniteError",
     "Optimum",
@@ -21,6 +24,7 @@ __all__ = [
     "Problem",
     "SamplingStatus",
     "SearchStatus",
+    "Stop",
     "find_optimum",
     "fit_ar",
     "gradient",
@@ -32,5 +36,6 @@ __all__ = [
     "natural_step",
     "robust_covariance_of_scores",
     "scattered_starts",
+    "smooth_weights",
     "tails_of",
 ]

@@ -24,10 +24,19 @@ def gradient(function: Callable[[Array], Array], point: Array, step: Array) -> A
     return np.stack(columns, axis=-1)
 
 
-def hessian(function: Callable[[Array], float], point: Array, step: Array) -> Array:
-    """Second derivatives of a scalar function, shape (p, p), of fourth order in ``step`` (p,)."""
-    wide = _hessian_once(function, point, step)
-    near = _hessian_once(function, point, step / 2)
+def hessian(
+    function: Callable[[Array], float],
+    point: Array,
+    step: Array,
+    many: Callable[[Array], Array] | None = None,
+) -> Array:
+    """Second derivatives of a scalar function, shape (p, p), of fourth order in ``step`` (p,).
+
+    ``many`` gives the function at points (k, p) at once, shape (k,), where that is cheaper.
+    """
+    every = many or (lambda points: np.array([function(u) for u in points]))
+    wide = _hessian_once(every, point, step)
+    near = _hessian_once(every, point, step / 2)
     return (4 * near - wide) / 3
 
 
@@ -58,21 +67,17 @@ def natural_step(
     return steps
 
 
-def _hessian_once(function: Callable[[Array], float], point: Array, step: Array) -> Array:
+def _hessian_once(many: Callable[[Array], Array], point: Array, step: Array) -> Array:
     size = len(point)
-    centre = function(point)
-    single = np.zeros((size, 2))
-    result = np.zeros((size, size))
-    for i in range(size):
-        reach = np.zeros(size)
-        reach[i] = step[i]
-        single[i] = function(point + reach), function(point - reach)
-        result[i, i] = (single[i].sum() - 2 * centre) / step[i] ** 2
-    for i in range(size):
-        for j in range(i):
-            reach = np.zeros(size)
-            reach[i], reach[j] = step[i], step[j]
-            both = function(point + reach) + function(point - reach)
-            mixed = both - single[i].sum() - single[j].sum() + 2 * centre
-            result[i, j] = result[j, i] = mixed / (2 * step[i] * step[j])
+    reach = np.diag(step)
+    pairs = [(i, j) for i in range(size) for j in range(i)]
+    both = [reach[i] + reach[j] for i, j in pairs]
+    away = np.vstack([np.zeros((1, size)), reach, *([both] if both else [])])
+    values = many(np.vstack([point + away, point - away[1:]]))
+    centre, sums = values[0], values[1 : len(away)] + values[len(away) :]
+    single = sums[:size]
+    result = np.diag((single - 2 * centre) / step**2)
+    for (i, j), sum_both in zip(pairs, sums[size:], strict=True):
+        mixed = sum_both - single[i] - single[j] + 2 * centre
+        result[i, j] = result[j, i] = mixed / (2 * step[i] * step[j])
     return result

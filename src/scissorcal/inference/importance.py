@@ -1,16 +1,16 @@
 """Importance sampling around optima, Pareto-smoothed, with its own check."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.mixture import Mixture, fit_mixture, wide_mixture
+from scissorcal.inference.pareto import smooth_weights
 
 Array = NDArray[np.float64]
+Many = Callable[[Array], Array]
 
 K_HAT_LIMIT = 0.7
 """k-hat below which weights of a proposal made without draws can be trusted."""
@@ -64,9 +64,11 @@ def sample_by_importance(
     count: int,
     rng: np.random.Generator,
     rounds: int | None = None,
+    many: Many | None = None,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.
 
+    ``many`` gives the log-posterior of draws (n, p) at once, shape (n,), where that is cheaper.
     Draws come from a mixture of multivariate Student-t (7 degrees of freedom), one for each known
     optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat exceeds 0.5
     the proposal is moved to the mean and covariance of the weighted draws, ``rounds`` times at
@@ -74,7 +76,8 @@ def sample_by_importance(
     learnt from few effective draws at first: four and one for every four of them if not given.
     """
     rounds = 4 + proposal.centres.shape[1] // 4 if rounds is None else rounds
-    first = _once(log_posterior, proposal, count, rng)
+    log_posteriors = many or _one_by_one(log_posterior)
+    first = _once(log_posteriors, proposal, count, rng)
     if first.k_hat <= GOOD_K or rounds < 2:
         return first
     components = len(proposal.weights)
@@ -82,7 +85,7 @@ def sample_by_importance(
     def refit(sampled: Sampled) -> Mixture:
         return fit_mixture(sampled.draws, sampled.weights, components, rng)
 
-    adapted = _adapted(log_posterior, first, refit, count, rng, rounds - 1, GOOD_K)
+    adapted = _adapted(log_posteriors, first, refit, count, rng, rounds - 1, GOOD_K)
     if first.trusted and not adapted.trusted:
         return replace(first, evaluations=adapted.evaluations)
     return adapted
@@ -95,6 +98,7 @@ def sample_by_mixture(
     count: int,
     rng: np.random.Generator,
     rounds: int,
+    many: Many | None = None,
 ) -> Sampled:
     """Sample a posterior that one Student-t does not fit, from a mixture of several.
 
@@ -109,11 +113,12 @@ def sample_by_mixture(
         fitted = fit_mixture(sampled.draws, sampled.weights, COMPONENTS, rng)
         return wide_mixture(fitted, WIDER).joined(guard, DEFENSIVE)
 
-    return _adapted(log_posterior, first, refit, count, rng, rounds, GOOD_MIXTURE_K)
+    log_posteriors = many or _one_by_one(log_posterior)
+    return _adapted(log_posteriors, first, refit, count, rng, rounds, GOOD_MIXTURE_K)
 
 
 def _adapted(
-    log_posterior: Callable[[Array], float],
+    log_posteriors: Many,
     first: Sampled,
     refit: Callable[[Sampled], Mixture],
     count: int,
@@ -130,36 +135,31 @@ def _adapted(
     chosen = refit(first)
     proposal = chosen
     for _ in range(rounds):
-        sampled = _once(log_posterior, proposal, count, rng)
+        sampled = _once(log_posteriors, proposal, count, rng)
         used += count
         if sampled.k_hat < lowest:
             lowest, chosen = sampled.k_hat, proposal
         if sampled.k_hat <= good:
             break
         proposal = refit(sampled)
-    fresh = _once(log_posterior, chosen, 2 * count, rng)
+    fresh = _once(log_posteriors, chosen, 2 * count, rng)
     return replace(fresh, evaluations=used + 2 * count, limit=ADAPTED_LIMIT)
 
 
-def _once(
-    log_posterior: Callable[[Array], float], proposal: Mixture, count: int, rng: np.random.Generator
-) -> Sampled:
+def _one_by_one(log_posterior: Callable[[Array], float]) -> Many:
+    return lambda draws: np.array([log_posterior(draw) for draw in draws])
+
+
+def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Generator) -> Sampled:
     draws = proposal.draw(count, rng)
-    log_target = np.array([log_posterior(draw) for draw in draws])
-    return _weigh(draws, log_target - proposal.log_density(draws))
+    return _weigh(draws, log_posteriors(draws) - proposal.log_density(draws))
 
 
 def _weigh(draws: Array, log_ratio: Array) -> Sampled:
-    with warnings.catch_warnings():
-        # Once a day ArviZ announces its next major version, which this project does not use.
-        warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:
         return Sampled(draws, np.full(len(draws), 1 / len(draws)), np.inf, 0.0, len(draws))
-    smooth: Any = arviz.psislw
-    smoothed, k_hat = smooth(log_ratio[usable])
+    smoothed, k_hat = smooth_weights(log_ratio[usable])
     weights = np.zeros(len(draws))
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()

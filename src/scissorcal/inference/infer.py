@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
 from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
-from scissorcal.inference.laplace import Laplace, laplace, local_covariance, polish
+from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SamplingStatus, named
+from scissorcal.inference.status import SamplingStatus, SearchStatus, named
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 Array = NDArray[np.float64]
@@ -24,6 +25,10 @@ BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
 MIXTURE_ROUNDS = 5
+LEAST_HELD = 1e-4
+"""Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
+a normal prior alone gives one."""
+
 RIVAL = 12.0
 """Optima this far below the highest one still get a share of the draws."""
 
@@ -39,6 +44,7 @@ def infer(
     escalate: bool = True,
     checkpoint: Path | None = None,
     budget: int | None = None,
+    stop: Stop | None = None,
 ) -> Posterior:
     """Infer a posterior whose likelihood terms may be autocorrelated.
 
@@ -56,30 +62,32 @@ def infer(
     for a proposal that was adapted to draws) and ``budget`` allows, with ensembles. What it became
     is said in the result. ``optimum`` may be passed if it is known already,
     ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
-    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`).
+    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`). ``stop`` is
+    asked before every evaluation of search and sampling whether the time allowed is used up; what
+    is there by then is returned, with a status that says so, and draws of the normal approximation
+    where there are no better ones. The curvature is measured whatever the time.
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
     beside the optimum.
     """
     tell = progress or (lambda done, sentence: None)
-    counter = _Counter()
+    counter = Counter()
     counted = counter.over(problem)
     tell(0.0, "searching the optimum")
-    best = optimum or find_optimum(problem)
+    best = optimum or find_optimum(problem, stop=stop)
     tell(0.3, "measuring the curvature")
     best, shape = polish(counted, best)
+    best = _held(problem, best, shape)
     worth = (
-        None if problem.independent else long_run_covariance(problem, shape.scores, shape.slopes)
+        None if problem.independent else long_run_covariance(counted, shape.scores, shape.slopes)
     )
-    local = laplace(counted, shape, worth.covariance if worth else None)
+    spread = worth.covariance if worth else None
+    local = laplace(counted, shape, spread)
     proposal = _proposal(counted, best, local)
+    if stop is not None:
+        local = laplace(counter.over(problem, stop), shape, spread)
     run = _Run(problem.names, local, proposal, counter, rng, count, tell)
-    if effort == "draft":
-        found = run.draft(problem)
-    elif effort == "standard":
-        found = run.standard(budget or BUDGET[effort], escalate, checkpoint)
-    else:
-        found = run.thorough(budget or BUDGET[effort], checkpoint)
+    found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     tell(1.0, found.sentence)
     return Posterior(
         names=problem.names,
@@ -99,10 +107,23 @@ def infer(
         tau=found.tau,
         ensembles=found.ensembles,
         acceptance=found.acceptance,
-        log_posterior=local.log_posterior,
+        log_posterior=laplace(problem, shape, spread).log_posterior,
         noise_orders=worth.orders if worth else (),
         dispersion=worth.dispersion if worth else 1.0,
     )
+
+
+def _held(problem: Problem, best: Optimum, shape: Shape) -> Optimum:
+    """Say of an optimum that neither data nor prior hold it, where its curvature shows that."""
+    unit = np.outer(problem.prior_sd, problem.prior_sd)
+    values, vectors = np.linalg.eigh((shape.information + shape.curvature_prior) * unit)
+    loose = values < LEAST_HELD
+    if not best.success or not np.any(loose):
+        return best
+    concerned = named(problem.names, np.asarray(np.any(vectors[:, loose] ** 2 > 0.1, axis=1)))
+    status = SearchStatus.PLATEAU
+    sentence = f"{status.value} It concerns {concerned}."
+    return replace(best, status=status, success=False, sentence=sentence)
 
 
 def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
@@ -121,31 +142,6 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
     shares = np.exp(np.array(logs) - max(logs))
     weights = np.maximum(shares / shares.sum(), 0.05)
     return Mixture.of(weights, np.stack(centres), np.stack(covariances))
-
-
-class _Counter:
-    """Counts evaluations of a problem's likelihood."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-
-    def over(self, problem: Problem) -> Problem:
-        def terms(u: Array) -> Array:
-            self.calls += 1
-            return problem.log_likelihood_terms(u)
-
-        normal = problem.standardised
-
-        def standardised(u: Array) -> tuple[Array, Array]:
-            self.calls += 1
-            assert normal is not None
-            return normal(u)
-
-        return replace(
-            problem,
-            log_likelihood_terms=terms,
-            standardised=None if normal is None else standardised,
-        )
 
 
 @dataclass(frozen=True)
@@ -169,10 +165,27 @@ class _Run:
     names: tuple[str, ...]
     local: Laplace
     proposal: Mixture
-    counter: _Counter
+    counter: Counter
     rng: np.random.Generator
     count: int
     tell: Progress
+
+    def at(
+        self,
+        effort: Effort,
+        problem: Problem,
+        budget: int,
+        escalate: bool,
+        checkpoint: Path | None,
+    ) -> _Found:
+        try:
+            if effort == "draft":
+                return self.draft(problem)
+            if effort == "standard":
+                return self.standard(budget, escalate, checkpoint)
+            return self.thorough(budget, checkpoint)
+        except TimeUsedUpError:
+            return self.out_of_time(problem)
 
     def draft(self, problem: Problem) -> _Found:
         draws = self.rng.multivariate_normal(
@@ -186,18 +199,24 @@ class _Run:
         nothing = np.full(len(self.names), np.nan)
         return _Found(draws, "draft", status, sentence, float(self.count), np.nan, nothing, nothing)
 
+    def out_of_time(self, problem: Problem) -> _Found:
+        status = SamplingStatus.BUDGET_USED_UP
+        sentence = f"{status.value} The time ended first: the draws are the normal approximation's."
+        return replace(self.draft(problem), status=status, sentence=sentence)
+
     def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "sampling")
         target = self.local.log_posterior
         first = self.counter.calls
-        sampled = sample_by_importance(target, self.proposal, self.count, self.rng)
+        many = self.local.log_posteriors
+        sampled = sample_by_importance(target, self.proposal, self.count, self.rng, many=many)
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count) - 2)
             if rounds > 0:
                 sampled = sample_by_mixture(
-                    target, sampled, self.proposal, 2 * self.count, self.rng, rounds
+                    target, sampled, self.proposal, 2 * self.count, self.rng, rounds, many
                 )
                 said += f", {sampled.k_hat:.2f} with an adapted mixture"
         if sampled.trusted or not escalate:
@@ -213,7 +232,12 @@ class _Run:
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
         sampled = sample_by_importance(
-            self.local.log_posterior, self.proposal, self.count, self.rng, rounds=1
+            self.local.log_posterior,
+            self.proposal,
+            self.count,
+            self.rng,
+            rounds=1,
+            many=self.local.log_posteriors,
         )
         return self._walked(budget, checkpoint, sampled, "")
 
@@ -240,6 +264,7 @@ class _Run:
             self.rng,
             budget=budget,
             checkpoint=checkpoint,
+            many=self.local.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(

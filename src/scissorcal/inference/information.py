@@ -58,7 +58,8 @@ def likelihood_information(
     """
     slopes, nu = slopes or slopes_at(problem, point, step), problem.tails
     if slopes is None:
-        return _positive(-hessian(problem.log_likelihood, point, step), problem.prior_sd)
+        many = problem.log_likelihoods if problem.log_posterior_many else None
+        return _positive(-hessian(problem.log_likelihood, point, step, many), problem.prior_sd)
     of_mean = 1.0 if np.isinf(nu) else (nu + 1.0) / (nu + 3.0)
     of_size = 2.0 if np.isinf(nu) else 2.0 * nu / (nu + 3.0)
     return np.asarray(

@@ -55,7 +55,8 @@ class Laplace:
     ``log_posterior`` is the posterior that is to be sampled: as written for independent terms,
     else stretched about ``pivot`` by the map ``stretch`` (p, p). ``inflation`` (p,) is the factor
     by which autocorrelation widens each standard deviation; ``null`` names, for each direction the
-    data leave to the prior, its parameters with their weights.
+    data leave to the prior, its parameters with their weights. ``log_posteriors`` is the same
+    posterior over points (k, p), shape (k,).
     """
 
     pivot: Array
@@ -65,6 +66,7 @@ class Laplace:
     inflation: Array
     null: tuple[str, ...]
     log_posterior: Callable[[Array], float]
+    log_posteriors: Callable[[Array], Array]
 
     def stretched(self, point: Array) -> Array:
         """Where the posterior that is sampled has what the written one has at ``point``."""
@@ -150,6 +152,17 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
         total = prior + problem.log_likelihood(point + stretch @ (u - point))
         return total if np.isfinite(total) else -np.inf
 
+    def log_posteriors(points: Array) -> Array:
+        if problem.log_posterior_many is None:
+            return np.array([log_posterior(u) for u in points])
+        inside = np.all((points >= problem.lower) & (points <= problem.upper), axis=1)
+        heights = np.full(len(points), -np.inf)
+        if np.any(inside):
+            kept = points[inside]
+            prior = np.array([float(problem.log_prior(u)) for u in kept])
+            heights[inside] = prior + problem.log_likelihoods(point + (kept - point) @ stretch.T)
+        return np.where(np.isfinite(heights), heights, -np.inf)
+
     return Laplace(
         pivot=point,
         stretch=stretch,
@@ -158,6 +171,7 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
         inflation=np.sqrt(np.diag(covariance) / np.diag(naive)),
         null=_null_directions(robust, scale, problem.names),
         log_posterior=problem.log_posterior if spread is None else log_posterior,
+        log_posteriors=problem.log_posteriors if spread is None else log_posteriors,
     )
 
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.squares import descend, has_squares
 from scissorcal.inference.status import NotFiniteError, SearchStatus, named
 
 Array = NDArray[np.float64]
@@ -27,6 +29,17 @@ ROUNDS = 12
 ROUNDS_BEFORE_CHOICE = 2
 HOPELESS = 20.0
 """A start this much log-posterior below the best one after its first rounds is given up."""
+
+ROUGH = 0.05
+"""Climb promised by differences a standard deviation long from which a likelihood counts as rough,
+where short differences promise none; skewness of a smooth one stays below."""
+
+RESTARTS = 3
+"""Searches begun anew from a higher point that was seen beside a supposed optimum."""
+
+FARTHEST_LOOK = 10.0
+"""Distance, in prior widths, at which the fall beside an optimum is looked at where neither data
+nor prior say how wide it is."""
 
 AT_BOUND = 1e-6
 """Distance from a bound, in units of the prior's, that counts as lying on it."""
@@ -67,20 +80,33 @@ class Optimum:
     optima: tuple[Cluster, ...] = ()
 
 
-def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
+def find_optimum(
+    problem: Problem, starts: Array | None = None, stop: Stop | None = None
+) -> Optimum:
     """Maximise a log-posterior from every row of ``starts`` (default: the problem's own).
 
-    Each start is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06) in coordinates
-    that the scores' outer product makes round, until a round gains nothing: strongly correlated
-    parameters then cost no more than independent ones. A start whose first rounds end far below
-    another's is given up. The best point ever seen is kept, whatever code the library returns,
-    since it reports rounding trouble at points that are solved and success at points it never
-    could evaluate. Ends between which the log-posterior does not dip are one optimum.
+    Where residuals are normal, each start is followed by least squares and Fisher scoring
+    (:func:`~scissorcal.inference.squares.descend`). What then still promises to climb, and every
+    start of other problems, is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06)
+    in coordinates that the scores' outer product makes round, until a round gains nothing: strongly
+    correlated parameters then cost no more than independent ones. A start whose first rounds end
+    far below another's is given up. The best point ever seen is kept, whatever code the library
+    returns, since it reports rounding trouble at points that are solved and success at points it
+    never could evaluate. Ends between which the log-posterior does not dip are one optimum.
+
+    An end counts as settled only where the log-posterior falls on both sides along each axis of
+    its covariance; where it rises instead, the search goes on from there. ``stop`` says whether the
+    time allowed is used up; the search then ends with the best point so far.
 
     Raises NotFiniteError (a ValueError) if the log-posterior is finite at no start.
     """
+    counter = Counter()
+    problem = counter.over(problem)
     chosen = np.atleast_2d(problem.starts if starts is None else starts)
-    begun = [_climb(problem, _begin(problem, start), ROUNDS_BEFORE_CHOICE) for start in chosen]
+    begun = [
+        _climb(problem, _begin(problem, start, stop), ROUNDS_BEFORE_CHOICE, stop)
+        for start in chosen
+    ]
     top = max(climb.value for climb in begun)
     if not np.isfinite(top):
         raise NotFiniteError(
@@ -88,12 +114,15 @@ def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
             "values that the priors rule out."
         )
     ended = [
-        _climb(problem, climb, ROUNDS) if climb.value > top - HOPELESS else climb for climb in begun
+        _climb(problem, climb, ROUNDS, stop) if climb.value > top - HOPELESS else climb
+        for climb in begun
     ]
-    best = max(ended, key=lambda climb: climb.value)
+    first = max(range(len(ended)), key=lambda index: ended[index].value)
+    ended[first], around = _confirmed(problem, ended[first], stop)
+    best = ended[first]
     agreeing = sum(climb.value > best.value - SAME_HEIGHT for climb in ended)
     optima = _clusters(problem, ended)
-    status, concerned = _status(problem, best)
+    status, concerned = _status(problem, best, around, stop)
     sentence = status.value + (f" It concerns {concerned}." if concerned else "")
     if agreeing < len(ended):
         sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
@@ -106,7 +135,7 @@ def find_optimum(problem: Problem, starts: Array | None = None) -> Optimum:
         sentence=sentence,
         agreeing=agreeing,
         starts=len(ended),
-        evaluations=sum(climb.evaluations for climb in ended) + 4 * len(best.point),
+        evaluations=counter.calls,
         status=status,
         optima=optima,
     )
@@ -143,39 +172,117 @@ class _Climb:
     value: float
     gained: float
     root: Array
-    evaluations: int
 
 
-def _begin(problem: Problem, start: Array) -> _Climb:
+def _begin(problem: Problem, start: Array, stop: Stop | None) -> _Climb:
     point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
     value = problem.log_posterior(point)
-    root = _rounding(problem, point) if np.isfinite(value) else np.diag(problem.prior_sd)
-    return _Climb(point, value, np.inf, root, 1 + 2 * len(point))
+    unknown = np.diag(problem.prior_sd)
+    if not np.isfinite(value) or (stop is not None and stop()):
+        return _Climb(point, value, np.inf, unknown)
+    if has_squares(problem):
+        descent = descend(problem, point, stop)
+        return _Climb(descent.point, descent.value, descent.promised, descent.root)
+    return _Climb(point, value, np.inf, _rounding(problem, point))
 
 
-def _climb(problem: Problem, climb: _Climb, rounds: int) -> _Climb:
-    point, value, gained = climb.point, climb.value, climb.gained
-    root, evaluations = climb.root, climb.evaluations
+def _climb(problem: Problem, climb: _Climb, rounds: int, stop: Stop | None) -> _Climb:
+    point, value, gained, root = climb.point, climb.value, climb.gained, climb.root
     for _ in range(rounds):
-        if not np.isfinite(value) or gained < SETTLED:
+        if not np.isfinite(value) or gained < SETTLED or (stop is not None and stop()):
             break
-        reached, height, used = _round(problem, point, value, root)
+        reached, height = _round(problem, point, value, root, stop)
         gained, point, value = height - value, reached, height
-        evaluations += used
         if gained >= SETTLED:
             root = _rounding(problem, point)
-            evaluations += 2 * len(point)
-    return _Climb(point, value, gained, root, evaluations)
+    return _Climb(point, value, gained, root)
 
 
-def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[Array, float, int]:
+def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Climb, Array]:
+    """Look beside an end along the axes of its covariance, and go on from what is higher there.
+
+    Returns the end that was reached and what the log-posterior loses on both sides, (axes, 2).
+    Without squares there is no gradient to go by, and in a bent valley a round may gain nothing far
+    from its end: such an end counts only where a search from a point beside it comes no higher.
+    """
+    lost, polished = np.zeros((0, 2)), False
+    for _ in range(RESTARTS + 1):
+        lost, higher = _beside_axes(problem, climb)
+        used_up = stop is not None and stop()
+        if higher is not None and not used_up:
+            climb = _climb(problem, _begin(problem, higher, stop), ROUNDS, stop)
+            continue
+        if used_up or climb.gained >= SETTLED:
+            break
+        if has_squares(problem):
+            if polished or _promised_from_afar(lost) < ROUGH:
+                break
+            polished = True
+            rough = replace(climb, gained=np.inf, root=_rounding(problem, climb.point))
+            climb = _climb(problem, rough, ROUNDS, stop)
+            continue
+        again = _climb(problem, _begin(problem, _perturbed(problem, climb), stop), 1, stop)
+        if again.value < climb.value + SETTLED:
+            break
+        climb = _climb(problem, again, ROUNDS, stop)
+        if climb.gained < SETTLED:
+            climb = replace(climb, gained=np.inf)
+    return climb, lost
+
+
+def _promised_from_afar(lost: Array) -> float:
+    """Climb that a Newton step promises by what is lost a standard deviation beside, (axes, 2)."""
+    known = lost[np.all(np.isfinite(lost), axis=1)]
+    slope = 0.5 * (known[:, 0] - known[:, 1])
+    curvature = np.maximum(known.sum(axis=1), 1.0)
+    return float(0.5 * np.sum(slope**2 / curvature))
+
+
+def _perturbed(problem: Problem, climb: _Climb) -> Array:
+    """A point half a standard deviation along every axis away, where it can be evaluated."""
+    signs = np.where(np.arange(len(climb.point)) % 2 == 0, 1.0, -1.0)
+    for share in (0.5, -0.5, 0.05, -0.05):
+        point = _inside(problem, climb.point + share * (climb.root @ signs))
+        if np.isfinite(problem.log_posterior(point)):
+            return point
+    return climb.point
+
+
+def _beside_axes(problem: Problem, climb: _Climb) -> tuple[Array, Array | None]:
+    """What is lost a standard deviation beside an end, (axes, 2), and the best point if higher.
+
+    Where rounding hides a fall, farther away counts, up to ``FARTHEST_LOOK`` prior widths.
+    """
+    axes = climb.root.T
+    length = np.linalg.norm(axes / problem.prior_sd, axis=1)
+    axes = axes * np.minimum(1.0, FARTHEST_LOOK / np.maximum(length, 1e-300))[:, None]
+    points = np.concatenate([_inside(problem, climb.point + sign * axes) for sign in (-1, 1)])
+    heights = problem.log_posteriors(points)
+    top = int(np.argmax(heights))
+    lost = climb.value - heights.reshape(2, -1).T
+    for axis, side in np.argwhere(np.abs(lost) < SETTLED):
+        reach = axes[axis] * (2 * side - 1)
+        while np.abs(lost[axis, side]) < SETTLED and (
+            np.linalg.norm(reach / problem.prior_sd) < FARTHEST_LOOK
+        ):
+            reach = reach * 10.0
+            there = problem.log_posterior(_inside(problem, climb.point + reach))
+            lost[axis, side] = climb.value - there
+    return lost, points[top] if heights[top] > climb.value + SETTLED else None
+
+
+def _round(
+    problem: Problem, centre: Array, value: float, root: Array, stop: Stop | None
+) -> tuple[Array, float]:
     import nlopt
 
-    best_point, best_value, evaluations = centre, value, 0
+    best_point, best_value = centre, value
 
     def seen(z: Array, gradient: Array) -> float:
-        nonlocal best_point, best_value, evaluations
-        evaluations += 1
+        nonlocal best_point, best_value
+        if stop is not None and stop():
+            search.force_stop()
+            return WORST
         wanted = centre + root @ z
         inside = np.clip(wanted, problem.lower, problem.upper)
         height = problem.log_posterior(inside)
@@ -194,9 +301,9 @@ def _round(problem: Problem, centre: Array, value: float, root: Array) -> tuple[
     search.set_maxeval(25 * size)
     try:
         search.optimize(np.zeros(size))
-    except nlopt.RoundoffLimited:
-        return best_point, best_value, evaluations
-    return best_point, best_value, evaluations
+    except (nlopt.RoundoffLimited, nlopt.ForcedStop):
+        return best_point, best_value
+    return best_point, best_value
 
 
 def _rounding(problem: Problem, point: Array) -> Array:
@@ -240,13 +347,20 @@ def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
     )
 
 
-def _status(problem: Problem, best: _Climb) -> tuple[SearchStatus, str]:
-    """How the best climb ended, and the names of the parameters that it concerns."""
+def _status(
+    problem: Problem, best: _Climb, lost: Array, stop: Stop | None
+) -> tuple[SearchStatus, str]:
+    """How the best climb ended, and the names of the parameters that it concerns.
+
+    ``lost`` (axes, 2) is what the log-posterior loses beside the end.
+    """
     scale = problem.prior_sd
     at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
     if np.any(at_bound):
         return SearchStatus.AT_BOUNDS, named(problem.names, at_bound)
-    settled = best.gained < SETTLED
+    settled = best.gained < SETTLED and bool(np.all(lost > -SETTLED))
+    if not settled and stop is not None and stop():
+        return SearchStatus.TIME_USED_UP, ""
     width = np.sqrt(np.diag(best.root @ best.root.T))
     around = _beside(problem.log_posterior, problem, best.point, (1e-3 if settled else 2.0) * width)
     if np.any(edges := np.asarray(np.any(~np.isfinite(around), axis=1))):
@@ -258,6 +372,10 @@ def _status(problem: Problem, best: _Climb) -> tuple[SearchStatus, str]:
     silent = np.all(away <= 1e-9 * (1 + abs(height)), axis=1)
     if np.any(silent):
         return SearchStatus.AT_START, named(problem.names, silent)
+    if np.any(level := np.asarray(np.any(lost < SETTLED, axis=1))):
+        share = np.square(best.root / problem.prior_sd[:, None])[:, level]
+        concerned = np.any(share > 0.1 * share.sum(axis=0), axis=1)
+        return SearchStatus.PLATEAU, named(problem.names, np.asarray(concerned))
     return SearchStatus.SETTLED, ""
 
 

@@ -30,6 +30,10 @@ class Problem:
     ``independent`` says that the terms are independent given the parameters and that the model is
     taken as true: the posterior is then used exactly as written, and its likelihood is not
     stretched for autocorrelation.
+
+    ``log_posterior_many`` gives, where the model can work out many points at once, the sum of
+    prior and likelihood at points (k, p), shape (k,); what is not finite counts as -inf. Bounds
+    need not be looked at. Importance sampling, ensembles and Hessians use it where it is there.
     """
 
     names: tuple[str, ...]
@@ -45,6 +49,7 @@ class Problem:
     populations: NDArray[np.int64] | None = None
     blocks: NDArray[np.int64] | None = None
     independent: bool = False
+    log_posterior_many: Callable[[Array], Array] | None = None
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""
@@ -57,3 +62,24 @@ class Problem:
             return -np.inf
         prior = float(self.log_prior(point))
         return prior + self.log_likelihood(point) if np.isfinite(prior) else -np.inf
+
+    def log_posteriors(self, points: Array) -> Array:
+        """Log-posteriors of points (k, p), shape (k,), at once where the problem can."""
+        many = self.log_posterior_many
+        if many is None:
+            return np.array([self.log_posterior(point) for point in points])
+        heights = np.full(len(points), -np.inf)
+        inside = np.all((points >= self.lower) & (points <= self.upper), axis=1)
+        if np.any(inside):
+            heights[inside] = many(points[inside])
+        return np.where(np.isfinite(heights), heights, -np.inf)
+
+    def log_likelihoods(self, points: Array) -> Array:
+        """Sums of the likelihood's terms at points (k, p), shape (k,); bounds do not matter."""
+        if self.log_posterior_many is None:
+            return np.array([self.log_likelihood(point) for point in points])
+        prior = np.array([float(self.log_prior(point)) for point in points])
+        if not np.all(np.isfinite(prior)):
+            return np.array([self.log_likelihood(point) for point in points])
+        heights = np.asarray(self.log_posterior_many(points)) - prior
+        return np.where(np.isfinite(heights), heights, -np.inf)

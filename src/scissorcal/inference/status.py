@@ -28,6 +28,15 @@ class SearchStatus(Enum):
         "A parameter stands where its start or its prior put it because the data do not respond to "
         "it: record what excites it, or choose a rung without it."
     )
+    PLATEAU = (
+        "The log-posterior hardly falls beside the point where the search ended, so far other "
+        "values would do as well and this one means nothing: record what excites the parameters, "
+        "start elsewhere, or give them priors."
+    )
+    TIME_USED_UP = (
+        "The time allowed was used up before the search settled, so the optimum is not known: "
+        "allow more time, or choose a simpler rung."
+    )
     NOT_FINITE = (
         "The log-posterior is not a finite number right beside the optimum, so the optimum may lie "
         "on the edge of what the model can evaluate: check the data for gaps and extreme values."
@@ -64,9 +73,9 @@ class SamplingStatus(Enum):
         "them leaves: look at the list of optima, and give priors that tell them apart."
     )
     BUDGET_USED_UP = (
-        "The budget of evaluations was used up before the ensembles were long enough against "
-        "their autocorrelation, so the intervals cannot be trusted: record more varied data, or "
-        "choose a simpler rung. A larger budget goes on from the checkpoint, where one was kept."
+        "The budget of evaluations or of time was used up before the draws could be relied on, so "
+        "the intervals cannot be trusted: allow more, record more varied data, or choose a simpler "
+        "rung. Ensembles go on from the checkpoint, where one was kept."
     )
     STUCK = (
         "A parameter never moved in the ensembles, so nothing is known of its spread: check that "

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
+from scissorcal.inference.counting import TimeUsedUpError
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.status import NotFiniteError, SamplingStatus
 
@@ -88,6 +89,7 @@ def run_ensembles(
     budget: int,
     checkpoint: Path | None = None,
     progress: Progress | None = None,
+    many: Callable[[Array], Array] | None = None,
 ) -> Chains:
     """Sample a posterior with four independent ensembles of walkers (emcee).
 
@@ -98,7 +100,9 @@ def run_ensembles(
     times of every parameter, those times have settled, and the ensembles agree; or when
     ``budget`` evaluations are used up. ``checkpoint`` is written after every 256 steps; where it
     exists, the run goes on from there exactly as if it had never stopped. Randomness comes from
-    ``rng`` alone.
+    ``rng`` alone. ``many`` gives the log-posterior of points (k, p) at once, shape (k,), where that
+    is cheaper. An evaluation that raises TimeUsedUpError ends the run as a used-up budget does; it
+    is raised on where nothing can be judged yet.
 
     Raises NotFiniteError where too few finite starts are found, CheckpointError where the
     checkpoint belongs to another posterior or cannot be read, and ValueError where the budget is
@@ -118,7 +122,12 @@ def run_ensembles(
     while chains is None or chains.status is SamplingStatus.BUDGET_USED_UP:
         if (walks[0].steps + BLOCK) * per_step > budget:
             return chains or _judged(walks)
-        walks = [_advance(walk, log_posterior) for walk in walks]
+        try:
+            walks = [_advance(walk, log_posterior, many) for walk in walks]
+        except TimeUsedUpError:
+            if walks[0].steps == 0:
+                raise
+            return replace(_judged(walks), status=SamplingStatus.BUDGET_USED_UP)
         if checkpoint is not None:
             save_walks(checkpoint, walks)
         chains = _look(walks)
@@ -233,7 +242,11 @@ def _begin(
     )
 
 
-def _advance(walk: Walk, log_posterior: Callable[[Array], float]) -> Walk:
+def _advance(
+    walk: Walk,
+    log_posterior: Callable[[Array], float],
+    many: Callable[[Array], Array] | None,
+) -> Walk:
     """One block of steps; all that the next one depends on is in what is returned."""
     import emcee
 
@@ -243,7 +256,9 @@ def _advance(walk: Walk, log_posterior: Callable[[Array], float]) -> Walk:
         (emcee.moves.StretchMove(), STRETCHES),
         (emcee.moves.DEMove(gamma0=1.0), JUMPS),
     ]
-    sampler = emcee.EnsembleSampler(walkers, size, log_posterior, moves=moves)
+    sampler = emcee.EnsembleSampler(
+        walkers, size, many or log_posterior, moves=moves, vectorize=many is not None
+    )
     state = emcee.State(walk.coords, log_prob=walk.heights, random_state=walk.random_state)
     for last in sampler.sample(
         state,

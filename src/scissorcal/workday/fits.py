@@ -1,7 +1,7 @@
 """Fit what a workspace's scene requires, in order, and only where something changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration.result import Effort
 
 Progress = Callable[[float, str], None]
+Stop = Callable[[], bool]
 
 FIT_ORDER: tuple[FitKind, ...] = ("friction", "cut")
 """Fits in the order in which they build on one another."""
@@ -39,6 +40,7 @@ def fit_workspace(
     seed: int = 0,
     force: bool = False,
     progress: Progress | None = None,
+    stop: Stop | None = None,
 ) -> tuple[FitOutcome, ...]:
     """Run the fits that the scene requires, each only where its inputs changed.
 
@@ -46,6 +48,8 @@ def fit_workspace(
     friction, which is run first where it is missing or its inputs changed. ``effort`` is the
     recipe's where not given. A fit whose inputs hash (recordings, settings, effort, fits it builds
     on) equals that of the stored one is read back instead; ``force`` does it again all the same.
+    Draft fits one law: the recipe's, else the one that the stored fit chose. ``stop`` says whether
+    the time allowed is used up; a fit that this ended is stored as one that is not current.
 
     Raises InputError where the scene does not require what is wanted, MissingError where nothing
     was captured, and what the fits themselves raise.
@@ -59,7 +63,7 @@ def fit_workspace(
     outcomes: list[FitOutcome] = []
     for index, kind in enumerate(order):
         share = progress_share(progress, index, len(order))
-        outcomes.append(_fit(workspace, recipe, kind, effort, seed, force, share))
+        outcomes.append(_fit(workspace, recipe, kind, effort, seed, force, share, stop))
     return tuple(outcomes)
 
 
@@ -145,11 +149,13 @@ def _fit(
     seed: int,
     force: bool,
     progress: Progress,
+    stop: Stop | None,
 ) -> FitOutcome:
     import numpy as np
 
     from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
     from scissorcal.calibration.hashing import cut_upstream
+    from scissorcal.calibration.storage import load_header
     from scissorcal.workday.geometry import edge_belief, edge_verdicts
 
     chosen: Effort = effort or recipe.fit.effort
@@ -167,12 +173,11 @@ def _fit(
     edge = edge_belief(workspace, recipe) if friction else None
     upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
     expected = expected_hash(workspace, recipe, what, chosen, upstream)
-    if path.is_file() and not force:
-        stored = load_fit(path)
-        if stored.inputs_hash == expected:
-            return FitOutcome(what, stored, path, cached=True)
+    if path.is_file() and not force and load_header(path).inputs_hash == expected:
+        return FitOutcome(what, load_fit(path), path, cached=True)
     rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
     checkpoint = workspace.checkpoint_path(what, expected)
+    before = last_chosen(workspace, what)
     if friction is None:
         result = fit_friction(
             usable.recordings,
@@ -181,6 +186,8 @@ def _fit(
             rng=rng,
             progress=progress,
             checkpoint=checkpoint,
+            last_chosen=before,
+            stop=stop,
         )
     else:
         result = fit_cut(
@@ -193,11 +200,37 @@ def _fit(
             edge=edge,
             edge_verdicts=edge_verdicts(workspace, recipe),
             checkpoint=checkpoint,
+            last_chosen=before,
+            stop=stop,
         )
+    if result.rejected and stop is not None and stop():
+        result = _unfinished(result)
     save_fit(result, path)
     if not result.rejected:
         checkpoint.unlink(missing_ok=True)
     return FitOutcome(what, result, path, cached=False)
+
+
+def last_chosen(workspace: Workspace, what: FitKind) -> str | None:
+    """Name of the law that the stored fit chose, whatever its inputs; None where there is none."""
+    from scissorcal.calibration.storage import load_header
+
+    path = workspace.fit_path(what)
+    try:
+        return load_header(path).rung if path.is_file() else None
+    except InputError:
+        return None
+
+
+def _unfinished(result: "FitResult") -> "FitResult":
+    """A fit that ran out of time, marked so that the next run does it again."""
+    note = (
+        "The time allowed was used up before the fit was finished; the next 'scissorcal fit' does "
+        "it again, with --max-minutes for as long as it needs."
+    )
+    return replace(
+        result, inputs_hash=f"unfinished:{result.inputs_hash}", notes=(*result.notes, note)
+    )
 
 
 def _refuse_unneeded(
