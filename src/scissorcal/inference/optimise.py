@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.ascent import ascend
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.squares import descend, has_squares
@@ -86,7 +87,8 @@ def find_optimum(
     """Maximise a log-posterior from every row of ``starts`` (default: the problem's own).
 
     Where residuals are normal, each start is followed by least squares and Fisher scoring
-    (:func:`~scissorcal.inference.squares.descend`). What then still promises to climb, and every
+    (:func:`~scissorcal.inference.squares.descend`), where the posterior is smooth by BFGS
+    (:func:`~scissorcal.inference.ascent.ascend`). What then still promises to climb, and every
     start of other problems, is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06)
     in coordinates that the scores' outer product makes round, until a round gains nothing: strongly
     correlated parameters then cost no more than independent ones. A start whose first rounds end
@@ -183,6 +185,9 @@ def _begin(problem: Problem, start: Array, stop: Stop | None) -> _Climb:
     if has_squares(problem):
         descent = descend(problem, point, stop)
         return _Climb(descent.point, descent.value, descent.promised, descent.root)
+    if problem.smooth:
+        ascent = ascend(problem, point, _rounding, stop)
+        return _Climb(ascent.point, ascent.value, ascent.promised, ascent.root)
     return _Climb(point, value, np.inf, _rounding(problem, point))
 
 
@@ -214,7 +219,7 @@ def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Cli
             continue
         if used_up or climb.gained >= SETTLED:
             break
-        if has_squares(problem):
+        if has_squares(problem) or problem.smooth:
             if polished or _promised_from_afar(lost) < ROUGH:
                 break
             polished = True

@@ -34,6 +34,9 @@ class Problem:
     ``log_posterior_many`` gives, where the model can work out many points at once, the sum of
     prior and likelihood at points (k, p), shape (k,); what is not finite counts as -inf. Bounds
     need not be looked at. Importance sampling, ensembles and Hessians use it where it is there.
+
+    ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
+    go by differences where there are no squares.
     """
 
     names: tuple[str, ...]
@@ -50,6 +53,7 @@ class Problem:
     blocks: NDArray[np.int64] | None = None
     independent: bool = False
     log_posterior_many: Callable[[Array], Array] | None = None
+    smooth: bool = False
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""

@@ -1,4 +1,4 @@
-"""The design of a cut's fit: segments, law and priors, over which torques may be thought measured."""
+"""The design of a cut's fit: segments, law and priors, to be compared with torques."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,12 +26,12 @@ class CutRung(Rung):
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
         """The posterior of this rung, over the segments that ``keep`` selects."""
-        return replace(super().problem(series, keep), standardised=None, independent=True)
+        return replace(super().problem(series, keep), standardised=None, independent=True, smooth=True)
 
 
 @dataclass(frozen=True)
 class CutExperiment:
-    """One law over one set of segments (see :class:`~scissorcal.calibration.experiment.Experiment`).
+    """One law over one set of segments, an :class:`~scissorcal.calibration.experiment.Experiment`.
 
     ``likelihood`` holds segments and geometry; ``key`` the law's discrete choices with the
     geometry, ``layout`` the parameters and priors (the edge's last, with ``prior_precision`` for
@@ -165,7 +165,7 @@ class CutExperiment:
 
 
 def starting_point(layout: Layout, values: Mapping[str, float]) -> tuple[float, ...]:
-    """An unconstrained point from values by name; what is not named starts at its prior's centre."""
+    """An unconstrained point from values by name; others start at their prior's centre."""
     centre = layout.natural(layout.mean)
     merged = {name: float(value) for name, value in centre.items()}
     merged |= {name: value for name, value in values.items() if name in merged}

@@ -22,13 +22,14 @@ from scissorcal.calibration.cut.scout import (
 )
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.cut.toughness import with_toughness
+from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.path import PathMotion, path_motion
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.sensors import inspect_sensors
 from scissorcal.errors import InputError
-from scissorcal.inference import infer
+from scissorcal.inference import Stop, infer
 from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
@@ -56,6 +57,8 @@ def fit_cut(
     edge: EdgeBelief | None = None,
     edge_verdicts: tuple[Verdict, ...] = (),
     checkpoint: Path | None = None,
+    last_chosen: str | None = None,
+    stop: Stop | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses), over their path.
 
@@ -67,7 +70,9 @@ def fit_cut(
 
     ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
     friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
-    interrupted goes on. Raises InputError where the blades hardly touched the material.
+    interrupted goes on. ``last_chosen`` is the law that draft effort fits where the recipe leaves
+    several, ``stop`` says whether the time allowed is used up. Raises InputError where the blades
+    hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
@@ -75,10 +80,11 @@ def fit_cut(
     sensors = inspect_sensors(recordings)
     motions = path_motion(recordings, known.inertia, sensors.usable)
     _refuse_no_contact(motions, known, recordings)
-    laws = allowed_laws(recipe)
+    ladder = allowed_laws(recipe)
+    laws = candidates_for(effort, ladder, last_chosen)
     tell(0.05, "cut: finding where cracks wait and run")
     scouted = _scouted(motions, known, recipe, geometry, laws, recordings)
-    climbed = _climb(scouted, geometry, recipe, laws, known, tell)
+    climbed = _climb(scouted, geometry, recipe, laws, known, tell, stop)
     chosen = choose([one for one, _ in climbed])
     design = next(d for c, d in climbed if c.rung.name == chosen.rung.name)
     tell(0.5, f"cut: inferring {chosen.rung.name}")
@@ -90,6 +96,7 @@ def fit_cut(
         optimum=chosen.optimum,
         budget=STANDARD_BUDGET if effort == "standard" else None,
         checkpoint=checkpoint,
+        stop=stop,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
     u = chosen.optimum.point
@@ -120,7 +127,11 @@ def fit_cut(
         rng=rng,
         critic=recipe.fit.cut.critic,
         extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, design, u, sensors),
-        extra_notes=(*sensors.notes, *line_notes(scouted, design, u, budget)),
+        extra_notes=(
+            *sensors.notes,
+            *line_notes(scouted, design, u, budget),
+            *draft_note(effort, ladder, laws),
+        ),
     )
     return with_toughness(fit, recipe, rng)
 
@@ -185,6 +196,7 @@ def _climb(
     laws: Sequence[CutLaw],
     known: KnownFriction,
     tell: Progress,
+    stop: Stop | None,
 ) -> list[tuple[Climbed, CutExperiment]]:
     """Fit every law to the same segments; each begins where the scouting ended."""
     found: list[tuple[Climbed, CutExperiment]] = []
@@ -203,7 +215,7 @@ def _climb(
             scouted.segments, geometry, recipe, law, known, begin, scouted.datum
         )
         rung = design.rung(design.observed)
-        found.append((climb(rung, design.series, design.strokes), design))
+        found.append((climb(rung, design.series, design.strokes, stop), design))
     return found
 
 

@@ -25,7 +25,7 @@ SHEET_VARIATION = (0.004, 1.0)
 """Sheets differ in their mean toughness: 90 % within 0.08 to 2 % before data."""
 NOISE_SCALE_SD = 0.2
 LOAD_SHARE_SD = 0.1
-"""Share of the cut's torque by which friction of the pivot grows: jaw tools show up to 0.1 of it."""
+"""Share of the cut's torque by which friction of the pivot grows: up to 0.1 in jaw tools."""
 DELAY_TICKS = (0.08, 0.06)
 """A motor whose lag is 0 to 2 ticks is late by 0 to 0.13 ticks; 0.08 for a lag of one tick."""
 SHAPE_SD = 0.5

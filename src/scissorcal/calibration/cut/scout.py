@@ -143,20 +143,19 @@ def tooth_periods(
     n the response's exponent at d_c. Against a crack stepped exactly it is right to 0.02 %.
     """
     view = geometry.running(opening)
-    moving, energy, kappa = geometry.moving_blades, float(values["fracture_energy"]), 1.0
+    moving, energy = geometry.moving_blades, float(values["fracture_energy"])
     kappa = float(values["kappa"])
-    slope, lever = view.slope, view.lever
-    for _ in range(2):
-        peak = energy / (moving * np.maximum(slope, 1e-6))
-        start, stop = response.indentation_at(peak), response.indentation_at(kappa * peak)
-        away = 0.5 * (start + stop) - geometry.reference_m
-        slope, lever = view.slope + view.slope_dd * away, view.lever + view.lever_dd * away
+    peak = energy / (moving * np.maximum(view.slope, 1e-6))
+    start, stop = response.indentation_at(peak), response.indentation_at(kappa * peak)
+    away = 0.5 * (start + stop) - geometry.reference_m
+    slope, lever = view.slope + view.slope_dd * away, view.lever + view.lever_dd * away
     gained = response.energy_at(start) - response.energy_at(stop)
     mean = gained / np.maximum(start - stop, 1e-15)
     power = response.stiffness_at(start) * start / response.force_at(start)
     turn = 0.5 * (start + stop) * (1.0 + slope**2) / (power * slope)
     period = moving * (start - stop) / np.maximum(lever - turn, 1e-6)
-    return np.log(np.maximum(period, 1e-12)), mean * lever
+    torque = mean / peak * energy * lever / (moving * slope)
+    return np.log(np.maximum(period, 1e-12)), torque
 
 
 def _with_line(
@@ -193,14 +192,16 @@ def _with_line(
         optimum = find_optimum(design.rung(design.observed).problem(design.series))
         evaluations += optimum.evaluations
         values = _natural(design, optimum.point)
-        again = _line(replace(found, values=values), geometry, design)
+        again = _line(replace(found, values=values), geometry, design, near=True)
         if again is None:
             break
         line = again
     return replace(found, values=values, line=line, believed=True, evaluations=evaluations)
 
 
-def _line(found: Scouted, geometry: Geometry, design: CutExperiment) -> Line | None:
+def _line(
+    found: Scouted, geometry: Geometry, design: CutExperiment, near: bool = False
+) -> Line | None:
     response = response_from(design.key, {k: np.asarray(v) for k, v in found.values.items()})
     rows = [
         tooth_periods(geometry, response, found.values, _middles(found, index))
@@ -210,7 +211,7 @@ def _line(found: Scouted, geometry: Geometry, design: CutExperiment) -> Line | N
     growth = 1.0 / float(np.asarray(response.exponent))
     periods, torques = [row[0] for row in rows], [gain * row[1] for row in rows]
     signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
-    return find_line(signals, periods, [s.path for s in found.segments.stretches])
+    return find_line(signals, periods, [s.path for s in found.segments.stretches], near)
 
 
 def _middles(found: Scouted, index: int) -> Array:

@@ -6,6 +6,7 @@ rest) serves the way back and the way in. Beyond, the crack runs.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ LEAST_SEGMENT_COUNTS = 6.0
 """An elastic segment spans at least so many steps of the encoder."""
 RUNNING_RAD = 5e-3
 LOADING_END = 0.88
-"""Share of the critical indentation at which loading ends: unevenness may start the crack sooner."""
+"""Share of the critical indentation at which loading ends: weak places start the crack sooner."""
 RUNNING_FROM = 1.6
 """Indentation, in critical ones, a standing crack would have where a running one is trusted."""
 FREE_SHARE = 0.4
@@ -77,8 +78,8 @@ class Stretch:
     """Segments between the samples ``ends`` (k + 1,) of a motion over which the crack runs.
 
     ``torque`` (k,) is the mean over the path that the sledge's motion leaves, ``path`` (k,) that
-    path in rad; ``noise`` (k,) is the variance of the drive's noise in the mean torque. ``tooth_sd``
-    (J) is what a tooth that the segment's end cuts off leaves of its work.
+    path in rad; ``noise`` (k,) is the variance of the drive's noise in the mean torque.
+    ``tooth_sd`` (J) is what a tooth that the segment's end cuts off leaves of its work.
     """
 
     sheet: int
@@ -121,7 +122,7 @@ def find_runs(motions: tuple[PathMotion, ...]) -> list[Run]:
     for index, motion in enumerate(motions):
         bounds = np.flatnonzero(np.diff(motion.sheet)) + 1
         edges = [0, *bounds.tolist(), len(motion.sheet)]
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             sheet = int(motion.sheet[low])
             if sheet < 0 or high - low < 2 * FEWEST_SEGMENTS:
                 continue
@@ -129,7 +130,7 @@ def find_runs(motions: tuple[PathMotion, ...]) -> list[Run]:
             ends = [low, *turns, high - 1]
             runs += [
                 Run(index, sheet, a, b)
-                for a, b in zip(ends[:-1], ends[1:], strict=True)
+                for a, b in pairwise(ends)
                 if b - a >= 2 * FEWEST_SEGMENTS
             ]
     return sorted(runs, key=lambda run: (motions[run.motion].recording, run.motion, run.low))
@@ -164,7 +165,7 @@ def cut_into_segments(
 
 
 def split(path: Array, low: int, high: int, step: float) -> Integers:
-    """Samples from ``low`` on, each ``step`` further along the path than the last, up to ``high``."""
+    """Samples from ``low`` on, each ``step`` further along the path than the last."""
     away = np.sign(path[high] - path[low]) * (path[low : high + 1] - path[low])
     farthest = np.maximum.accumulate(away)
     ends, at = [low], 0.0

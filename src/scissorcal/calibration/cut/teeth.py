@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
-from scissorcal.calibration.path import Material, PathMotion
+from scissorcal.calibration.path import Material
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -27,7 +27,7 @@ LEAST_TICKS = 3.5
 """A stroke counts from so many samples a tooth; below, teeth and samples alias."""
 FASTEST_RATIO = (0.7, 1.4)
 SCAN = (0.4, 2.5)
-SCAN_STEP = 0.02
+SCAN_STEP = 0.04
 COHERENT = 0.30
 """Least share of the windows' power that keeps its phase for a stroke to show a line. Noise leaves
 less than 1 / sqrt(windows), 0.15 in a stroke of 45 windows."""
@@ -110,24 +110,31 @@ def phase_signals(
 
 
 def find_line(
-    signals: Sequence[PhaseSignal], log_periods: Sequence[Array], paths: Sequence[Array]
+    signals: Sequence[PhaseSignal],
+    log_periods: Sequence[Array],
+    paths: Sequence[Array],
+    near: bool = False,
 ) -> Line | None:
     """Look for the teeth; None where no stroke shows them.
 
     The phase's true advance is searched over ``SCAN`` of the expected one, by the power that keeps
     its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1977,
     doi:10.1109/TAES.1977.308469); the error is a jackknife over strokes, and ``PERIOD_SD``.
-    ``paths`` (k,) of the segments weigh the mean period.
+    ``paths`` (k,) of the segments weigh the mean period; ``near`` says that the expected period is
+    right to some percent, and needs no search.
     """
     seen = [s for s in signals if _ticks_per_cycle(s) >= LEAST_TICKS * SCAN[0]]
     if not seen:
         return None
-    scan = np.exp(np.arange(np.log(SCAN[0]), np.log(SCAN[1]), SCAN_STEP))
-    power = np.array([_coherent(seen, float(f)) for f in scan])
-    if not np.any(power > 0):
-        return None
-    frequency = float(scan[int(np.argmax(power))])
-    frequency = _fundamental(seen, _refined(seen, frequency))
+    frequency = 1.0
+    if not near:
+        scan = np.exp(np.arange(np.log(SCAN[0]), np.log(SCAN[1]), SCAN_STEP))
+        power = np.array([_coherent(seen, float(f)) for f in scan])
+        if not np.any(power > 0):
+            return None
+        frequency = _fundamental(seen, _refined(seen, float(scan[int(np.argmax(power))])))
+    else:
+        frequency = _refined(seen, frequency)
     pairs = {s.stretch: p for s in seen if (p := _pairs(s, frequency)) is not None}
     if not pairs:
         return None

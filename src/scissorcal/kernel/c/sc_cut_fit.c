@@ -239,7 +239,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             if (fabs(move) > largest) largest = fabs(move);
             if (step < SC_CUT_REST_STEPS) places[r] += move;
         }
-        if (step >= SC_CUT_REST_STEPS || largest < 1e-12) break;
+        if (step >= SC_CUT_REST_STEPS || largest < 1e-10) break;
     }
     double sum = 0.0, log_scale = log(p->noise_scale);
     for (int32_t i = 0; i < data->pieces; i++) {
@@ -313,10 +313,61 @@ static double observe(filter *f, const double *row, double residual, double nois
     return -0.5 * *standard * *standard - 0.5 * log(variance);
 }
 
+/* What a cycle is at slopes between two, by cubic interpolation in the slope's logarithm. */
+enum { CYCLE_KNOTS = 13 };
+
+typedef struct {
+    double first, step;
+    double log_start[CYCLE_KNOTS], log_stop[CYCLE_KNOTS], share[CYCLE_KNOTS], power[CYCLE_KNOTS];
+} cycle_table;
+
+static void fill_cycles(cycle_table *table, const sc_cut_parameters *p, double blades, double low,
+                        double high)
+{
+    table->first = log(low);
+    table->step = (log(high) - table->first) / (double)(CYCLE_KNOTS - 1);
+    for (int32_t i = 0; i < CYCLE_KNOTS; i++) {
+        double start, stop, slope = exp(table->first + table->step * (double)i);
+        sc_cut_cycle(p, blades, slope, &start, &stop, &table->share[i]);
+        table->log_start[i] = log(start);
+        table->log_stop[i] = log(stop);
+        sc_response_log_force(&p->response, table->log_start[i], &table->power[i]);
+    }
+}
+
+static double between(const double *knots, int32_t low, const double *weight)
+{
+    return weight[0] * knots[low] + weight[1] * knots[low + 1] + weight[2] * knots[low + 2] +
+           weight[3] * knots[low + 3];
+}
+
+static int32_t cycle_at(const cycle_table *table, double slope, double *weight)
+{
+    double place = (log(slope > LEAST_SLOPE ? slope : LEAST_SLOPE) - table->first) / table->step;
+    int32_t low = (int32_t)floor(place) - 1;
+    if (low < 0) low = 0;
+    if (low > CYCLE_KNOTS - 4) low = CYCLE_KNOTS - 4;
+    double t = place - (double)low;
+    weight[0] = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0;
+    weight[1] = t * (t - 2.0) * (t - 3.0) / 2.0;
+    weight[2] = -t * (t - 1.0) * (t - 3.0) / 2.0;
+    weight[3] = t * (t - 1.0) * (t - 2.0) / 6.0;
+    return low;
+}
+
 static double running(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
                       double *residuals, double *scaled, double *line_log_period)
 {
     double sum = 0.0, line = 0.0, blades = data->moving_blades;
+    int32_t count = data->run_first[data->sheets];
+    double lowest = HUGE_VAL, highest = 0.0;
+    for (int32_t k = 0; k < count; k++) {
+        if (data->run_slope[k] < lowest) lowest = data->run_slope[k];
+        if (data->run_slope[k] > highest) highest = data->run_slope[k];
+    }
+    cycle_table cycles;
+    lowest = 0.97 * (lowest > LEAST_SLOPE ? lowest : LEAST_SLOPE);
+    fill_cycles(&cycles, p, blades, lowest, 1.03 * (highest > lowest ? highest : 2.0 * lowest));
     for (int32_t sheet = 0; sheet < data->sheets; sheet++) {
         filter f;
         for (int32_t i = 0; i < 4; i++) forget(&f, i, 0.0);
@@ -326,11 +377,13 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             const double *le = data->run_lever_de + (ptrdiff_t)k * data->edge_count;
             const double *se = data->run_slope_de + (ptrdiff_t)k * data->edge_count;
             double by_edge = departure(se, p->edge, data->edge_count);
-            double start, stop, share, slope = data->run_slope[k] + by_edge;
-            sc_cut_cycle(p, blades, slope, &start, &stop, &share);
+            double weight[4], slope = data->run_slope[k] + by_edge;
+            int32_t at = cycle_at(&cycles, slope, weight);
+            double start = exp(between(cycles.log_start, at, weight)), stop = start;
+            if (p->fracture == SC_CUT_RIPPLED) stop = exp(between(cycles.log_stop, at, weight));
             double away = 0.5 * (start + stop) - data->reference_depth;
             slope += data->run_slope_dd[k] * away;
-            sc_cut_cycle(p, blades, slope, &start, &stop, &share);
+            double share = between(cycles.share, at, weight);
             double lever = data->run_lever[k] + data->run_lever_dd[k] * away +
                            departure(le, p->edge, data->edge_count);
             double peak = p->energy * lever / (blades * slope) *
@@ -338,8 +391,7 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             double torque = (1.0 + p->load) * share * peak;
             double period = 0.0;
             if (p->fracture == SC_CUT_RIPPLED) {
-                double power;
-                sc_response_log_force(&p->response, log(start), &power);
+                double power = between(cycles.power, at, weight);
                 double turn = 0.5 * (start + stop) * (1.0 + slope * slope) / (power * slope);
                 period = blades * (start - stop) / (lever - turn);
                 if (data->line_weight[k] > 0.0)

@@ -1,0 +1,108 @@
+"""Search for an optimum of a smooth log-posterior that is no sum of squares: BFGS."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.inference.counting import Stop
+from scissorcal.inference.problem import Problem
+from scissorcal.inference.squares import Descent
+
+Array = NDArray[np.float64]
+
+STEP = 0.02
+"""Step of the central differences, in standard deviations by the scores' outer product."""
+ROUNDS = 3
+STEPS = 40
+ARRIVED = 1e-4
+"""Log-posterior that a step has to promise to be worth taking."""
+ARMIJO, HALVINGS = 1e-4, 12
+LONGEST = 30.0
+"""Longest step, in standard deviations by the scores' outer product."""
+
+
+def ascend(
+    problem: Problem,
+    start: Array,
+    rounding: Callable[[Problem, Array], Array],
+    stop: Stop | None = None,
+) -> Descent:
+    """Maximise a smooth log-posterior from one start (p,) by BFGS with central differences.
+
+    Each round works in coordinates that ``rounding`` makes round, a root (p, p) of a covariance at
+    a point, so that the first step is a Newton step already (Nocedal and Wright 2006, chapter 6).
+    Rounds end where one gains nothing.
+    """
+    point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
+    value = problem.log_posterior(point)
+    root, promised = np.diag(problem.prior_sd), np.inf
+    for _ in range(ROUNDS):
+        if not np.isfinite(value) or (stop is not None and stop()):
+            break
+        before = value
+        surface = _Surface(problem, point, rounding(problem, point))
+        z, value, slope, inverse = _bfgs(surface, value)
+        point, promised = surface.at(z), 0.5 * float(slope @ inverse @ slope)
+        root = surface.root @ _root_of(inverse)
+        if value - before < ARRIVED or promised < ARRIVED:
+            break
+    return Descent(point, value, promised, root)
+
+
+class _Surface:
+    """A log-posterior in round coordinates about a centre."""
+
+    def __init__(self, problem: Problem, centre: Array, root: Array) -> None:
+        self.problem, self.centre, self.root = problem, centre, root
+
+    def at(self, z: Array) -> Array:
+        wanted = self.centre + self.root @ z
+        return np.asarray(np.clip(wanted, self.problem.lower, self.problem.upper))
+
+    def height(self, z: Array) -> float:
+        return self.problem.log_posterior(self.at(z))
+
+    def slope(self, z: Array) -> Array:
+        steps = STEP * np.eye(len(z))
+        points = [self.at(z + step) for step in steps] + [self.at(z - step) for step in steps]
+        heights = self.problem.log_posteriors(np.array(points))
+        ahead, behind = heights[: len(z)], heights[len(z) :]
+        known = np.isfinite(ahead) & np.isfinite(behind)
+        with np.errstate(invalid="ignore"):
+            return np.where(known, (ahead - behind) / (2 * STEP), 0.0)
+
+
+def _bfgs(surface: _Surface, value: float) -> tuple[Array, float, Array, Array]:
+    """Climb with one gradient a step: place, height, slope, and the inverse curvature learnt."""
+    size = len(surface.centre)
+    z, inverse = np.zeros(size), np.eye(size)
+    slope = surface.slope(z)
+    for _ in range(STEPS):
+        move = inverse @ slope
+        promised = float(slope @ move)
+        if promised < 2 * ARRIVED:
+            break
+        reach = min(1.0, LONGEST / float(np.linalg.norm(move)))
+        for _ in range(HALVINGS):
+            height = surface.height(z + reach * move)
+            if height > value + ARMIJO * reach * promised:
+                break
+            reach *= 0.4
+        else:
+            break
+        step, value = reach * move, height
+        z = z + step
+        after = surface.slope(z)
+        change = slope - after
+        slope = after
+        turned = float(step @ change)
+        if turned > 1e-3 * float(np.linalg.norm(step) * np.linalg.norm(change)):
+            left = np.eye(size) - np.outer(step, change) / turned
+            inverse = left @ inverse @ left.T + np.outer(step, step) / turned
+    return z, value, slope, inverse
+
+
+def _root_of(covariance: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 1e-12)))
