@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.scout import Scouted
+from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.sensors import Sensors
 from scissorcal.verdicts import Verdict, failed
@@ -47,11 +48,13 @@ def line_notes(
     """What the teeth say, what each sheet's toughness was, and what lack of fit was allowed for."""
     notes = []
     if scouted.believed and scouted.line is not None:
-        speeds = ", ".join(f"{speed:.2g}" for speed, _, share in scouted.line.speeds if share > 0.3)
+        speeds = ", ".join(
+            f"{speed:.2g}" for speed, _, gain in scouted.line.speeds if gain > COHERENT
+        )
         notes.append(
             f"The teeth of the running crack show as a line whose period is known to "
             f"{scouted.line.sd:.2%}, at stroke speeds of {speeds} rad/s; without it kappa would be "
-            f"{scouted.without:.2g} +- {scouted.without_sd:.2g}."
+            f"{scouted.without:.2g}, weakly known."
         )
     elif design.law.fracture == "rippled":
         notes.append(f"kappa is open: {scouted.reason}")

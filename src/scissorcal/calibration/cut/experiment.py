@@ -26,7 +26,9 @@ class CutRung(Rung):
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
         """The posterior of this rung, over the segments that ``keep`` selects."""
-        return replace(super().problem(series, keep), standardised=None, independent=True, smooth=True)
+        return replace(
+            super().problem(series, keep), standardised=None, independent=True, smooth=True
+        )
 
 
 @dataclass(frozen=True)

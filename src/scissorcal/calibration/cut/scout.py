@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)
 DISAGREE = 4.0
-"""A line is refused where its period lies so many standard deviations from what the rest says."""
+"""A line is refused where it costs the rest of the data as much as so many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,7 @@ class Scouted:
     """Segments by a fit that placed them, and the line, with why it is or is not believed.
 
     ``values`` are that fit's parameters by name, ``line`` is what was found, ``believed`` whether
-    it is used; ``without`` and ``without_sd`` are kappa and its standard deviation where the line
-    is left out. ``evaluations`` counts likelihoods.
+    it is used; ``without`` is kappa where the line is left out. ``evaluations`` counts likelihoods.
     """
 
     segments: Segments
@@ -44,7 +43,6 @@ class Scouted:
     line: Line | None
     believed: bool
     without: float
-    without_sd: float
     reason: str
     evaluations: int
 
@@ -92,9 +90,7 @@ def scout(
         evaluations += optimum.evaluations
         values = _natural(design, optimum.point)
         guess = _guess_of(design, values)
-    found = Scouted(
-        segments, materials, values, None, False, float("nan"), float("nan"), "", evaluations
-    )
+    found = Scouted(segments, materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
         return found
     return _with_line(found, design, optimum, recipe, known, geometry)
@@ -167,35 +163,35 @@ def _with_line(
     geometry: Geometry,
 ) -> Scouted:
     """Look for the teeth, ask whether they agree with the rest, and fit again with them."""
-    sd_period, sd_kappa = _uncertainty(design, optimum.point)
-    kappa = found.values["kappa"]
     first = _line(found, geometry, design)
-    found = replace(found, without=kappa, without_sd=sd_kappa)
+    found = replace(found, without=found.values["kappa"])
     if first is None:
         return replace(found, reason="No stroke shows the teeth of a running crack as a line.")
     if not first.at_two_speeds:
         return replace(
             found, line=first, reason="The line of the teeth does not show at two stroke speeds."
         )
-    away = abs(np.log(first.ratio)) / float(np.hypot(sd_period, first.sd))
+    alone = design.rung(design.observed).problem(design.series)
+    values, line, evaluations = dict(found.values), first, found.evaluations
+    for _ in range(ROUNDS):
+        values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
+        datum = LineDatum(line.log_period, line.sd, line.stretches)
+        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
+        with_line = find_optimum(design.rung(design.observed).problem(design.series))
+        evaluations += with_line.evaluations
+        values = _natural(design, with_line.point)
+        again = _line(replace(found, values=values), geometry, design, near=True)
+        if again is None:
+            break
+        line = again
+    lost = optimum.value - alone.log_posterior(with_line.point)
+    away = float(np.sqrt(max(2.0 * lost, 0.0)))
     if away > DISAGREE:
         reason = (
             f"The line's period lies {away:.1f} standard deviations from what the rest of the "
             "data say, as encoder counts that alias with the samples do."
         )
-        return replace(found, line=first, reason=reason)
-    values, line, evaluations = dict(found.values), first, found.evaluations
-    for _ in range(ROUNDS):
-        values["kappa"] = _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        datum = LineDatum(line.log_period, line.sd, line.stretches)
-        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
-        optimum = find_optimum(design.rung(design.observed).problem(design.series))
-        evaluations += optimum.evaluations
-        values = _natural(design, optimum.point)
-        again = _line(replace(found, values=values), geometry, design, near=True)
-        if again is None:
-            break
-        line = again
+        return replace(found, line=line, reason=reason, evaluations=evaluations)
     return replace(found, values=values, line=line, believed=True, evaluations=evaluations)
 
 
@@ -226,8 +222,8 @@ def _kappa_at(
     found: Scouted,
     log_period: float,
     stretches: tuple[int, ...],
-) -> float:
-    """The kappa that gives a mean period while the mean energy stays as it is."""
+) -> dict[str, float]:
+    """Kappa, and the energy that goes with it, that give a mean period at the same mean energy."""
     mean = values["fracture_energy"] * (1.0 + values["kappa"]) / 2.0
     response = Response(
         "power", values["response_force"], values["response_exponent"], geometry.reference_m
@@ -238,34 +234,8 @@ def _kappa_at(
         tried = {**values, "kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}
         logs, _ = tooth_periods(geometry, response, tried, opening)
         misses.append(abs(float(logs.mean()) - log_period))
-    return float(KAPPAS[int(np.argmin(misses))])
-
-
-def _uncertainty(design: CutExperiment, point: Array) -> tuple[float, float]:
-    """Standard deviations of the mean log period and of kappa, by the curvature at ``point``."""
-    from scissorcal.inference.curvature import hessian, natural_step
-
-    likelihood = replace(
-        design.likelihood,
-        line=LineDatum(0.0, np.inf, tuple(range(len(design.likelihood.segments.stretches)))),
-    )
-    design = replace(design, likelihood=likelihood, _last={})
-    problem = design.rung(design.observed).problem(design.series)
-    step = natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
-    information = -hessian(problem.log_posterior, point, step)
-    values, vectors = np.linalg.eigh(information)
-    covariance = (vectors / np.maximum(values, 1e-6 * values.max())) @ vectors.T
-    grade = np.array(
-        [
-            (design.evaluate(point + d).log_period - design.evaluate(point - d).log_period)
-            / (2 * np.abs(d).sum())
-            for d in np.diag(0.1 * step)
-        ]
-    )
-    index = design.layout.names.index("kappa")
-    kappa = float(design.layout.natural(point)["kappa"])
-    own = kappa * (1.0 - kappa) * float(np.sqrt(covariance[index, index]))
-    return float(np.sqrt(grade @ covariance @ grade)), own
+    kappa = float(KAPPAS[int(np.argmin(misses))])
+    return {"kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}
 
 
 def _values_of(guess: Guess, fracture: str) -> dict[str, float]:

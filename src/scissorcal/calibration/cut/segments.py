@@ -129,9 +129,7 @@ def find_runs(motions: tuple[PathMotion, ...]) -> list[Run]:
             turns = [low + t for t in turning_points(motion.opening[low:high], TURN_RAD)]
             ends = [low, *turns, high - 1]
             runs += [
-                Run(index, sheet, a, b)
-                for a, b in pairwise(ends)
-                if b - a >= 2 * FEWEST_SEGMENTS
+                Run(index, sheet, a, b) for a, b in pairwise(ends) if b - a >= 2 * FEWEST_SEGMENTS
             ]
     return sorted(runs, key=lambda run: (motions[run.motion].recording, run.motion, run.low))
 

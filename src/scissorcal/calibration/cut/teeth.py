@@ -26,11 +26,16 @@ LOCAL_CYCLES = 6.0
 LEAST_TICKS = 3.5
 """A stroke counts from so many samples a tooth; below, teeth and samples alias."""
 FASTEST_RATIO = (0.7, 1.4)
-SCAN = (0.4, 2.5)
+SCAN = (0.25, 2.5)
 SCAN_STEP = 0.04
-COHERENT = 0.30
-"""Least share of the windows' power that keeps its phase for a stroke to show a line. Noise leaves
-less than 1 / sqrt(windows), 0.15 in a stroke of 45 windows."""
+COHERENT = 16.0
+"""Power that keeps its phase over what noise leaves: exponential with mean 1 where there is no line,
+so that one stroke speed in ten million passes by chance."""
+OVERLAP = 4.0
+"""Windows half a cycle apart that count as one: the sum of the Hann window's squared
+autocorrelation."""
+SHOWN = 4.0
+"""Gain from which one stretch is used."""
 SPEEDS_DIFFER = 1.5
 SAME_PERIOD = 0.03
 HARMONICS = (2, 3)
@@ -55,8 +60,8 @@ class Line:
     """A line that was found: the true period is ``ratio`` times the expected one, +- ``sd``.
 
     ``log_period`` is the mean logarithm of the period (rad) over the stretches ``stretches``,
-    ``coherence`` the share of power that keeps its phase, by speed (rad/s) in ``speeds`` with the
-    ratio that each gives. ``half`` and ``third`` are the powers at a half and a third of the line's
+    ``gain`` the power that keeps its phase over what noise would leave. ``speeds`` has rows of
+    stroke speed (rad/s), the ratio that it gives and its gain. ``half`` and ``third`` are the powers at a half and a third of the line's
     frequency over its own.
     """
 
@@ -64,7 +69,7 @@ class Line:
     sd: float
     log_period: float
     stretches: tuple[int, ...]
-    coherence: float
+    gain: float
     speeds: tuple[tuple[float, float, float], ...]
     half: float
     third: float
@@ -72,7 +77,7 @@ class Line:
     @property
     def at_two_speeds(self) -> bool:
         """Whether two speeds that differ show the line at one period: counts would move."""
-        shown = [(speed, ratio) for speed, ratio, coherence in self.speeds if coherence > COHERENT]
+        shown = [(speed, ratio) for speed, ratio, gain in self.speeds if gain > COHERENT]
         return any(
             a[0] > SPEEDS_DIFFER * b[0] and abs(np.log(a[1] / b[1])) < SAME_PERIOD
             for a in shown
@@ -129,18 +134,18 @@ def find_line(
     frequency = 1.0
     if not near:
         scan = np.exp(np.arange(np.log(SCAN[0]), np.log(SCAN[1]), SCAN_STEP))
-        power = np.array([_coherent(seen, float(f)) for f in scan])
-        if not np.any(power > 0):
+        gains = np.array([_shown(seen, float(f)) for f in scan])
+        if not np.any(gains > 0):
             return None
-        frequency = _fundamental(seen, _refined(seen, float(scan[int(np.argmax(power))])))
+        frequency = _fundamental(seen, float(scan[int(np.argmax(gains))]))
     else:
         frequency = _refined(seen, frequency)
     pairs = {s.stretch: p for s in seen if (p := _pairs(s, frequency)) is not None}
     if not pairs:
         return None
-    kept = {index: pair for index, pair in pairs.items() if _coherence(pair) > 0.5 * COHERENT}
-    sums = np.array([pair.sum() for pair in kept.values()])
-    if len(sums) == 0 or abs(sums.sum()) / _total(kept.values()) < COHERENT:
+    kept = {index: pair for index, pair in pairs.items() if _gain([pair]) > SHOWN}
+    sums = np.array([pair.sum() / np.abs(pair).mean() for pair in kept.values()])
+    if len(sums) == 0 or _gain(list(kept.values())) < COHERENT:
         return None
     shift = np.angle(sums.sum()) / (2 * np.pi * WINDOW_CYCLES)
     jackknife = _jackknife(sums)
@@ -155,7 +160,7 @@ def find_line(
         sd=float(np.hypot(jackknife, PERIOD_SD)),
         log_period=mean - float(np.log(frequency)),
         stretches=where,
-        coherence=float(abs(sums.sum()) / _total(kept.values())),
+        gain=_gain(list(kept.values())),
         speeds=_by_speed(seen, frequency),
         half=_power(chosen, frequency / 2) / own,
         third=_power(chosen, frequency / 3) / own,
@@ -208,18 +213,30 @@ def _pairs(signal: PhaseSignal, frequency: float) -> Complex | None:
     return np.asarray(amplitude[apart:] * np.conj(amplitude[:-apart]))
 
 
-def _coherence(pair: Complex) -> float:
-    return float(abs(pair.sum()) / max(float(np.abs(pair).sum()), 1e-300))
+def _gain(pairs: Sequence[Complex]) -> float:
+    """Squared sum of the pairs over what it would be if their phases were random."""
+    own = [pair / np.abs(pair).mean() for pair in pairs]
+    chance = OVERLAP * sum(float(np.sum(np.abs(pair) ** 2)) for pair in own)
+    return float(abs(sum(complex(pair.sum()) for pair in own)) ** 2 / max(chance, 1e-300))
 
 
-def _total(pairs: object) -> float:
-    return float(sum(float(np.abs(pair).sum()) for pair in pairs))  # type: ignore[attr-defined]
+def _shown(signals: Sequence[PhaseSignal], frequency: float) -> float:
+    """Gain at a frequency, 0 where the phase gains a part of a cycle between windows."""
+    found = [p for s in signals if (p := _pairs(s, frequency)) is not None]
+    if not found:
+        return 0.0
+    ahead = sum(float(np.real(p.sum())) / float(np.abs(p).mean()) for p in found)
+    return _gain(found) if ahead > 0 else 0.0
 
 
 def _coherent(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """Sum over strokes of the coherence, weighed by their windows."""
-    found = [p for s in signals if (p := _pairs(s, frequency)) is not None]
-    return sum(len(p) * float(np.real(p.sum())) / float(np.abs(p).sum()) for p in found)
+    """Power that keeps its phase, each stroke's over the variance of its torque."""
+    total = 0.0
+    for signal in signals:
+        pair = _pairs(signal, frequency)
+        if pair is not None:
+            total += float(np.real(pair.sum())) / float(np.var(signal.torque))
+    return total
 
 
 def _power(signals: Sequence[PhaseSignal], frequency: float) -> float:
@@ -238,8 +255,16 @@ def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
     return frequency
 
 
+def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
+    """The frequency or one that gains a whole cycle more or less between two windows."""
+    apart = 1.0 / WINDOW_CYCLES
+    tried = [_refined(signals, frequency * (1.0 + k * apart)) for k in (-1, 0, 1)]
+    return max(tried, key=lambda f: _coherent(signals, f))
+
+
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """The frequency, or a half or a third of it where that has teeth of its own."""
+    frequency = _strongest(signals, frequency)
     own = _power(signals, frequency)
     for order in HARMONICS:
         lower = _refined(signals, frequency / order)
@@ -271,8 +296,8 @@ def _by_speed(
     for group in groups:
         pairs = [p for s in group if (p := _pairs(s, frequency)) is not None]
         if pairs:
-            total = sum(p.sum() for p in pairs)
+            total = sum(complex(p.sum()) for p in pairs)
             shift = float(np.angle(total)) / (2 * np.pi * WINDOW_CYCLES)
             speed = float(np.mean([s.stroke_speed for s in group]))
-            rows.append((speed, 1.0 / (frequency * (1 + shift)), float(abs(total) / _total(pairs))))
+            rows.append((speed, 1.0 / (frequency * (1 + shift)), _gain(pairs)))
     return tuple(rows)
