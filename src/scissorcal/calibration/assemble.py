@@ -6,12 +6,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.critic import Critique, criticise
 from scissorcal.calibration.ladder import Climbed, rung_table
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.selection import selection_sentence
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion

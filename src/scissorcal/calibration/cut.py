@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.conditioning import condition
 from scissorcal.calibration.cut_data import FrictionPrior, edge_of
 from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.cut_experiment import CutExperiment
@@ -19,6 +18,7 @@ from scissorcal.calibration.cut_toughness import with_toughness
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import choose
 from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.signals.filtering import condition
 from scissorcal.errors import InputError
 from scissorcal.inference import infer
 from scissorcal.model import EdgeBelief

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.friction_experiment import friction_law
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.model import Cutting, Edge, EdgeBelief, Response, friction_torque
 from scissorcal.recipe.schema import Recipe
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.cut_rests import Rests, find_rests
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.model import Edge, Turned, take_stance
 
 Array = NDArray[np.float64]

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.friction_experiment import FrictionExperiment, design
 from scissorcal.calibration.friction_layout import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.physical import bandwidth_verdict, physical_verdict, start_verdict
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.sensors import Sensors, inspect_sensors
-from scissorcal.calibration.windows import Windows, next_cutoff, weigh
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, find_optimum, infer, tails_of
 from scissorcal.model.terms import TERMS

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.windows import Windows
+from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model import presliding_state
 from scissorcal.model.terms import TERMS, Motion, evaluate
 

@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.friction_basis import FrictionBasis
 from scissorcal.calibration.friction_layout import NUISANCE, LawParts, friction_layout
 from scissorcal.calibration.ladder import Likelihood, Rung
 from scissorcal.calibration.layout import Layout
-from scissorcal.calibration.windows import Windows
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model import FrictionLaw
 from scissorcal.model.terms import TERMS
 from scissorcal.recording.recording import Joint

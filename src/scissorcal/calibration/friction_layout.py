@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.layout import Layout, Parameter
-from scissorcal.calibration.windows import Windows
+from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model.terms import TERMS, Motion, evaluate
 from scissorcal.recording.recording import Joint
 

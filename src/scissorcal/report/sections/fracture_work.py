@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration import friction_law
-from scissorcal.calibration.conditioning import Bins, condition
 from scissorcal.calibration.cut import CUTOFF_HZ
 from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.filtering import Bins, condition
 from scissorcal.errors import InputError
 from scissorcal.model import (
     Cutting,

@@ -1,12 +1,12 @@
 """From raw samples to band-limited bins: derivatives without phase, gaps respected."""
 
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.sensors import resolution_of
+from scissorcal.calibration.signals.segments import EDGE_SAMPLES, pieces_of, sheets_of
+from scissorcal.calibration.signals.sensors import resolution_of
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -14,10 +14,6 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BIN_S = 0.005
-EDGE_SAMPLES = 50
-"""Samples left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
-
-GAP_FACTOR = 1.5
 REST_MARGIN = 4
 JITTER = 0.1
 """Motion slower than this share of the recording's rms rate is jitter, not sliding."""
@@ -104,23 +100,6 @@ def condition(
         bin_s=pieces[0].bin_s,
         rate_floor=max(piece.rate_floor for piece in pieces),
     )
-
-
-def pieces_of(recording: Recording) -> list[tuple[int, int]]:
-    """Stretches without a gap that are long enough for a rate, as (first, one past the last)."""
-    time = recording.device_time_s
-    if len(time) < 2:
-        return []
-    step = np.diff(time)
-    usual = float(np.median(step))
-    if usual <= 0:
-        raise InputError(
-            f"{recording.source or 'The recording'}: its clock does not advance; "
-            "check the time column or the device's clock."
-        )
-    breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
-    bounds = [0, *breaks.tolist(), len(time)]
-    return [(low, high) for low, high in pairwise(bounds) if high - low > 4 * EDGE_SAMPLES]
 
 
 def _bin_piece(
@@ -221,13 +200,3 @@ def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
     share = min(2 * cutoff_Hz / rate_Hz, 1.0)
     noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
     return float(3 * noise)
-
-
-def sheets_of(recording: Recording) -> Integers:
-    """Sheet in place at each sample: a stroke's own, held until the next stroke names another."""
-    stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
-    of_stroke = np.array([s.sheet for s in recording.strokes] + [-1], dtype=np.int64)
-    known = np.where(stroke >= 0, stroke, len(recording.strokes))
-    sheet = of_stroke[known]
-    last = np.maximum.accumulate(np.where(stroke >= 0, np.arange(len(stroke)), -1))
-    return np.where(last >= 0, sheet[np.maximum(last, 0)], -1)

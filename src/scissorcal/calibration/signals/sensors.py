@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.signals.segments import stretches
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Status, Verdict
 
@@ -115,8 +116,10 @@ def _inspect(name: str, values: Array, moves: Mask) -> Channel:
     equal = values[1:] == values[:-1]
     inside = (values[1:] > low) & (values[1:] < high) & (values[1:] != 0.0)
     noisy = bool(np.any(inside)) and float(np.mean(equal[inside])) < NOISY
-    saturated = (_stretches(values == low) | _stretches(values == high)) if noisy else none
-    dead = _stretches((values == 0.0) & moves) if noisy and low < 0.0 < high else none
+    saturated = (
+        (_long_stretches(values == low) | _long_stretches(values == high)) if noisy else none
+    )
+    dead = _long_stretches((values == 0.0) & moves) if noisy and low < 0.0 < high else none
     return Channel(
         name,
         constant,
@@ -128,10 +131,10 @@ def _inspect(name: str, values: Array, moves: Mask) -> Channel:
     )
 
 
-def _stretches(held: Mask) -> Mask:
+def _long_stretches(held: Mask) -> Mask:
     """The runs of ``held`` (m,) that are too long for chance."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
-    lengths = edges[1::2] - edges[::2]
+    low, high = stretches(held)
+    lengths = high - low
     long_enough = np.repeat(lengths >= LONG_RUN, lengths)
     result = np.zeros(len(held), dtype=bool)
     result[np.flatnonzero(held)] = long_enough

@@ -6,15 +6,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import (
-    BIN_S,
-    EDGE_SAMPLES,
-    Bins,
-    low_pass,
-    pieces_of,
-    rate_floor,
-    sheets_of,
-)
+from scissorcal.calibration.signals.filtering import BIN_S, Bins, low_pass, rate_floor
+from scissorcal.calibration.signals.segments import EDGE_SAMPLES, pieces_of, sheets_of, stretches
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -246,8 +239,7 @@ def _rests(rate: Array, floor: float, tick_s: float) -> Mask:
     stands alone. Touches that follow each other within ``STICK_SLIP_S`` are sticking and slipping.
     """
     certain = np.abs(rate) > floor
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], certain, [True]]).astype(int)))
-    low, high = edges[::2], edges[1::2]
+    low, high = stretches(~certain)
     apart = round(3 * TURN_S / tick_s)
     before, after = np.maximum(low - apart, 0), np.minimum(high - 1 + apart, len(rate) - 1)
     turns = ((high - low) * tick_s <= TURN_S) & (low > 0) & (high < len(rate))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.sensors import channels_of, inspect_sensors, resolution_of
+from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors, resolution_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
