@@ -11,13 +11,21 @@ from scissorcal.recording.recording import Recording
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-EDGE_SAMPLES = 50
-"""Samples left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
+EDGE_S = 0.05
+"""Time left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
+EDGES = 4
+"""A piece is longer than so many edges, so that at least half of it can be used."""
+FEWEST_SAMPLES = 20
+"""Samples that a piece must exceed for a 4th-order filter and a window of one knot to fit in."""
 GAP_FACTOR = 1.5
 
 
 def pieces_of(recording: Recording) -> list[tuple[int, int]]:
-    """Stretches without a gap that are long enough for a rate, as (first, one past the last)."""
+    """Stretches without a gap that are long enough for a rate, as (first, one past the last).
+
+    Long enough is longer than four times ``EDGE_S``, and more than ``FEWEST_SAMPLES`` samples,
+    whatever the sampling rate. Raises InputError where the device's clock stands still.
+    """
     time = recording.device_time_s
     if len(time) < 2:
         return []
@@ -30,7 +38,26 @@ def pieces_of(recording: Recording) -> list[tuple[int, int]]:
         )
     breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
     bounds = [0, *breaks.tolist(), len(time)]
-    return [(low, high) for low, high in pairwise(bounds) if high - low > 4 * EDGE_SAMPLES]
+    least = max(EDGES * edge_samples(1.0 / usual), FEWEST_SAMPLES)
+    return [(low, high) for low, high in pairwise(bounds) if high - low > least]
+
+
+def edge_samples(rate_Hz: float) -> int:
+    """Samples that ``EDGE_S`` lasts at a sampling rate, one at least.
+
+    >>> edge_samples(1000.0), edge_samples(200.0)
+    (50, 10)
+    """
+    return max(1, round(EDGE_S * rate_Hz))
+
+
+def no_piece(recordings: tuple[Recording, ...]) -> InputError:
+    """Say that no piece of these recordings is long enough for a rate."""
+    names = ", ".join(recording.source or "recording" for recording in recordings)
+    return InputError(
+        f"{names}: no stretch without gaps is longer than {EDGES * EDGE_S:g} s and "
+        f"{FEWEST_SAMPLES} samples, so no rate can be computed; record again without interruptions."
+    )
 
 
 def stretches(held: Mask) -> tuple[Integers, Integers]:

@@ -7,7 +7,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S, Bins, low_pass, rate_floor
-from scissorcal.calibration.signals.segments import EDGE_SAMPLES, pieces_of, sheets_of, stretches
+from scissorcal.calibration.signals.segments import (
+    edge_samples,
+    no_piece,
+    pieces_of,
+    sheets_of,
+    stretches,
+)
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -55,9 +61,14 @@ class Windows:
     held: bool
 
     def average(self, values: Array) -> Array:
-        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
-        view = sliding_window_view(values, len(self.weights), axis=0)
-        return np.asarray(view[self.first] @ self.weights)
+        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k).
+
+        One weight after the other, so that memory grows with the windows and not with their length.
+        """
+        total = self.weights[0] * values[self.first]
+        for reach, weight in enumerate(self.weights[1:].tolist(), start=1):
+            total += weight * values[self.first + reach]
+        return np.asarray(total)
 
     @property
     def bears_load(self) -> bool:
@@ -107,11 +118,7 @@ def weigh(
             samples += high - low
         stroke_offset += len(recording.strokes)
     if not pieces:
-        names = ", ".join(recording.source or "recording" for recording in recordings)
-        raise InputError(
-            f"{names}: no stretch without gaps is longer than {4 * EDGE_SAMPLES} samples, "
-            "so no rate can be computed; record again without interruptions."
-        )
+        raise no_piece(recordings)
     if len({len(piece.weights) for piece in pieces}) > 1:
         raise InputError(
             "The recordings have different sampling rates; fit those of one rate together."
@@ -170,7 +177,8 @@ def _weigh_piece(
     weights, twice = _weights(knot, rate_Hz)
     driving = _widened(_spline(knot), HELD if held else SMOOTH)
     width = max(1, round(BIN_S * rate_Hz))
-    first = np.arange(EDGE_SAMPLES, len(time) - EDGE_SAMPLES - len(weights), width)
+    edge = edge_samples(rate_Hz)
+    first = np.arange(edge, len(time) - edge - len(weights), width)
     middle = first + len(weights) // 2
 
     def over(values: Array, kernel: Array, at: Integers) -> Array:
