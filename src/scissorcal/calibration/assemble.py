@@ -47,12 +47,14 @@ def assemble(
     load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
+    extra_diagnostics: Mapping[str, Any] | None = None,
 ) -> FitResult:
     """Put a finished fit into the form that reports, packages and files read.
 
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
-    ``extra_notes`` are what only the fit itself can say; they follow the common ones. ``critic``
+    ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
+    common ones. ``critic``
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
     what the joint bore, where that was measured.
     """
@@ -63,7 +65,7 @@ def assemble(
     natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     series = _series(chosen, posterior, bins, strokes, measured, contact)
-    diagnostics = _diagnostics(chosen, posterior, bins, measured)
+    diagnostics = _diagnostics(chosen, posterior, bins, measured) | dict(extra_diagnostics or {})
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, load, joint, rng)

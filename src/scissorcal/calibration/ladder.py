@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.friction_moments import ReducedLaw
+from scissorcal.calibration.friction_search import ascend, search
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
@@ -44,6 +46,20 @@ SEARCH_REACH = 8.0
 
 
 @dataclass(frozen=True)
+class ReducedProblem(Problem):
+    """A posterior whose sums over bins come from products by stroke, where the law has them."""
+
+    reduced: ReducedLaw | None = None
+
+    def log_likelihood(self, point: Array) -> float:
+        """Sum of the likelihood's terms; -inf where it is not finite."""
+        if self.reduced is None:
+            return super().log_likelihood(point)
+        total = self.reduced.log_likelihood(point)
+        return total if np.isfinite(total) else -np.inf
+
+
+@dataclass(frozen=True)
 class Likelihood:
     """A law's likelihood before its prior.
 
@@ -70,7 +86,9 @@ class Likelihood:
 class Rung:
     """One law of a ladder, ready to be fitted. ``key`` holds its discrete choices.
 
-    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.Problem`.
+    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.Problem`. ``reduced``
+    is the same law over products of its columns by stroke, where it is linear in them and its noise
+    normal: what needs sums over bins only is then taken from there.
     """
 
     name: str
@@ -82,8 +100,9 @@ class Rung:
     prior_precision: Array
     blocks: Integers | None = None
     populations: Integers | None = None
+    reduced: ReducedLaw | None = None
 
-    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
+    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> "ReducedProblem":
         """The posterior of this rung, over the bins that ``keep`` selects."""
 
         def log_prior(u: Array) -> float:
@@ -102,7 +121,8 @@ class Rung:
             return labels if labels is None or keep is None else labels[keep]
 
         sd = self.layout.sd
-        return Problem(
+        return ReducedProblem(
+            reduced=self.reduced if keep is None else None,
             names=self.layout.names,
             log_prior=log_prior,
             log_likelihood_terms=terms,
@@ -151,6 +171,7 @@ class Climbed:
             self.rung.prior_precision,
             labelled,
             self.share,
+            self.rung.reduced.by_stroke if self.rung.reduced else None,
         )
 
     @property
@@ -173,6 +194,8 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
     arXiv:1711.05305).
     """
     problem = rung.problem(series)
+    if rung.reduced is not None:
+        return _climb_reduced(rung, rung.reduced, problem, strokes)
     optimum = find_optimum(problem)
     point = optimum.point
     white = ljung_box(rung.likelihood.standardised(point), series)
@@ -196,6 +219,36 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
         log_likelihood=problem.log_likelihood(point),
         share=white.share,
         series=series,
+        strokes=strokes,
+    )
+
+
+def _climb_reduced(
+    rung: Rung, law: ReducedLaw, problem: ReducedProblem, strokes: Integers
+) -> Climbed:
+    """As :func:`climb`, over products by stroke; what is held out is fitted without it in full."""
+    optimum = search(law, problem)
+    labels = law.moments.labels
+    white = ljung_box(rung.likelihood.standardised(optimum.point), problem.series)
+    residuals, densities = np.full(len(strokes), np.nan), np.full(len(strokes), np.nan)
+    folds = split_strokes(labels)
+    for fold in folds:
+        rest = law.without(fold)
+        seen = replace(problem, reduced=rest)
+        reached = ascend(rest, seen, optimum.point).point if len(folds) > 1 else optimum.point
+        unseen = np.isin(strokes, fold)
+        left = rung.likelihood.residuals(reached)[unseen]
+        residuals[unseen] = left
+        densities[unseen] = -0.5 * (left * np.exp(-reached[-1])) ** 2 - reached[-1]
+    return Climbed(
+        rung=rung,
+        optimum=optimum,
+        scores=np.array([densities[strokes == label].sum() for label in labels]),
+        held_out_residuals=residuals,
+        information=law.information(optimum.point),
+        log_likelihood=problem.log_likelihood(optimum.point),
+        share=white.share,
+        series=problem.series,
         strokes=strokes,
     )
 

@@ -18,6 +18,7 @@ HEADERS = (
     "sc_servo.h",
     "sc_block.h",
     "sc_loop.h",
+    "sc_presliding.h",
 )
 
 

@@ -32,10 +32,7 @@ def pieces_of(recording: Recording) -> list[tuple[int, int]]:
     step = np.diff(time)
     usual = float(np.median(step))
     if usual <= 0:
-        raise InputError(
-            f"{recording.source or 'The recording'}: its clock does not advance; "
-            "check the time column or the device's clock."
-        )
+        raise still_clock(recording)
     breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
     bounds = [0, *breaks.tolist(), len(time)]
     least = max(EDGES * edge_samples(1.0 / usual), FEWEST_SAMPLES)
@@ -49,6 +46,14 @@ def edge_samples(rate_Hz: float) -> int:
     (50, 10)
     """
     return max(1, round(EDGE_S * rate_Hz))
+
+
+def still_clock(recording: Recording) -> InputError:
+    """Say that the clock of a recording stands still, so that nothing has a rate."""
+    return InputError(
+        f"{recording.source or 'The recording'}: its clock does not advance; "
+        "check the time column or the device's clock."
+    )
 
 
 def no_piece(recordings: tuple[Recording, ...]) -> InputError:

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.segments import stretches
+from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Status, Verdict
 
@@ -112,7 +112,9 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
         names.append("handle_force")
     opening = np.asarray(samples["opening"], dtype=np.float64)
     time = recording.device_time_s
-    tick_s = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    tick_s = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if tick_s <= 0.0:
+        raise still_clock(recording)
     moves = _moves(opening, max(1, round(NEAR_S / tick_s)))
     return tuple(
         _inspect(name, np.asarray(samples[name], dtype=np.float64), moves, tick_s) for name in names

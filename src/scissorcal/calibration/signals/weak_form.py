@@ -1,6 +1,8 @@
 """Motion and drive weighed over short windows, so that filtering treats both sides alike."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -16,6 +18,9 @@ from scissorcal.calibration.signals.segments import (
 )
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -41,10 +46,10 @@ class Windows:
     """A recording as weighed by short windows, and the samples beneath.
 
     ``bins`` (n,) hold weighted means: of the drive, and of the acceleration exactly, by moving both
-    derivatives from the position to the weight. ``opening``, ``rate`` and ``load`` (m,) are the
-    samples (``load`` None where none was measured), for what is not linear in them: friction is
-    taken at every sample and weighed by :meth:`average`, as the measured drive was. ``first`` (n,)
-    is where each window begins, ``weights`` (k,) its weights, ``starts`` where the pieces
+    derivatives from the position to the weight. ``opening``, ``rate``, ``load`` and ``drive`` (m,)
+    are the samples (``load`` None where none was measured), for what is not linear in them:
+    friction is taken at every sample and weighed by :meth:`average`, as the drive was. ``first``
+    (n,) is where each window begins, ``weights`` (k,) its weights, ``starts`` where the pieces
     without a gap begin. ``slope`` (n,) is the time derivative of the weighed drive, ``tick_s`` the
     time between samples; ``held`` says that commands held the drive from one to the next.
     """
@@ -53,6 +58,7 @@ class Windows:
     opening: Array
     rate: Array
     load: Array | None
+    drive: Array
     first: Integers
     weights: Array
     starts: Integers
@@ -61,14 +67,20 @@ class Windows:
     held: bool
 
     def average(self, values: Array) -> Array:
-        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k).
+        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
+        return np.asarray(self._weighing @ values)
 
-        One weight after the other, so that memory grows with the windows and not with their length.
-        """
-        total = self.weights[0] * values[self.first]
-        for reach, weight in enumerate(self.weights[1:].tolist(), start=1):
-            total += weight * values[self.first + reach]
-        return np.asarray(total)
+    @cached_property
+    def _weighing(self) -> "csr_array":
+        """The windows' weights as a sparse matrix (n, m)."""
+        from scipy.sparse import csr_array
+
+        count, length = len(self.first), len(self.weights)
+        places = (self.first[:, None] + np.arange(length)).ravel().astype(np.int32)
+        ends = np.arange(count + 1, dtype=np.int32) * length
+        return csr_array(
+            (np.tile(self.weights, count), places, ends), shape=(count, len(self.rate))
+        )
 
     @property
     def bears_load(self) -> bool:
@@ -147,6 +159,7 @@ def _joined(pieces: list[Windows], loaded: bool) -> Windows:
         opening=together("opening"),
         rate=together("rate"),
         load=together("load") if loaded else None,
+        drive=together("drive"),
         first=np.concatenate([piece.first for piece in pieces]),
         weights=pieces[0].weights,
         starts=np.concatenate([piece.starts for piece in pieces]),
@@ -209,6 +222,7 @@ def _weigh_piece(
         opening=opening,
         rate=rate,
         load=low_pass(recording.handle_radius_m * hand, band_Hz, rate_Hz),
+        drive=drive,
         first=first,
         weights=weights,
         starts=np.zeros(1, dtype=np.int64),
