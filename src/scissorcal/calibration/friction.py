@@ -17,9 +17,8 @@ from scissorcal.calibration.friction_noise import (
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.friction_search import search
 from scissorcal.calibration.hashing import fit_inputs_hash
-from scissorcal.calibration.ladder import Climbed, choose, climb
+from scissorcal.calibration.ladder import Climbed, choose, climb, optimum_of
 from scissorcal.calibration.physical import bandwidth_verdict, physical_verdict, start_verdict
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
@@ -27,7 +26,7 @@ from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.errors import InputError
-from scissorcal.inference import Posterior, find_optimum, infer, tails_of
+from scissorcal.inference import Posterior, infer, tails_of
 from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
@@ -212,8 +211,7 @@ def _bandwidth(
     )
     here = chosen.optimum.point
     rung = replace(there.rung(there.observed), starts=here[None, :])
-    problem = rung.problem(there.series)
-    optimum = search(rung.reduced, problem) if rung.reduced else find_optimum(problem)
+    optimum = optimum_of(rung, there.series)
     cutoffs = (settings.cutoff_Hz, other_Hz)
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 

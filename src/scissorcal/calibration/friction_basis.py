@@ -14,8 +14,9 @@ from scissorcal.model.terms import TERMS, Motion, evaluate
 Array = NDArray[np.float64]
 Product = tuple[float, tuple[str, ...]]
 
-SPACING = 0.1
-"""Distance of nodes in the logarithm of a scale; interpolation then errs by 1e-4 at most."""
+RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
+"""Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
+errs by 2e-4 of a level at most."""
 
 RIGID = 5
 """Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
@@ -49,8 +50,8 @@ class FrictionBasis:
         self.levels = tuple(name for name in terms if TERMS[name].of_rate_only)
         self.others = tuple(name for name in terms if not TERMS[name].of_rate_only)
         self.fixed = np.column_stack([*self._rigid(), *self._free(), *self._levels()])
-        self.stribeck = ScaledColumns(self._stribeck_at)
-        self.lag = ScaledColumns(self._lag_at)
+        self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
+        self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
 
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
@@ -180,34 +181,34 @@ def _value(values: Mapping[str, Array], name: str) -> float:
     return 0.0 if found is None else float(values[found])
 
 
-def cell_of(log_scale: float) -> tuple[int, ...]:
-    """The four nodes around a scale's logarithm.
-
-    >>> cell_of(0.05)
-    (-1, 0, 1, 2)
-    """
-    low = math.floor(log_scale / SPACING)
-    return (low - 1, low, low + 1, low + 2)
-
-
 class ScaledColumns:
     """Columns that depend smoothly on a positive scale, worked out at nodes when first needed."""
 
-    def __init__(self, at: Callable[[float], Array]) -> None:
-        self.at = at
+    def __init__(self, at: Callable[[float], Array], spacing: float) -> None:
+        """``at`` gives the columns at a scale, ``spacing`` is the nodes' in its logarithm."""
+        self.at, self.spacing = at, spacing
         self.known: dict[int, Array] = {}
         self.last: tuple[float, Array] | None = None
 
     def __call__(self, scale: float) -> Array:
         """Cubic interpolation (Lagrange) in the logarithm of ``scale``."""
         if self.last is None or self.last[0] != scale:
-            nodes = cell_of(float(np.log(scale)))
+            nodes = self.cell_of(float(np.log(scale)))
             weights = self.weights_over(np.asarray(scale), nodes).tolist()
             total = weights[0] * self.node(nodes[0])
             for index, weight in zip(nodes[1:], weights[1:], strict=True):
                 total += weight * self.node(index)
             self.last = (scale, total)
         return self.last[1]
+
+    def cell_of(self, log_scale: float) -> tuple[int, ...]:
+        """The four nodes around a scale's logarithm.
+
+        >>> ScaledColumns(lambda scale: np.array([scale]), 0.1).cell_of(0.05)
+        (-1, 0, 1, 2)
+        """
+        low = math.floor(log_scale / self.spacing)
+        return (low - 1, low, low + 1, low + 2)
 
     def weights_over(self, scales: Array, nodes: tuple[int, ...]) -> Array:
         """Weights (..., nodes) by which columns at ``nodes`` make up those at ``scales`` (...).
@@ -217,12 +218,12 @@ class ScaledColumns:
         """
         if len(nodes) == 1:
             return np.ones((*np.shape(scales), 1))
-        return np.stack(_cubic(np.log(scales) / SPACING - nodes[1]), axis=-1)
+        return np.stack(_cubic(np.log(scales) / self.spacing - nodes[1]), axis=-1)
 
     def node(self, index: int) -> Array:
         """Columns at one node."""
         if index not in self.known:
-            self.known[index] = self.at(float(np.exp(index * SPACING)))
+            self.known[index] = self.at(float(np.exp(index * self.spacing)))
         return self.known[index]
 
 

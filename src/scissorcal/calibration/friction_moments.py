@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_basis import FrictionBasis, cell_of, side_of
+from scissorcal.calibration.friction_basis import FrictionBasis, side_of
 from scissorcal.calibration.layout import Layout
 
 Array = NDArray[np.float64]
@@ -23,6 +23,8 @@ MEASURED: Block = ("measured", 0)
 FIXED: Block = ("fixed", 0)
 STEP = 1e-4
 """Step in unconstrained parameters by which coefficients are differentiated."""
+MOST_BYTES = 1e8
+"""Memory for cells, which are made again when they are wanted again."""
 LEAST = 1e-13
 """Share of the measured squares below which what is left is rounding."""
 
@@ -43,6 +45,7 @@ class StrokeMoments:
         self._bounds = list(zip([0, *ends[:-1]], ends, strict=True))
         self._sorted: dict[Block, Array] = {}
         self._products: dict[tuple[Block, Block], Array] = {}
+        self._cells: dict[Cell, Array] = {}
 
     def of(self, measured: Array) -> "StrokeMoments":
         """The same columns with other measurements (n,)."""
@@ -62,24 +65,29 @@ class StrokeMoments:
             )
         return self._products[a, b]
 
-    def cell(self, cell: Cell, weights: Array | None = None) -> Array:
-        """Products of measurements, fixed columns and those of a cell's nodes.
+    def cell(self, cell: Cell) -> Array:
+        """Products of measurements, fixed columns and those of a cell's nodes, (strokes, q, q)."""
+        if cell not in self._cells:
+            made = self._assembled(cell)
+            if (len(self._cells) + 1) * made.nbytes > MOST_BYTES:
+                self._cells.clear()
+            self._cells[cell] = made
+        return self._cells[cell]
 
-        Summed over strokes with ``weights`` (strokes,), or (strokes, q, q) where there are none.
-        """
+    def _assembled(self, cell: Cell) -> Array:
         blocks = [MEASURED, FIXED]
         blocks += [("stribeck", index) for index in cell[0]]
         blocks += [("lag", index) for index in cell[1]]
-
-        rows: list[list[Array]] = [[] for _ in blocks]
+        ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
+        result = np.empty((len(self.labels), ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
-            for j, right in enumerate(blocks):
-                if j < i:
-                    rows[i].append(np.swapaxes(rows[j][i], -1, -2))
-                    continue
-                found = self.products(left, right)
-                rows[i].append(found if weights is None else np.tensordot(weights, found, axes=1))
-        return np.asarray(np.block(rows))
+            rows = slice(ends[i], ends[i + 1])
+            for j in range(i, len(blocks)):
+                columns = slice(ends[j], ends[j + 1])
+                found = self.products(left, blocks[j])
+                result[:, rows, columns] = found
+                result[:, columns, rows] = found.transpose(0, 2, 1)
+        return result
 
     def _columns(self, block: Block) -> Array:
         """Columns of a block, stroke after stroke."""
@@ -158,15 +166,17 @@ class ReducedLaw:
 
     def cell_at(self, u: Array) -> Cell:
         """The nodes of the scales that ``u`` (p,) lies between."""
+        basis = self.moments.basis
         first, second = (
-            () if place is None else cell_of(float(u[place])) for place in self._scales
+            () if place is None else scaled.cell_of(float(u[place]))
+            for place, scaled in zip(self._scales, (basis.stribeck, basis.lag), strict=True)
         )
         return first, second
 
     def summed(self, cell: Cell) -> Array:
         """Products over the strokes that count, (q, q)."""
         if cell not in self._cells:
-            self._cells[cell] = self.moments.cell(cell, self._weights)
+            self._cells[cell] = np.tensordot(self._weights, self.moments.cell(cell), axes=1)
         return self._cells[cell]
 
     def factors(self, u: Array, cell: Cell) -> Array:

@@ -1,12 +1,11 @@
 """The optimum of a friction law over products of its columns: scans of its scales, Gauss-Newton."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_basis import SPACING
 from scissorcal.calibration.friction_moments import Cell, ReducedLaw
 from scissorcal.inference.optimise import Cluster, Optimum
 from scissorcal.inference.problem import Problem
@@ -20,10 +19,36 @@ ARRIVED = 1e-6
 SAME_HEIGHT = 0.5
 AT_BOUND = 1e-6
 SILENT = 1e-9
-SCAN_REACH, SCAN_STEP = 2.5, 0.5
+SCAN_REACH, SCAN_STEP = 2.5, 0.6
 """Reach of a scan in prior standard deviations, and its step in the logarithm of a scale."""
 SCANNED_STARTS = 2
 RIDGE = 1e-10
+
+
+@dataclass(frozen=True)
+class ReducedProblem(Problem):
+    """A posterior whose sums over bins come from products by stroke, where the law has them.
+
+    Its prior is normal, with ``prior_mean`` (p,) and ``prior_precision`` (p, p).
+    """
+
+    prior_mean: Array = field(default_factory=lambda: np.zeros(0))
+    prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    reduced: ReducedLaw | None = None
+
+    def log_likelihood(self, point: Array) -> float:
+        """Sum of the likelihood's terms; -inf where it is not finite."""
+        if self.reduced is None:
+            return super().log_likelihood(point)
+        total = self.reduced.log_likelihood(point)
+        return total if np.isfinite(total) else -np.inf
+
+    @property
+    def law(self) -> ReducedLaw:
+        """The law over products; ValueError where there is none."""
+        if self.reduced is None:
+            raise ValueError("this posterior is one over bins: search it with find_optimum")
+        return self.reduced
 
 
 @dataclass(frozen=True)
@@ -33,7 +58,7 @@ class _Ascent:
     evaluations: int
 
 
-def search(law: ReducedLaw, problem: Problem) -> Optimum:
+def search(problem: ReducedProblem) -> Optimum:
     """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
 
     Levenberg and Marquardt's method on the law's own coefficients (More 1978,
@@ -42,8 +67,8 @@ def search(law: ReducedLaw, problem: Problem) -> Optimum:
     highest): scales are therefore scanned with all columns free, and the best places are starts
     too.
     """
-    starts = [*problem.starts, *_scanned(law, problem)]
-    ended = [ascend(law, problem, start) for start in starts]
+    starts = [*problem.starts, *_scanned(problem)]
+    ended = [ascend(problem, start) for start in starts]
     best = max(ended, key=lambda one: one.value)
     agreeing = sum(one.value > best.value - SAME_HEIGHT for one in ended)
     optima: list[Cluster] = []
@@ -51,7 +76,7 @@ def search(law: ReducedLaw, problem: Problem) -> Optimum:
         if all(np.abs((one.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
             optima.append(Cluster(one.point, one.value, 1, True))
     optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
-    status, concerned = _status(law, problem, best.point)
+    status, concerned = _status(problem, best.point)
     sentence = status.value + (f" It concerns {concerned}." if concerned else "")
     if agreeing < len(ended):
         sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
@@ -68,18 +93,18 @@ def search(law: ReducedLaw, problem: Problem) -> Optimum:
     )
 
 
-def ascend(law: ReducedLaw, problem: Problem, start: Array) -> _Ascent:
+def ascend(problem: ReducedProblem, start: Array) -> _Ascent:
     """Climb from one start (p,) to the optimum that it leads to."""
-    precision, mean = 1.0 / problem.prior_sd**2, _prior_mean(problem)
-    point = _with_best_noise(law, problem, np.clip(start, problem.lower, problem.upper))
+    law, precision, mean = problem.law, problem.prior_precision, problem.prior_mean
+    point = _with_best_noise(problem, np.clip(start, problem.lower, problem.upper))
     value, evaluations, damping = problem.log_posterior(point), 1, 1e-3
     for _ in range(MOST_STEPS):
         cell = law.cell_at(point)
         slopes, products = law.slopes(point, cell), law.summed(cell)
         weight = np.exp(-2.0 * point[-1])
         factors = law.factors(point, cell)
-        slope = -weight * slopes.T @ (products @ factors) - (precision * (point - mean))[:-1]
-        curvature = weight * slopes.T @ products @ slopes + np.diag(precision[:-1])
+        slope = -weight * slopes.T @ (products @ factors) - (precision @ (point - mean))[:-1]
+        curvature = weight * slopes.T @ products @ slopes + precision[:-1, :-1]
         evaluations += 2 * len(point) - 1
         gained, promised = 0.0, np.inf
         while damping < 1e12:
@@ -89,7 +114,7 @@ def ascend(law: ReducedLaw, problem: Problem, start: Array) -> _Ascent:
                 break
             reached = point.copy()
             reached[:-1] = np.clip(point[:-1] + step, problem.lower[:-1], problem.upper[:-1])
-            reached = _with_best_noise(law, problem, reached)
+            reached = _with_best_noise(problem, reached)
             height = problem.log_posterior(reached)
             evaluations += 1
             if height > value:
@@ -101,14 +126,10 @@ def ascend(law: ReducedLaw, problem: Problem, start: Array) -> _Ascent:
     return _Ascent(point, value, evaluations)
 
 
-def _prior_mean(problem: Problem) -> Array:
-    return np.asarray(0.5 * (problem.lower + problem.upper))
-
-
-def _with_best_noise(law: ReducedLaw, problem: Problem, point: Array) -> Array:
+def _with_best_noise(problem: ReducedProblem, point: Array) -> Array:
     """The point (p,) with the noise at its best for the squares that the law leaves there."""
-    squares, count = law.squares(point), law.counted
-    mean, precision = _prior_mean(problem)[-1], problem.prior_sd[-1] ** -2
+    squares, count = problem.law.squares(point), problem.law.counted
+    mean, precision = problem.prior_mean[-1], problem.prior_precision[-1, -1]
     size = 0.5 * np.log(squares / count)
     for _ in range(20):
         left = squares * np.exp(-2.0 * size)
@@ -121,47 +142,48 @@ def _with_best_noise(law: ReducedLaw, problem: Problem, point: Array) -> Array:
     return reached
 
 
-def _scanned(law: ReducedLaw, problem: Problem) -> list[Array]:
-    """Starts at the scales at which the columns, each of them free, leave the fewest squares."""
-    layout = law.layout
-    places = {
-        name: layout.names.index(name)
-        for name in ("stribeck_rate", "presliding_length")
-        if name in layout.names
-    }
-    if "presliding_length" not in places:
+def _scanned(problem: ReducedProblem) -> list[Array]:
+    """Starts at the scales at which the columns, each of them free, leave the fewest squares.
+
+    Only laws with Dahl's length need them.
+    """
+    law = problem.law
+    names, basis = law.layout.names, law.moments.basis
+    if "presliding_length" not in names:
         return []
-    grids = [
-        _grid(problem, places[name]) if name in places else ()
-        for name in ("stribeck_rate", "presliding_length")
-    ]
+    late = names.index("presliding_length")
+    slow = names.index("stribeck_rate") if "stribeck_rate" in names else None
+    lengths = _grid(problem, late, basis.lag.spacing)
+    rates: list[int | None] = [None]
+    if slow is not None:
+        rates = list(_grid(problem, slow, basis.stribeck.spacing))
     found = []
-    for rate, length in product(grids[0] or (None,), grids[1]):
+    for rate, length in product(rates, lengths):
         cell: Cell = (() if rate is None else (rate,), (length,))
         found.append((_free_squares(law, problem.starts[0], cell), rate, length))
     found.sort(key=lambda one: one[0])
     starts: list[Array] = []
     taken: list[int] = []
     for _, rate, length in found:
-        if any(abs(length - other) * SPACING < 1.5 * SCAN_STEP for other in taken):
+        if any(abs(length - other) * basis.lag.spacing < 1.5 * SCAN_STEP for other in taken):
             continue
         taken.append(length)
         start = problem.starts[0].copy()
-        start[places["presliding_length"]] = length * SPACING
-        if rate is not None:
-            start[places["stribeck_rate"]] = rate * SPACING
+        start[late] = length * basis.lag.spacing
+        if rate is not None and slow is not None:
+            start[slow] = rate * basis.stribeck.spacing
         starts.append(start)
         if len(starts) == SCANNED_STARTS:
             break
     return starts
 
 
-def _grid(problem: Problem, place: int) -> tuple[int, ...]:
+def _grid(problem: ReducedProblem, place: int, spacing: float) -> list[int]:
     """Nodes over the prior of a scale's logarithm."""
-    middle, reach = _prior_mean(problem)[place], SCAN_REACH * problem.prior_sd[place]
+    middle, reach = problem.prior_mean[place], SCAN_REACH * problem.prior_sd[place]
     count = max(2, round(2 * reach / SCAN_STEP) + 1)
     logs = np.linspace(middle - reach, middle + reach, count)
-    return tuple(np.unique(np.round(logs / SPACING).astype(int)).tolist())
+    return list(np.unique(np.round(logs / spacing).astype(int)).tolist())
 
 
 def _free_squares(law: ReducedLaw, start: Array, cell: Cell) -> float:
@@ -185,12 +207,13 @@ def _dips(problem: Problem, best: Cluster, other: Cluster) -> bool:
     )
 
 
-def _status(law: ReducedLaw, problem: Problem, point: Array) -> tuple[SearchStatus, str]:
+def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, str]:
     """How the search ended, and the names of the parameters that it concerns."""
     scale = problem.prior_sd
     bound = np.minimum(point - problem.lower, problem.upper - point) < AT_BOUND * scale
     if np.any(bound):
         return SearchStatus.AT_BOUNDS, named(problem.names, bound)
+    law = problem.law
     height = law.log_likelihood(point)
     silent = np.array(
         [

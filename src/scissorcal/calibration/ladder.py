@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction_moments import ReducedLaw
-from scissorcal.calibration.friction_search import ascend, search
+from scissorcal.calibration.friction_search import ReducedProblem, ascend, search
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
@@ -43,20 +43,6 @@ factor of 20 (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572, call th
 
 SEARCH_REACH = 8.0
 """Half-width of the search, in prior standard deviations."""
-
-
-@dataclass(frozen=True)
-class ReducedProblem(Problem):
-    """A posterior whose sums over bins come from products by stroke, where the law has them."""
-
-    reduced: ReducedLaw | None = None
-
-    def log_likelihood(self, point: Array) -> float:
-        """Sum of the likelihood's terms; -inf where it is not finite."""
-        if self.reduced is None:
-            return super().log_likelihood(point)
-        total = self.reduced.log_likelihood(point)
-        return total if np.isfinite(total) else -np.inf
 
 
 @dataclass(frozen=True)
@@ -123,6 +109,8 @@ class Rung:
         sd = self.layout.sd
         return ReducedProblem(
             reduced=self.reduced if keep is None else None,
+            prior_mean=self.prior_mean,
+            prior_precision=self.prior_precision,
             names=self.layout.names,
             log_prior=log_prior,
             log_likelihood_terms=terms,
@@ -193,10 +181,9 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
     from the full one by a Newton step (the approximate cross-validation of Beirami et al. 2017,
     arXiv:1711.05305).
     """
-    problem = rung.problem(series)
+    problem, optimum = rung.problem(series), optimum_of(rung, series)
     if rung.reduced is not None:
-        return _climb_reduced(rung, rung.reduced, problem, strokes)
-    optimum = find_optimum(problem)
+        return _climb_reduced(rung, rung.reduced, problem, optimum, strokes)
     point = optimum.point
     white = ljung_box(rung.likelihood.standardised(point), series)
     step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
@@ -223,19 +210,26 @@ def climb(rung: Rung, series: Integers, strokes: Integers) -> Climbed:
     )
 
 
+def optimum_of(rung: Rung, series: Integers) -> Optimum:
+    """The optimum of a rung over its bins, by the search that fits use for it.
+
+    ``series`` (n,) labels the bins' pieces without a gap.
+    """
+    problem = rung.problem(series)
+    return find_optimum(problem) if rung.reduced is None else search(problem)
+
+
 def _climb_reduced(
-    rung: Rung, law: ReducedLaw, problem: ReducedProblem, strokes: Integers
+    rung: Rung, law: ReducedLaw, problem: ReducedProblem, optimum: Optimum, strokes: Integers
 ) -> Climbed:
     """As :func:`climb`, over products by stroke; what is held out is fitted without it in full."""
-    optimum = search(law, problem)
     labels = law.moments.labels
     white = ljung_box(rung.likelihood.standardised(optimum.point), problem.series)
     residuals, densities = np.full(len(strokes), np.nan), np.full(len(strokes), np.nan)
     folds = split_strokes(labels)
     for fold in folds:
-        rest = law.without(fold)
-        seen = replace(problem, reduced=rest)
-        reached = ascend(rest, seen, optimum.point).point if len(folds) > 1 else optimum.point
+        seen = replace(problem, reduced=law.without(fold))
+        reached = ascend(seen, optimum.point).point if len(folds) > 1 else optimum.point
         unseen = np.isin(strokes, fold)
         left = rung.likelihood.residuals(reached)[unseen]
         residuals[unseen] = left

@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 LENGTHS = (4, 8, 16, 32, 64, 128)
 """Ticks over which the torque is summed."""
-TIMES_S = tuple(np.geomspace(0.002, 0.3, 30).tolist())
+TIMES_S = tuple(np.geomspace(0.002, 0.3, 60).tolist())
 FEWEST_SUMS = 20
 BLOCKS = 12
 """Groups of stretches of which each is left out in turn for the errors."""
