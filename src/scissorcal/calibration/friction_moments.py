@@ -155,6 +155,14 @@ class ReducedLaw:
         above, below = self.factors(u + reach, cell), self.factors(u - reach, cell)
         return np.asarray((above - below).T / (2.0 * STEP))
 
+    def slope(self, u: Array) -> Array:
+        """Derivative of the log-likelihood at ``u`` (p,), shape (p,)."""
+        cell = self.cell_at(u)
+        factors, weight = self.factors(u, cell), np.exp(-2.0 * u[-1])
+        products = self.summed(cell) @ factors
+        by_mean = -weight * self.slopes(u, cell).T @ products
+        return np.append(by_mean, weight * float(factors @ products) - self.counted)
+
     def information(self, u: Array) -> Array:
         """Fisher's information of the likelihood at ``u`` (p,), shape (p, p)."""
         cell = self.cell_at(u)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction_moments import ReducedLaw
-from scissorcal.calibration.friction_search import ReducedProblem, ascend, search
+from scissorcal.calibration.friction_search import ReducedProblem, search
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
@@ -222,14 +222,20 @@ def optimum_of(rung: Rung, series: Integers) -> Optimum:
 def _climb_reduced(
     rung: Rung, law: ReducedLaw, problem: ReducedProblem, optimum: Optimum, strokes: Integers
 ) -> Climbed:
-    """As :func:`climb`, over products by stroke; what is held out is fitted without it in full."""
+    """As :func:`climb`, over products by stroke."""
     labels = law.moments.labels
+    information = law.information(optimum.point)
     white = ljung_box(rung.likelihood.standardised(optimum.point), problem.series)
     residuals, densities = np.full(len(strokes), np.nan), np.full(len(strokes), np.nan)
     folds = split_strokes(labels)
     for fold in folds:
-        seen = replace(problem, reduced=law.without(fold))
-        reached = ascend(seen, optimum.point).point if len(folds) > 1 else optimum.point
+        reached = optimum.point
+        if len(folds) > 1:
+            rest = law.without(fold)
+            precision = rest.counted / law.counted * information + rung.prior_precision
+            slope = rest.slope(reached) - rung.prior_precision @ (reached - rung.prior_mean)
+            seen = replace(problem, reduced=rest)
+            reached = _step_uphill(seen, reached, _newton(precision, slope))
         unseen = np.isin(strokes, fold)
         left = rung.likelihood.residuals(reached)[unseen]
         residuals[unseen] = left
@@ -239,7 +245,7 @@ def _climb_reduced(
         optimum=optimum,
         scores=np.array([densities[strokes == label].sum() for label in labels]),
         held_out_residuals=residuals,
-        information=law.information(optimum.point),
+        information=information,
         log_likelihood=problem.log_likelihood(optimum.point),
         share=white.share,
         series=problem.series,
@@ -271,10 +277,14 @@ def _without(
         share = float(np.mean(~unseen))
         precision = share * information + rung.prior_precision
         slope = scores[~unseen].sum(axis=0) + slope_prior
-        values, vectors = np.linalg.eigh(precision)
-        move = vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max()))
-        reached.append(_step_uphill(rung.problem(problem.series, ~unseen), point, move))
+        seen = rung.problem(problem.series, ~unseen)
+        reached.append(_step_uphill(seen, point, _newton(precision, slope)))
     return reached
+
+
+def _newton(precision: Array, slope: Array) -> Array:
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray(vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max())))
 
 
 def _step_uphill(problem: Problem, point: Array, move: Array) -> Array:
@@ -345,55 +355,3 @@ def beaten(gained: Array) -> bool:
     if len(gained) < FEWEST_FOR_RANKS:
         return True
     return float(wilcoxon(gained, alternative="greater").pvalue) < FALSE_ALARM
-
-
-def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any], ...]:
-    """Rows for the report, cheapest first.
-
-    name, parameters, bic, held_out_rms, held_out_score, loo, loo_se, loo_k_hat, equivalent,
-    chosen. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
-    independent, the same share for every rung. ``loo`` is the log density of all strokes, each by
-    the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index; they are NaN for a single rung, as there is nothing to compare.
-    ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
-    ``key`` and ``values`` (by name, at the best point) are what a rung's law is drawn from.
-    """
-    share = best_of(climbed).share
-    compared = len(climbed) > 1
-    return tuple(
-        {
-            "name": candidate.rung.name,
-            "parameters": len(candidate.optimum.point),
-            "bic": -2 * candidate.log_likelihood * share
-            + len(candidate.optimum.point) * float(np.log(candidate.observations * share)),
-            "held_out_rms": candidate.held_out_rms,
-            "held_out_score": float(candidate.scores.sum()) * share,
-            **_loo(candidate, share if compared else float("nan")),
-            "equivalent": candidate.rung is chosen.rung or candidate.rung.name in chosen.alike,
-            "chosen": candidate.rung is chosen.rung,
-            "key": dict(candidate.rung.key),
-            "values": {
-                name: float(value)
-                for name, value in candidate.rung.layout.natural(candidate.optimum.point).items()
-            },
-        }
-        for candidate in climbed
-    )
-
-
-def _loo(candidate: Climbed, share: float) -> dict[str, float]:
-    if not np.isfinite(share):
-        return {"loo": share, "loo_se": share, "loo_k_hat": share}
-    found = candidate.left_out
-    return {
-        "loo": float(found.scores.sum()) * share,
-        "loo_se": _standard_error(found.scores * share),
-        "loo_k_hat": float(found.k_hats.max()),
-    }
-
-
-def _standard_error(scores: Array) -> float:
-    """Of a sum over independent strokes; NaN for a single one."""
-    if len(scores) < 2:
-        return float("nan")
-    return float(np.sqrt(len(scores) * np.var(scores, ddof=1)))
