@@ -5,6 +5,7 @@ their coefficients. The products are made once; from then on what an evaluation 
 depend on how much was recorded, and leaving strokes out is leaving out their products.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -68,25 +69,28 @@ class StrokeMoments:
     def cell(self, cell: Cell) -> Array:
         """Products of measurements, fixed columns and those of a cell's nodes, (strokes, q, q)."""
         if cell not in self._cells:
-            made = self._assembled(cell)
+            made = self.assembled(cell, self.products, (len(self.labels),))
             if (len(self._cells) + 1) * made.nbytes > MOST_BYTES:
                 self._cells.clear()
             self._cells[cell] = made
         return self._cells[cell]
 
-    def _assembled(self, cell: Cell) -> Array:
+    def assembled(
+        self, cell: Cell, products: Callable[[Block, Block], Array], shape: tuple[int, ...]
+    ) -> Array:
+        """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
         blocks = [MEASURED, FIXED]
         blocks += [("stribeck", index) for index in cell[0]]
         blocks += [("lag", index) for index in cell[1]]
         ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
-        result = np.empty((len(self.labels), ends[-1], ends[-1]))
+        result = np.empty((*shape, ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
             rows = slice(ends[i], ends[i + 1])
             for j in range(i, len(blocks)):
                 columns = slice(ends[j], ends[j + 1])
-                found = self.products(left, blocks[j])
-                result[:, rows, columns] = found
-                result[:, columns, rows] = found.transpose(0, 2, 1)
+                found = products(left, blocks[j])
+                result[..., rows, columns] = found
+                result[..., columns, rows] = np.swapaxes(found, -1, -2)
         return result
 
     def _columns(self, block: Block) -> Array:
@@ -184,7 +188,7 @@ class ReducedLaw:
     def summed(self, cell: Cell) -> Array:
         """Products over the strokes that count, (q, q)."""
         if cell not in self._cells:
-            self._cells[cell] = np.tensordot(self._weights, self.moments.cell(cell), axes=1)
+            self._cells[cell] = self.moments.assembled(cell, self._summed_pair, ())
         return self._cells[cell]
 
     def factors(self, u: Array, cell: Cell) -> Array:
@@ -254,6 +258,15 @@ class ReducedLaw:
     @cached_property
     def _weights(self) -> Array:
         return np.ones(len(self.moments.labels)) if self.weights is None else self.weights
+
+    def _summed_pair(self, a: Block, b: Block) -> Array:
+        if (a, b) not in self._pairs:
+            self._pairs[a, b] = np.tensordot(self._weights, self.moments.products(a, b), axes=1)
+        return self._pairs[a, b]
+
+    @cached_property
+    def _pairs(self) -> dict[tuple[Block, Block], Array]:
+        return {}
 
     @cached_property
     def _cells(self) -> dict[Cell, Array]:

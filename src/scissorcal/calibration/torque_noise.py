@@ -67,11 +67,11 @@ def torque_noise(
         return None
     total, ends = tables.sum(axis=0), 2.0 * (momentum_sd / tick_s) ** 2
     white, slow, time_s = _fitted(total, tick_s, ends)
-    groups = [tables[k::BLOCKS] for k in range(min(BLOCKS, len(tables)))]
-    others = [_fitted(total - group.sum(axis=0), tick_s, ends) for group in groups]
-    count = len(others)
+    count = min(BLOCKS, len(tables))
+    left = [total - tables[k::count].sum(axis=0) for k in range(count)]
     errors: list[float] = [float("nan")] * 3
-    if count > 1:
+    if min(table[-1, 1] for table in left) >= FEWEST_SUMS:
+        others = [_fitted(table, tick_s, ends) for table in left]
         errors = np.sqrt((count - 1) * np.var(others, axis=0)).tolist()
     return TorqueNoise(white, slow, time_s, *errors)
 
