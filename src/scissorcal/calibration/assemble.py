@@ -198,8 +198,8 @@ def _series(
     residuals = chosen.rung.likelihood.residuals
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
     every = max(1, len(posterior.draws) // BAND_DRAWS)
-    predictions = np.stack([measured - residuals(u) for u in posterior.draws[::every]])
-    low, high = np.quantile(predictions[:, thin], [0.05, 0.95], axis=0)
+    predictions = np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
+    low, high = np.quantile(predictions, [0.05, 0.95], axis=0)
     return FitSeries(
         time_s=bins.time_s[thin],
         recording=bins.recording[thin],

@@ -12,6 +12,7 @@ from scissorcal.kernel import presliding_path
 from scissorcal.model.terms import TERMS, Motion, evaluate
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Product = tuple[float, tuple[str, ...]]
 
 RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
@@ -50,6 +51,7 @@ class FrictionBasis:
         self.levels = tuple(name for name in terms if TERMS[name].of_rate_only)
         self.others = tuple(name for name in terms if not TERMS[name].of_rate_only)
         self.fixed = np.column_stack([*self._rigid(), *self._free(), *self._levels()])
+        self._places: dict[tuple[str, ...], list[tuple[Array, Integers, Integers, Integers]]] = {}
         self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
         self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
 
@@ -69,12 +71,32 @@ class FrictionBasis:
         The latter two are zero where the law has no such part.
         """
 
-        def factor(product: Product) -> float:
-            sign, names = product
-            return sign * float(np.prod([_value(values, name) for name in names]))
-
-        parts = [np.array([factor(one) for one in part]) for part in self.factors]
+        known = np.array([*(float(value) for value in values.values()), 1.0, 0.0])
+        parts = [
+            signs * known[first] * known[second] * known[third]
+            for signs, first, second, third in self.places(tuple(values))
+        ]
         return parts[0], parts[1], parts[2]
+
+    def places(self, names: tuple[str, ...]) -> list[tuple[Array, Integers, Integers, Integers]]:
+        """Signs, and the places among ``names`` of three parameters, whose product a factor is.
+
+        One past the last name stands for one, and the place after that for zero.
+        """
+        if names not in self._places:
+            one, zero = len(names), len(names) + 1
+            tables = []
+            for part in self.factors:
+                rows = []
+                for _, wanted in part:
+                    found = [side_of(name, names) for name in wanted]
+                    row = [zero if name is None else names.index(name) for name in found]
+                    rows.append([*row, one, one][:3])
+                places = np.array(rows, dtype=np.int64)
+                signs = np.array([sign for sign, _ in part])
+                tables.append((signs, places[:, 0], places[:, 1], places[:, 2]))
+            self._places[names] = tables
+        return self._places[names]
 
     @cached_property
     def factors(self) -> tuple[tuple[Product, ...], ...]:
@@ -174,11 +196,6 @@ def side_of(name: str, known: Container[str]) -> str | None:
     """
     stem = name.removesuffix("_pos").removesuffix("_neg")
     return name if name in known else stem if stem in known else None
-
-
-def _value(values: Mapping[str, Array], name: str) -> float:
-    found = side_of(name, values)
-    return 0.0 if found is None else float(values[found])
 
 
 class ScaledColumns:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_basis import FrictionBasis, side_of
+from scissorcal.calibration.friction_basis import FrictionBasis
 from scissorcal.calibration.layout import Layout
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ class ReducedLaw:
         known[..., -1] = 0.0
         fixed, stribeck, late = (
             -signs * known[..., first] * known[..., second] * known[..., third]
-            for signs, first, second, third in self._places
+            for signs, first, second, third in self.moments.basis.places(self.layout.names)
         )
         parts = [np.ones((*u.shape[:-1], 1)), fixed]
         basis = self.moments.basis
@@ -212,26 +212,6 @@ class ReducedLaw:
                 joined = weights[..., :, None] * own[..., None, :]
                 parts.append(joined.reshape((*u.shape[:-1], -1)))
         return np.concatenate(parts, axis=-1)
-
-    @cached_property
-    def _places(self) -> list[tuple[Array, Integers, Integers, Integers]]:
-        """Signs, and the places of three parameters each, whose product every factor is.
-
-        One past the last parameter stands for one, and the place after that for zero.
-        """
-        names = list(self.layout.names)
-        one, zero = len(names), len(names) + 1
-        tables = []
-        for part in self.moments.basis.factors:
-            rows = []
-            for _, wanted in part:
-                found = [side_of(name, names) for name in wanted]
-                row = [zero if name is None else names.index(name) for name in found]
-                rows.append([*row, one, one][:3])
-            places = np.array(rows, dtype=np.int64)
-            signs = np.array([sign for sign, _ in part])
-            tables.append((signs, places[:, 0], places[:, 1], places[:, 2]))
-        return tables
 
     @cached_property
     def _scales(self) -> tuple[int | None, int | None]:
