@@ -24,7 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "recording": {"recipe"},
     "device": {"kernel", "recipe", "recording"},
     "vision": {"recipe", "model"},
-    "calibration": {"model", "inference", "recipe", "recording", "vision"},
+    "calibration": {"kernel", "model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},
     "report": {"model", "vision", "calibration", "package", "recipe", "recording"},

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
-from scissorcal.calibration.conditioning import condition
 from scissorcal.calibration.cut_expected import Expected, Spread
 from scissorcal.calibration.cut_ladder import allowed_laws
 from scissorcal.calibration.cut_motion import cut_motion
+from scissorcal.calibration.signals.filtering import condition
 from scissorcal.model import Cutting, Edge, Response, Turned, held_torque, take_stance
 from scissorcal.recording.recording import Stroke
 from tests.calibration.test_cut import friction_of, recipe

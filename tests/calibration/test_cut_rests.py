@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import cut_experiment, fit_cut
-from scissorcal.calibration.conditioning import condition
 from scissorcal.calibration.cut_expected import Expected, Spread, kept_of_a_saw_tooth
 from scissorcal.calibration.cut_likelihood import contrasts, make_blocks, normal_terms
 from scissorcal.calibration.cut_motion import cut_motion
 from scissorcal.calibration.cut_rests import find_rests
+from scissorcal.calibration.signals.filtering import condition
 from scissorcal.model import Cutting, Edge, EdgeBelief, Response
 from tests.calibration.test_cut import friction_of, recipe
 from tests.calibration.truth import Truth, cut_recording, loaded_cut_recording

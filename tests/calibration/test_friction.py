@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, load_fit, save_fit
-from scissorcal.calibration.conditioning import condition
+from scissorcal.calibration.signals.filtering import condition
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, friction_experiment
+from scissorcal.calibration.ladder import optimum_of
 from scissorcal.inference import find_optimum, fit_ar
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.truth import Truth, friction_recording
@@ -24,10 +25,17 @@ def test_the_fit_again_from_its_design_is_the_fit(fitted):
     fit, experiment = fitted
     rung = pickle.loads(pickle.dumps(experiment)).rung(experiment.observed)
     assert rung.name == fit.rung
-    optimum = find_optimum(rung.problem(experiment.series))
+    optimum = optimum_of(rung, experiment.series)
     wanted = [i for i, n in enumerate(rung.layout.names) if n not in experiment.nuisance]
     natural = rung.layout.columns(optimum.point)[wanted]
     assert natural == pytest.approx(fit.map_point, rel=1e-6)
+
+
+def test_the_search_over_products_ends_where_a_search_over_bins_does(fitted):
+    _, experiment = fitted
+    rung = experiment.rung(experiment.observed)
+    slow = find_optimum(rung.problem(experiment.series))
+    assert optimum_of(rung, experiment.series).value > slow.value - 1e-3
 
 
 def test_simulated_data_have_the_priors_of_the_original(fitted):

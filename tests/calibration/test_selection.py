@@ -13,9 +13,9 @@ from scissorcal.calibration.ladder import (
     beaten,
     choose,
     climb,
-    rung_table,
 )
 from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.rung_table import rung_table
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.truth import Truth, friction_recording
 

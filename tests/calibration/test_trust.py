@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.ladder import Climbed, climb
 from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.cli.fit import _text
 from scissorcal.inference import Posterior, infer

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from scissorcal.calibration import FittedParameter
 from scissorcal.errors import InputError
 from scissorcal.package import build_package, open_package
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -52,3 +53,18 @@ def test_what_load_and_presliding_cost_is_told(tmp_path):
     assert "builds up over 0.02 rad" in told
     assert "0.012 N m too much right after one" in told
     assert package.warnings == summary.warnings
+
+
+def test_cogging_is_not_rendered_and_is_told(tmp_path):
+    _, plain = built(tmp_path, friction_fit())
+    fit = with_structure(friction_fit(), cogging_periods_per_turn=252.0)
+    found = [
+        FittedParameter(f"cogging_{wave}", "N m", size, 1e-5, size, size, size, 0.1)
+        for wave, size in (("cos", 3e-4), ("sin", -4e-4))
+    ]
+    draws = np.tile([3e-4, -4e-4], (len(fit.draws), 1))
+    fit = dataclasses.replace(fit, nuisance=tuple(found), nuisance_draws=draws)
+    summary, package = built(tmp_path, fit)
+    for opening in (0.5, 0.5 + np.pi / 252):
+        assert package.torque(opening, -0.3, 0.05) == plain.torque(opening, -0.3, 0.05)
+    assert "0.0005 N m that repeat 252.0 times" in " ".join(summary.warnings)

@@ -6,12 +6,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.critic import Critique, criticise
-from scissorcal.calibration.ladder import Climbed, rung_table
+from scissorcal.calibration.ladder import Climbed
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
+from scissorcal.calibration.rung_table import rung_table
 from scissorcal.calibration.selection import selection_sentence
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion
@@ -47,12 +48,14 @@ def assemble(
     load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
+    extra_diagnostics: Mapping[str, Any] | None = None,
 ) -> FitResult:
     """Put a finished fit into the form that reports, packages and files read.
 
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
-    ``extra_notes`` are what only the fit itself can say; they follow the common ones. ``critic``
+    ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
+    common ones. ``critic``
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
     what the joint bore, where that was measured.
     """
@@ -65,6 +68,7 @@ def assemble(
     series = _series(chosen, posterior, bins, strokes, measured, contact)
     rungs = rung_table(climbed, chosen)
     diagnostics = _diagnostics(climbed, chosen, posterior, bins, measured)
+    diagnostics |= dict(extra_diagnostics or {})
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, load, joint, rng)
@@ -199,8 +203,8 @@ def _series(
     residuals = chosen.rung.likelihood.residuals
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
     every = max(1, len(posterior.draws) // BAND_DRAWS)
-    predictions = np.stack([measured - residuals(u) for u in posterior.draws[::every]])
-    low, high = np.quantile(predictions[:, thin], [0.05, 0.95], axis=0)
+    predictions = np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
+    low, high = np.quantile(predictions, [0.05, 0.95], axis=0)
     return FitSeries(
         time_s=bins.time_s[thin],
         recording=bins.recording[thin],

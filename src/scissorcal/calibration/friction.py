@@ -8,18 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.conditioning import Bins
+from scissorcal.calibration.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.friction_experiment import FrictionExperiment, design
 from scissorcal.calibration.friction_layout import NUISANCE, LawParts
+from scissorcal.calibration.friction_noise import (
+    cogging_notes,
+    noise_diagnostics,
+    sample_noise,
+    stroke_offsets,
+)
 from scissorcal.calibration.hashing import fit_inputs_hash
-from scissorcal.calibration.ladder import Climbed, choose, climb
+from scissorcal.calibration.ladder import Climbed, choose, climb, optimum_of
 from scissorcal.calibration.physical import bandwidth_verdict, physical_verdict, start_verdict
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.sensors import Sensors, inspect_sensors
-from scissorcal.calibration.windows import Windows, next_cutoff, weigh
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.usage import usage_of_windows
+from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.errors import InputError
-from scissorcal.inference import Posterior, Stop, find_optimum, infer, tails_of
+from scissorcal.inference import Posterior, Stop, infer, tails_of
 from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
@@ -86,7 +94,7 @@ def fit_friction(
     _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
-    every_law = _ladder(windows, strokes, settings, joint)
+    every_law, cogging = _ladder(windows, strokes, settings, joint)
     ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     climbed: list[Climbed] = []
     for index, candidate in enumerate(ladder):
@@ -105,6 +113,14 @@ def fit_friction(
         stop=stop,
         progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
     )
+    noise = sample_noise(law, chosen.optimum.point)
+    diagnostics = {
+        **noise_diagnostics(noise),
+        "stroke_offset_sd_Nm": stroke_offsets(
+            chosen.rung.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
+        ),
+    }
+    usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
         what="friction",
         effort=effort,
@@ -132,7 +148,10 @@ def fit_friction(
             *sensors.notes,
             *_notes(every, windows, posterior, joint),
             *draft_note(effort, every_law, ladder),
+            *cogging_notes(cogging, posterior, joint),
+            usage.sentence,
         ),
+        extra_diagnostics=diagnostics,
     )
 
 
@@ -149,7 +168,8 @@ def friction_experiment(
     windows = every.where(every.bins.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
-    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt)
+    cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
+    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
 
 
@@ -205,7 +225,7 @@ def _bandwidth(
     )
     here = chosen.optimum.point
     rung = replace(there.rung(there.observed), starts=here[None, :])
-    optimum = find_optimum(rung.problem(there.series))
+    optimum = optimum_of(rung, there.series)
     cutoffs = (settings.cutoff_Hz, other_Hz)
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 
@@ -302,18 +322,21 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 
 def _ladder(
     windows: Windows, strokes: NDArray[np.int64], settings: FitFriction, joint: Joint
-) -> list[FrictionExperiment]:
+) -> tuple[list[FrictionExperiment], Cogging]:
+    """The laws to be compared, over columns that they share, with cogging where there is any."""
     laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
-    ladder: list[FrictionExperiment] = []
-    for law in laws:
-        first, *others = (
-            design(windows, strokes, law, symmetric, joint, settings.adopt)
-            for symmetric in both[settings.symmetry]
-        )
-        ladder += [first, *(replace(other, shared=first.basis) for other in others)]
-    return ladder
+    plain = design(windows, strokes, laws[0], False, joint, settings.adopt)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(plain.moments)
+    periods = cogging.periods_per_turn if cogging.found else 0.0
+    first, *others = (
+        design(windows, strokes, law, symmetric, joint, settings.adopt, periods)
+        for law in laws
+        for symmetric in both[settings.symmetry]
+    )
+    first = first if periods else replace(first, shared=plain.moments)
+    return [first, *(replace(other, shared=first.moments) for other in others)], cogging
 
 
 def _laws(windows: Windows) -> tuple[str, ...]:

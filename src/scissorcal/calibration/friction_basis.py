@@ -1,78 +1,167 @@
 """A friction law weighed over windows: columns that its parameters multiply."""
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Container, Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.windows import Windows
-from scissorcal.model import presliding_state
+from scissorcal.calibration.signals.weak_form import Windows
+from scissorcal.kernel import presliding_path
 from scissorcal.model.terms import TERMS, Motion, evaluate
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Product = tuple[float, tuple[str, ...]]
 
-SPACING = 0.1
-"""Distance of nodes in the logarithm of a scale; interpolation then errs by 1e-4 at most."""
+RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
+"""Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
+errs by 2e-4 of a level at most."""
+
+RIGID = 5
+"""Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
 
 
 class FrictionBasis:
-    """Friction at every sample, weighed as the drive was, for any parameters of one law.
+    """Drive at every window, weighed as it was measured, for any parameters of one law.
 
-    Equals ``windows.average(friction_torque(law, samples))`` and costs a fraction of it: what is
-    linear in its parameters is weighed once, and what depends on a scale (Stribeck's speed,
-    Dahl's length) is weighed at nodes of that scale and interpolated.
+    Its friction equals ``windows.average(friction_torque(law, samples))`` and costs a fraction of
+    it: what is linear in its parameters is weighed once, and what depends on a scale (Stribeck's
+    speed, Dahl's length) is weighed at nodes of that scale and interpolated. So a drive is
+    ``fixed`` (n, q) times coefficients, plus the columns of the scales' nodes times theirs.
     """
 
     def __init__(
-        self, windows: Windows, angle_center: float, *, angle: bool, terms: tuple[str, ...] = ()
+        self,
+        windows: Windows,
+        angle_center: float,
+        *,
+        angle: bool,
+        terms: tuple[str, ...] = (),
+        cogging: float = 0.0,
     ) -> None:
-        """``angle`` has friction depend on the place, ``terms`` are named ones that it adopted."""
-        self.windows = windows
-        away = windows.opening - angle_center
-        self._count = 3 if angle else 1
-        self._powers = np.stack([np.ones_like(away), away, away**2][: self._count], axis=1)
-        rate, sign = windows.rate, np.sign(windows.rate)
-        self._sign, self._speed = sign, np.abs(rate)
-        forward, backward = (rate > 0).astype(float), (rate < 0).astype(float)
-        load = np.zeros_like(rate) if windows.load is None else windows.load
-        self._sides = np.stack([forward, backward, np.abs(load)], axis=1)
-        motion = Motion(windows.opening, rate, np.zeros_like(rate), load)
-        levels = tuple(name for name in terms if TERMS[name].of_rate_only)
-        others = tuple(name for name in terms if not TERMS[name].of_rate_only)
-        self.terms = (levels, others)
-        speeds = np.stack([forward * rate, backward * rate], axis=1)
-        fixed = [sign[:, None] * self._sides, speeds, evaluate(levels, motion)]
-        self._fixed = self._weigh(np.concatenate(fixed, axis=1))
-        self._others = windows.average(
-            np.concatenate([load[:, None], evaluate(others, motion)], axis=1)
-        )
-        self._stribeck = _Nodes(self._stribeck_at)
-        self._lag = _Nodes(self._lag_at)
+        """``angle`` has friction depend on the place, ``terms`` are named ones that it adopted.
+
+        ``cogging`` is the number of periods a turn of a torque that repeats, 0 where there is none.
+        """
+        self.windows, self.cogging = windows, cogging
+        self._center, self._count = angle_center, 3 if angle else 1
+        self._loaded = windows.load is not None
+        self.levels = tuple(name for name in terms if TERMS[name].of_rate_only)
+        self.others = tuple(name for name in terms if not TERMS[name].of_rate_only)
+        self.fixed = np.column_stack([*self._rigid(), *self._free(), *self._levels()])
+        self._places: dict[tuple[str, ...], list[tuple[Array, Integers, Integers, Integers]]] = {}
+        self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
+        self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
 
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
+        fixed, stribeck, late = self.coefficients(values)
+        own = np.concatenate([np.zeros(RIGID), fixed[RIGID:]])
+        return self._total(own, stribeck, late, values)
 
-        def level(name: str) -> float:
-            return float(values.get(name, 0.0))
+    def drive(self, values: Mapping[str, Array]) -> Array:
+        """Friction, inertia, offset, lateness and cogging together (n,)."""
+        return self._total(*self.coefficients(values), values)
 
-        def side(name: str) -> list[float]:
-            return [level(name) or level(name + suffix) for suffix in ("_pos", "_neg")]
+    def coefficients(self, values: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+        """Factors of ``fixed`` (q,), of Stribeck's columns and of the late ones, from parameters.
 
-        dry = [*side("coulomb"), level("load_share")]
-        levels, others = self.terms
-        place = np.array([1.0, level("angle_slope"), level("angle_curvature")])[: self._count]
-        fixed = np.array([*dry, *side("viscous"), *(level(name) for name in levels)])
-        gains = np.array([level("load_gain"), *(level(name) for name in others)])
-        total = self._fixed @ np.outer(fixed, place).ravel() + self._others @ gains
-        if level("stribeck"):
-            total += self._stribeck(level("stribeck_rate")) @ (level("stribeck") * place)
-        if level("presliding_share"):
-            late = -level("presliding_share") * np.outer(dry, place).ravel()
-            total += self._lag(level("presliding_length")) @ late
+        The latter two are zero where the law has no such part.
+        """
+
+        known = np.array([*(float(value) for value in values.values()), 1.0, 0.0])
+        parts = [
+            signs * known[first] * known[second] * known[third]
+            for signs, first, second, third in self.places(tuple(values))
+        ]
+        return parts[0], parts[1], parts[2]
+
+    def places(self, names: tuple[str, ...]) -> list[tuple[Array, Integers, Integers, Integers]]:
+        """Signs, and the places among ``names`` of three parameters, whose product a factor is.
+
+        One past the last name stands for one, and the place after that for zero.
+        """
+        if names not in self._places:
+            one, zero = len(names), len(names) + 1
+            tables = []
+            for part in self.factors:
+                rows = []
+                for _, wanted in part:
+                    found = [side_of(name, names) for name in wanted]
+                    row = [zero if name is None else names.index(name) for name in found]
+                    rows.append([*row, one, one][:3])
+                places = np.array(rows, dtype=np.int64)
+                signs = np.array([sign for sign, _ in part])
+                tables.append((signs, places[:, 0], places[:, 1], places[:, 2]))
+            self._places[names] = tables
+        return self._places[names]
+
+    @cached_property
+    def factors(self) -> tuple[tuple[Product, ...], ...]:
+        """What multiplies ``fixed``, Stribeck's columns and the late ones: sign and parameters.
+
+        A parameter of both directions stands for either side where a law has no sides; one that a
+        law lacks is zero.
+        """
+        place: list[tuple[str, ...]] = [(), ("angle_slope",), ("angle_curvature",)]
+        dry = ["coulomb_pos", "coulomb_neg", *(["load_share"] if self._loaded else [])]
+        sliding = ["viscous_pos", "viscous_neg", *self.levels]
+        rigid = ("inertia", "offset", "delay", "cogging_cos", "cogging_sin")
+        plain = (*rigid, "load_gain", *self.others)
+
+        def placed(sign: float, names: tuple[str, ...]) -> list[Product]:
+            return [(sign, (*names, *one)) for one in place[: self._count]]
+
+        fixed: list[Product] = [(-1.0 if name == "delay" else 1.0, (name,)) for name in plain]
+        fixed += [one for name in (*dry, *sliding) for one in placed(1.0, (name,))]
+        late = [one for name in dry for one in placed(-1.0, ("presliding_share", name))]
+        return tuple(fixed), tuple(placed(1.0, ("stribeck",))), tuple(late)
+
+    def _total(
+        self, fixed: Array, stribeck: Array, late: Array, values: Mapping[str, Array]
+    ) -> Array:
+        total = self.fixed @ fixed
+        if np.any(stribeck):
+            total += self.stribeck(float(values["stribeck_rate"])) @ stribeck
+        if np.any(late):
+            total += self.lag(float(values["presliding_length"])) @ late
         return np.asarray(total)
 
+    def _rigid(self) -> list[Array]:
+        windows, bins = self.windows, self.windows.bins
+        waves = [np.zeros(len(windows.first))] * 2
+        if self.cogging:
+            phase = self.cogging * windows.opening
+            waves = [windows.average(np.cos(phase)), windows.average(np.sin(phase))]
+        return [bins.acceleration, np.ones(len(windows.first)), windows.slope, *waves]
+
+    def _free(self) -> list[Array]:
+        windows = self.windows
+        load = np.zeros_like(windows.rate) if windows.load is None else windows.load
+        motion = Motion(windows.opening, windows.rate, np.zeros_like(windows.rate), load)
+        named = [evaluate((name,), motion)[:, 0] for name in self.others]
+        return [windows.average(column) for column in (load, *named)]
+
+    def _levels(self) -> list[Array]:
+        rate = self.windows.rate
+        sign = np.sign(rate)
+        columns = [sign * side for side in self._sides()]
+        columns += [np.where(rate > 0, rate, 0.0), np.where(rate < 0, rate, 0.0)]
+        motion = Motion(self.windows.opening, rate, np.zeros_like(rate), self.windows.load)
+        columns += [evaluate((name,), motion)[:, 0] for name in self.levels]
+        return self._weigh(columns)
+
+    def _sides(self) -> list[Array]:
+        rate, load = self.windows.rate, self.windows.load
+        sides = [(rate > 0).astype(float), (rate < 0).astype(float)]
+        return sides if load is None else [*sides, np.abs(load)]
+
     def _stribeck_at(self, rate: float) -> Array:
-        return self._weigh((self._sign * np.exp(-((self._speed / rate) ** 2)))[:, None])
+        moving = self.windows.rate
+        bell = np.sign(moving) * np.exp(-((moving / rate) ** 2))
+        return np.column_stack(self._weigh([bell]))
 
     def _lag_at(self, length: float) -> Array:
         """What dry friction still lacks after a reversal, relative to its level."""
@@ -80,43 +169,86 @@ class FrictionBasis:
         ends = [*windows.starts[1:].tolist(), len(windows.opening)]
         state = np.concatenate(
             [
-                presliding_state(windows.opening[low:high], length)
+                presliding_path(windows.opening[low:high], length)
                 for low, high in zip(windows.starts.tolist(), ends, strict=True)
             ]
         )
-        return self._weigh((self._sign - state)[:, None] * self._sides)
+        late = np.sign(windows.rate) - state
+        return np.column_stack(self._weigh([late * side for side in self._sides()]))
 
-    def _weigh(self, columns: Array) -> Array:
-        """Columns (m, k) times the powers of the place, weighed: (n, k * powers)."""
-        products = columns[:, :, None] * self._powers[:, None, :]
-        return self.windows.average(products.reshape(len(columns), -1))
+    def _weigh(self, columns: list[Array]) -> list[Array]:
+        """Each column (m,) times the powers of the place, weighed (n,); one at a time."""
+        away = self.windows.opening - self._center
+        weighed = []
+        for column in columns:
+            for power in range(self._count):
+                weighed.append(self.windows.average(column))
+                if power + 1 < self._count:
+                    column = column * away
+        return weighed
 
 
-class _Nodes:
-    """Arrays that depend smoothly on a positive scale, worked out at nodes when first needed."""
+def side_of(name: str, known: Container[str]) -> str | None:
+    """The parameter among ``known`` that stands for ``name``: itself, or that of both directions.
 
-    def __init__(self, at: Callable[[float], Array]) -> None:
-        self.at = at
+    >>> side_of("coulomb_pos", {"coulomb"}), side_of("viscous_pos", {"coulomb"})
+    ('coulomb', None)
+    """
+    stem = name.removesuffix("_pos").removesuffix("_neg")
+    return name if name in known else stem if stem in known else None
+
+
+class ScaledColumns:
+    """Columns that depend smoothly on a positive scale, worked out at nodes when first needed."""
+
+    def __init__(self, at: Callable[[float], Array], spacing: float) -> None:
+        """``at`` gives the columns at a scale, ``spacing`` is the nodes' in its logarithm."""
+        self.at, self.spacing = at, spacing
         self.known: dict[int, Array] = {}
         self.last: tuple[float, Array] | None = None
 
     def __call__(self, scale: float) -> Array:
         """Cubic interpolation (Lagrange) in the logarithm of ``scale``."""
         if self.last is None or self.last[0] != scale:
-            self.last = (scale, self._interpolated(scale))
+            nodes = self.cell_of(float(np.log(scale)))
+            weights = self.weights_over(np.asarray(scale), nodes).tolist()
+            total = weights[0] * self.node(nodes[0])
+            for index, weight in zip(nodes[1:], weights[1:], strict=True):
+                total += weight * self.node(index)
+            self.last = (scale, total)
         return self.last[1]
 
-    def _interpolated(self, scale: float) -> Array:
-        place = float(np.log(scale)) / SPACING
-        low = int(np.floor(place))
-        t = place - low
-        result = self._node(low - 1) * (-t * (t - 1) * (t - 2) / 6)
-        result += self._node(low) * ((t + 1) * (t - 1) * (t - 2) / 2)
-        result += self._node(low + 1) * (-(t + 1) * t * (t - 2) / 2)
-        result += self._node(low + 2) * ((t + 1) * t * (t - 1) / 6)
-        return result
+    def cell_of(self, log_scale: float) -> tuple[int, ...]:
+        """The four nodes around a scale's logarithm.
 
-    def _node(self, index: int) -> Array:
+        >>> ScaledColumns(lambda scale: np.array([scale]), 0.1).cell_of(0.05)
+        (-1, 0, 1, 2)
+        """
+        low = math.floor(log_scale / self.spacing)
+        return (low - 1, low, low + 1, low + 2)
+
+    def weights_over(self, scales: Array, nodes: tuple[int, ...]) -> Array:
+        """Weights (..., nodes) by which columns at ``nodes`` make up those at ``scales`` (...).
+
+        Cubic interpolation (Lagrange) in the logarithm of the scale between the four of a cell. A
+        single node counts alone, wherever the scale is.
+        """
+        if len(nodes) == 1:
+            return np.ones((*np.shape(scales), 1))
+        return np.stack(_cubic(np.log(scales) / self.spacing - nodes[1]), axis=-1)
+
+    def node(self, index: int) -> Array:
+        """Columns at one node."""
         if index not in self.known:
-            self.known[index] = self.at(float(np.exp(index * SPACING)))
+            self.known[index] = self.at(float(np.exp(index * self.spacing)))
         return self.known[index]
+
+
+def _cubic(t: Array) -> tuple[Array, Array, Array, Array]:
+    """Weights of four even nodes for a place ``t`` nodes beyond the second one."""
+    return (
+        -t * (t - 1) * (t - 2) / 6,
+        (t + 1) * (t - 1) * (t - 2) / 2,
+        -(t + 1) * t * (t - 2) / 2,
+        (t + 1) * t * (t - 1) / 6,
+    )

@@ -8,12 +8,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.friction_basis import FrictionBasis
-from scissorcal.calibration.friction_layout import NUISANCE, LawParts, friction_layout
+from scissorcal.calibration.friction_layout import NUISANCE, friction_layout
+from scissorcal.calibration.friction_moments import ReducedLaw, StrokeMoments
 from scissorcal.calibration.ladder import Likelihood, Rung
 from scissorcal.calibration.layout import Layout
-from scissorcal.calibration.windows import Windows
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model import FrictionLaw
 from scissorcal.model.terms import TERMS
 from scissorcal.recording.recording import Joint
@@ -27,9 +28,10 @@ class FrictionExperiment:
     """One friction law over one set of motions (see :class:`~.experiment.Experiment`).
 
     ``windows`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's
-    discrete choices: ``law``, ``symmetric``, ``angle_center`` and ``adopt``, the names of adopted
-    terms. ``tails`` are the degrees of freedom of the noise. ``shared`` is a basis that another law
-    of the same kind has made already, if any.
+    discrete choices: ``law``, ``symmetric``, ``angle_center``, ``adopt``, the names of adopted
+    terms, and ``cogging_periods_per_turn`` where cogging was found. ``tails`` are the degrees of
+    freedom of the noise. ``shared`` are moments that another law over the same windows has made
+    already, if any.
     """
 
     windows: Windows
@@ -40,11 +42,12 @@ class FrictionExperiment:
     tails: float = np.inf
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
-    shared: FrictionBasis | None = field(default=None, repr=False, compare=False)
+    shared: StrokeMoments | None = field(default=None, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the basis out of a pickle: it is made again sooner than it is sent."""
-        kept = {name: value for name, value in self.__dict__.items() if name != "basis"}
+        """Leave basis and moments out of a pickle: they are made again sooner than sent."""
+        made = ("basis", "moments")
+        kept = {name: value for name, value in self.__dict__.items() if name not in made}
         return {**kept, "shared": None}
 
     @property
@@ -69,13 +72,19 @@ class FrictionExperiment:
         return " + ".join(words) + (", symmetric" if self.key["symmetric"] else ", asymmetric")
 
     @cached_property
-    def basis(self) -> FrictionBasis:
-        """Friction over these windows for any parameters of the law."""
+    def moments(self) -> StrokeMoments:
+        """Products of the law's columns by stroke, with what was measured."""
         if self.shared is not None:
             return self.shared
-        parts, adopt = LawParts.of(str(self.key["law"])), tuple(self.key["adopt"])
-        center = float(self.key["angle_center"])
-        return FrictionBasis(self.windows, center, angle=parts.angle, terms=adopt)
+        adopt, center = tuple(self.key["adopt"]), float(self.key["angle_center"])
+        cogging = float(self.key.get("cogging_periods_per_turn", 0.0))
+        basis = FrictionBasis(self.windows, center, angle=True, terms=adopt, cogging=cogging)
+        return StrokeMoments(basis, self.observed, self.strokes)
+
+    @property
+    def basis(self) -> FrictionBasis:
+        """Drive over these windows for any parameters of the law."""
+        return self.moments.basis
 
     def mean(self, u: Array) -> Array:
         """Drive that inertia, friction and offset ask for (n,), at unconstrained ``u`` (p,)."""
@@ -86,9 +95,7 @@ class FrictionExperiment:
 
         A drive that is measured late by ``delay`` is what it should be less delay times slope.
         """
-        drive = self.basis(values) + values["inertia"] * self.bins.acceleration
-        late = values.get("delay", np.asarray(0.0))
-        return np.asarray(drive + values.get("offset", np.asarray(0.0)) - late * self.windows.slope)
+        return self.basis.drive(values)
 
     def simulate(self, u: Array, rng: np.random.Generator) -> Array:
         """Give the mean (n,): a friction law has no irregularities of its own."""
@@ -113,7 +120,16 @@ class FrictionExperiment:
             prior_mean=layout.mean,
             prior_precision=np.diag(1 / layout.sd**2),
             blocks=self.strokes,
+            reduced=self._reduced(measured),
         )
+
+    def _reduced(self, measured: Array) -> ReducedLaw | None:
+        """The law over products of columns, where its noise is normal."""
+        if np.isfinite(self.tails):
+            return None
+        own = measured is self.observed or np.array_equal(measured, self.moments.measured)
+        moments = self.moments if own else self.moments.of(measured)
+        return ReducedLaw(self.layout, moments)
 
     def _starts(self, measured: Array) -> Array:
         """Starts from linear least squares of Coulomb, viscous, inertia and offset."""
@@ -153,12 +169,23 @@ def design(
     symmetric: bool,
     joint: Joint,
     adopt: tuple[str, ...] = (),
+    cogging: float = 0.0,
 ) -> FrictionExperiment:
-    """One law over windows, with priors of the data's own size."""
+    """One law over windows, with priors of the data's own size.
+
+    ``cogging`` is the number of its periods a turn, 0 where there is none.
+    """
     opening = windows.bins.opening
     center = float(np.round(np.mean([opening.min(), opening.max()]), 3))
-    key = {"law": law, "symmetric": symmetric, "angle_center": center, "adopt": list(adopt)}
-    layout = friction_layout(windows, law, symmetric, joint, adopt)
+    key: dict[str, Any] = {
+        "law": law,
+        "symmetric": symmetric,
+        "angle_center": center,
+        "adopt": list(adopt),
+    }
+    if cogging:
+        key["cogging_periods_per_turn"] = cogging
+    layout = friction_layout(windows, law, symmetric, joint, adopt, cogging=bool(cogging))
     return FrictionExperiment(windows, strokes, key, layout, joint)
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.layout import Layout, Parameter
-from scissorcal.calibration.windows import Windows
+from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model.terms import TERMS, Motion, evaluate
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
 
-NUISANCE = ("delay", "noise")
+NUISANCE = ("cogging_cos", "cogging_sin", "delay", "noise")
 WIDE = 2.8
 """Prior standard deviation of a logarithm: 90 % within a factor of 100 of its centre."""
 DELAY_TICKS = (0.1, 0.15)
@@ -41,11 +41,18 @@ class LawParts:
 
 
 def friction_layout(
-    windows: Windows, law: str, symmetric: bool, joint: Joint, adopt: tuple[str, ...] = ()
+    windows: Windows,
+    law: str,
+    symmetric: bool,
+    joint: Joint,
+    adopt: tuple[str, ...] = (),
+    *,
+    cogging: bool = False,
 ) -> Layout:
     """Lay out a law's parameters over windowed data; ``noise`` stands last.
 
-    Wide priors are centred on the drive's, the rate's and the opening's own size.
+    Wide priors are centred on the drive's, the rate's and the opening's own size. ``cogging`` adds
+    the two parameters of a torque that repeats over the opening.
     """
     parts, bins = LawParts.of(law), windows.bins
     effort, rate = float(np.std(bins.drive)), float(np.sqrt(np.mean(bins.rate**2)))
@@ -76,6 +83,12 @@ def friction_layout(
     rows += _place(parts, float(np.ptp(bins.opening)), position)
     rows += _load(parts)
     rows += _adopted(adopt, windows, joint, effort)
+    if cogging:
+        meaning = "torque that repeats over the opening, in the drive"
+        rows += [
+            Parameter(f"cogging_{wave}", unit, "identity", 0.0, effort, meaning)
+            for wave in ("cos", "sin")
+        ]
     if windows.held:
         mean, sd = (share * windows.tick_s for share in DELAY_TICKS)
         rows.append(Parameter("delay", "s", "identity", mean, sd, "torque is measured late"))

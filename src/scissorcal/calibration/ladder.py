@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.friction_moments import ReducedLaw
+from scissorcal.calibration.friction_search import ReducedProblem, search
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.leave_out import LeftOut, leave_strokes_out
 from scissorcal.inference import (
@@ -72,7 +74,9 @@ class Likelihood:
 class Rung:
     """One law of a ladder, ready to be fitted. ``key`` holds its discrete choices.
 
-    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.Problem`.
+    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.Problem`. ``reduced``
+    is the same law over products of its columns by stroke, where it is linear in them and its noise
+    normal: what needs sums over bins only is then taken from there.
     """
 
     name: str
@@ -84,8 +88,9 @@ class Rung:
     prior_precision: Array
     blocks: Integers | None = None
     populations: Integers | None = None
+    reduced: ReducedLaw | None = None
 
-    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
+    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> "ReducedProblem":
         """The posterior of this rung, over the bins that ``keep`` selects."""
 
         def log_prior(u: Array) -> float:
@@ -104,7 +109,10 @@ class Rung:
             return labels if labels is None or keep is None else labels[keep]
 
         sd = self.layout.sd
-        return Problem(
+        return ReducedProblem(
+            reduced=self.reduced if keep is None else None,
+            prior_mean=self.prior_mean,
+            prior_precision=self.prior_precision,
             names=self.layout.names,
             log_prior=log_prior,
             log_likelihood_terms=terms,
@@ -161,6 +169,7 @@ class Climbed:
             self.rung.prior_precision,
             labelled,
             self.share,
+            self.rung.reduced.by_stroke if self.rung.reduced else None,
         )
 
     @property
@@ -184,7 +193,9 @@ def climb(rung: Rung, series: Integers, strokes: Integers, stop: Stop | None = N
     """
     counter = Counter()
     problem = counter.over(rung.problem(series))
-    optimum = find_optimum(problem, stop=stop)
+    optimum = optimum_of(rung, series, stop)
+    if rung.reduced is not None:
+        return _climb_reduced(rung, rung.reduced, rung.problem(series), optimum, strokes)
     point = optimum.point
     white = ljung_box(rung.likelihood.standardised(point), series)
     step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
@@ -208,7 +219,51 @@ def climb(rung: Rung, series: Integers, strokes: Integers, stop: Stop | None = N
         share=white.share,
         series=series,
         strokes=strokes,
-        climbing=counter.calls,
+        climbing=counter.calls + optimum.evaluations,
+    )
+
+
+def optimum_of(rung: Rung, series: Integers, stop: Stop | None = None) -> Optimum:
+    """The optimum of a rung over its bins, by the search that fits use for it.
+
+    ``series`` (n,) labels the bins' pieces without a gap.
+    """
+    problem = rung.problem(series)
+    return find_optimum(problem, stop=stop) if rung.reduced is None else search(problem)
+
+
+def _climb_reduced(
+    rung: Rung, law: ReducedLaw, problem: ReducedProblem, optimum: Optimum, strokes: Integers
+) -> Climbed:
+    """As :func:`climb`, over products by stroke."""
+    labels = law.moments.labels
+    information = law.information(optimum.point)
+    white = ljung_box(rung.likelihood.standardised(optimum.point), problem.series)
+    residuals, densities = np.full(len(strokes), np.nan), np.full(len(strokes), np.nan)
+    folds = split_strokes(labels)
+    for fold in folds:
+        reached = optimum.point
+        if len(folds) > 1:
+            rest = law.without(fold)
+            precision = rest.counted / law.counted * information + rung.prior_precision
+            slope = rest.slope(reached) - rung.prior_precision @ (reached - rung.prior_mean)
+            seen = replace(problem, reduced=rest)
+            reached = _step_uphill(seen, reached, _newton(precision, slope))
+        unseen = np.isin(strokes, fold)
+        left = rung.likelihood.residuals(reached)[unseen]
+        residuals[unseen] = left
+        densities[unseen] = -0.5 * (left * np.exp(-reached[-1])) ** 2 - reached[-1]
+    return Climbed(
+        rung=rung,
+        optimum=optimum,
+        scores=np.array([densities[strokes == label].sum() for label in labels]),
+        held_out_residuals=residuals,
+        information=information,
+        log_likelihood=problem.log_likelihood(optimum.point),
+        share=white.share,
+        series=problem.series,
+        strokes=strokes,
+        climbing=optimum.evaluations,
     )
 
 
@@ -237,11 +292,14 @@ def _without(
         share = float(np.mean(~unseen))
         precision = share * information + rung.prior_precision
         slope = scores[~unseen].sum(axis=0) + slope_prior
-        values, vectors = np.linalg.eigh(precision)
-        move = vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max()))
         others = counter.over(rung.problem(problem.series, ~unseen))
-        reached.append(_step_uphill(others, point, move))
+        reached.append(_step_uphill(others, point, _newton(precision, slope)))
     return reached
+
+
+def _newton(precision: Array, slope: Array) -> Array:
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray(vectors @ ((vectors.T @ slope) / np.maximum(values, 1e-8 * values.max())))
 
 
 def _step_uphill(problem: Problem, point: Array, move: Array) -> Array:
@@ -312,55 +370,3 @@ def beaten(gained: Array) -> bool:
     if len(gained) < FEWEST_FOR_RANKS:
         return True
     return float(wilcoxon(gained, alternative="greater").pvalue) < FALSE_ALARM
-
-
-def rung_table(climbed: list[Climbed], chosen: Climbed) -> tuple[dict[str, Any], ...]:
-    """Rows for the report, cheapest first.
-
-    name, parameters, bic, held_out_rms, held_out_score, loo, loo_se, loo_k_hat, equivalent,
-    chosen. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
-    independent, the same share for every rung. ``loo`` is the log density of all strokes, each by
-    the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index; they are NaN for a single rung, as there is nothing to compare.
-    ``equivalent`` rungs cannot be told from the best, ``chosen`` is used.
-    ``key`` and ``values`` (by name, at the best point) are what a rung's law is drawn from.
-    """
-    share = best_of(climbed).share
-    compared = len(climbed) > 1
-    return tuple(
-        {
-            "name": candidate.rung.name,
-            "parameters": len(candidate.optimum.point),
-            "bic": -2 * candidate.log_likelihood * share
-            + len(candidate.optimum.point) * float(np.log(candidate.observations * share)),
-            "held_out_rms": candidate.held_out_rms,
-            "held_out_score": float(candidate.scores.sum()) * share,
-            **_loo(candidate, share if compared else float("nan")),
-            "equivalent": candidate.rung is chosen.rung or candidate.rung.name in chosen.alike,
-            "chosen": candidate.rung is chosen.rung,
-            "key": dict(candidate.rung.key),
-            "values": {
-                name: float(value)
-                for name, value in candidate.rung.layout.natural(candidate.optimum.point).items()
-            },
-        }
-        for candidate in climbed
-    )
-
-
-def _loo(candidate: Climbed, share: float) -> dict[str, float]:
-    if not np.isfinite(share):
-        return {"loo": share, "loo_se": share, "loo_k_hat": share}
-    found = candidate.left_out
-    return {
-        "loo": float(found.scores.sum()) * share,
-        "loo_se": _standard_error(found.scores * share),
-        "loo_k_hat": float(found.k_hats.max()),
-    }
-
-
-def _standard_error(scores: Array) -> float:
-    """Of a sum over independent strokes; NaN for a single one."""
-    if len(scores) < 2:
-        return float("nan")
-    return float(np.sqrt(len(scores) * np.var(scores, ddof=1)))

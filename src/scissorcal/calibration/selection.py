@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.ladder import (
     POSITIVE_EVIDENCE,
     RELIABLE_STROKES,
@@ -14,6 +13,7 @@ from scissorcal.calibration.ladder import (
     best_of,
 )
 from scissorcal.calibration.leave_out import RELIABLE
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.friction_basis import FrictionBasis
 from scissorcal.calibration.friction_layout import LawParts
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.windows import Windows, weigh
+from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 

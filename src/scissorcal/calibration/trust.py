@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior
 from scissorcal.verdicts import Status, Verdict
 

@@ -20,6 +20,7 @@ from scissorcal.kernel.frames import (
     encode,
 )
 from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
     EnergyLedger,
@@ -76,5 +77,6 @@ __all__ = [
     "decode",
     "encode",
     "encode_frame",
+    "presliding_path",
     "run_loop",
 ]

@@ -105,7 +105,10 @@ def build_package(
     bound = _bound(model, compiled, ranges, recipe, tolerance)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
     if record.friction and model.friction:
-        said = (*record.friction.warnings, *left_out(model.friction, bound.scene_torque_Nm))
+        said = (
+            *record.friction.warnings,
+            *left_out(model.friction, bound.scene_torque_Nm, friction),
+        )
         told = record.friction.model_copy(update={"warnings": said})
         record = record.model_copy(update={"friction": told})
     manifest = _hashed(

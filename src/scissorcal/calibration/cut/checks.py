@@ -8,7 +8,7 @@ from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.scout import Scouted
 from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.sensors import Sensors
+from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.verdicts import Verdict, failed
 
 Array = NDArray[np.float64]

@@ -8,13 +8,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import Bins
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.structure import response_from
+from scissorcal.calibration.friction_search import ReducedProblem
 from scissorcal.calibration.ladder import SEARCH_REACH, Likelihood, Rung
 from scissorcal.calibration.layout import Layout
-from scissorcal.inference import Problem
+from scissorcal.calibration.signals.filtering import Bins
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 class CutRung(Rung):
     """A law of a cut over its segments: whitened, so that its terms are taken as independent."""
 
-    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> Problem:
+    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> ReducedProblem:
         """The posterior of this rung, over the segments that ``keep`` selects."""
         return replace(
             super().problem(series, keep), standardised=None, independent=True, smooth=True

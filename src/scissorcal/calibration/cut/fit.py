@@ -27,7 +27,7 @@ from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.path import PathMotion, path_motion
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.sensors import inspect_sensors
+from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop, infer
 from scissorcal.model import EdgeBelief
@@ -77,7 +77,7 @@ def fit_cut(
     tell = progress or (lambda done, sentence: None)
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
     known = KnownFriction.of(friction)
-    sensors = inspect_sensors(recordings)
+    sensors = inspect_sensors(recordings, "fit.cut")
     motions = path_motion(recordings, known.inertia, sensors.usable)
     _refuse_no_contact(motions, known, recordings)
     ladder = allowed_laws(recipe)
@@ -150,7 +150,7 @@ def cut_experiment(
     """
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
     known = KnownFriction.of(friction)
-    motions = path_motion(recordings, known.inertia, inspect_sensors(recordings).usable)
+    motions = path_motion(recordings, known.inertia, inspect_sensors(recordings, "fit.cut").usable)
     law = CutLaw.of(fit.structure)
     scouted = _scouted(motions, known, recipe, geometry, [law], recordings)
     ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}

@@ -188,7 +188,7 @@ def _power_law(
     slopes = [geometry.slope(p.opening, p.place - p.advance) for p in pulls]
 
     def misfit(u: Array) -> Array:
-        rows = [u[2:] / 3.0, [(u[1] - np.log(median_exponent)) / log_sd_exponent]]
+        rows = [u[2:] / 3.0, (u[1:2] - np.log(median_exponent)) / log_sd_exponent]
         for pull, (depth, lever), slope, move in zip(pulls, exact, slopes, u[2:], strict=True):
             inside = np.maximum(depth - slope * move * PLACE_M * cuts, 0.0)
             force = np.exp(u[0]) * (inside / geometry.reference_m) ** np.exp(u[1])

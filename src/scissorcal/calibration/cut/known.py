@@ -9,11 +9,11 @@ from scissorcal.calibration.friction_experiment import friction_law
 from scissorcal.calibration.path import (
     Material,
     PathMotion,
-    TorqueNoise,
     material_of,
     torque_noise_of,
 )
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque
 
 Array = NDArray[np.float64]
@@ -30,7 +30,8 @@ class KnownFriction:
 
     ``law`` and ``offset`` (N m) stand at the posterior's mean. ``closing_sd`` and ``opening_sd``
     (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
-    single strokes differ by. ``cogging`` is (cosine, sine, periods per radian).
+    single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
+    what the motor adds to the measured drive.
     """
 
     law: FrictionLaw
@@ -48,7 +49,8 @@ class KnownFriction:
         means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
         centre = float(friction.structure["angle_center"])
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
-        cogging = tuple(float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin"))
+        # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
+        cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
             max(OFFSET_SD_FLOOR, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
         )

@@ -18,8 +18,8 @@ REST_PHASE = (0.65, 0.25)
 """Where in the cycle cracks come to rest, 0 just after a jump and 1 before the next: blades that
 yield stall where the torque is highest."""
 REST_SPREAD = (0.2, 1.0)
-"""Spread of that in cycles, and the standard deviation of its logarithm: 0.29 is uniform, and blades
-that stall leave less. Wide, since a narrow one would tell kappa by the scatter of rests."""
+"""Spread of that in cycles, and the standard deviation of its logarithm: 0.29 is uniform,
+and blades that stall leave less. Wide: a narrow one would tell kappa by the scatter of rests."""
 VARIATION = (0.04, 0.7)
 VARIATION_LENGTH_M = (1.5e-3, 0.5)
 SHEET_VARIATION = (0.004, 1.0)

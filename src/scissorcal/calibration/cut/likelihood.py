@@ -260,7 +260,9 @@ class CutLikelihood:
 
 def response_table(response: Response, reference_m: float) -> tuple[Array, Array, Array, Array]:
     """Logarithms of depth, force, d(log force)/d(log depth) and log energy at the table's knots."""
-    log_depth = np.log(reference_m) + np.linspace(*np.log(TABLE_SPAN), TABLE_SIZE)
+    log_depth = np.log(reference_m) + np.linspace(
+        np.log(TABLE_SPAN[0]), np.log(TABLE_SPAN[1]), TABLE_SIZE
+    )
     depth = np.exp(log_depth)
     if response.family == "power":
         exponent = float(np.asarray(response.exponent))

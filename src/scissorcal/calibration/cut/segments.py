@@ -16,12 +16,11 @@ from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.path import (
     Material,
     PathMotion,
-    TorqueNoise,
     mean_torque,
     torque_covariance,
     turning_points,
 )
-from scissorcal.calibration.path.work import mean_noise
+from scissorcal.calibration.torque_noise import TorqueNoise
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -316,7 +315,9 @@ class _Builder:
                     torque=work / path,
                     late=late * turned / path,
                     path=path,
-                    noise=mean_noise(ticks, motion.tick_s, self.noise),
+                    noise=np.array(
+                        [self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks]
+                    ),
                     speed=float(np.median(np.abs(turned) / (ticks * motion.tick_s))),
                     tooth_sd=self.guess.cut_off_tooth(geometry, motion.opening[ends]),
                 )

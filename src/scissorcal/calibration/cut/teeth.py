@@ -29,7 +29,7 @@ FASTEST_RATIO = (0.7, 1.4)
 SCAN = (0.25, 2.5)
 SCAN_STEP = 0.04
 COHERENT = 16.0
-"""Power that keeps its phase over what noise leaves: exponential with mean 1 where there is no line,
+"""Power that keeps its phase over what noise leaves. Without a line that is exponential with mean 1,
 so that one stroke speed in ten million passes by chance."""
 OVERLAP = 4.0
 """Windows half a cycle apart that count as one: the sum of the Hann window's squared
@@ -61,8 +61,8 @@ class Line:
 
     ``log_period`` is the mean logarithm of the period (rad) over the stretches ``stretches``,
     ``gain`` the power that keeps its phase over what noise would leave. ``speeds`` has rows of
-    stroke speed (rad/s), the ratio that it gives and its gain. ``half`` and ``third`` are the powers at a half and a third of the line's
-    frequency over its own.
+    stroke speed (rad/s), the ratio that it gives and its gain. ``half`` and ``third`` are the
+    powers at a half and a third of the line's frequency over its own.
     """
 
     ratio: float

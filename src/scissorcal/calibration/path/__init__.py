@@ -3,7 +3,6 @@
 from scissorcal.calibration.path.motion import PathMotion, path_motion, turning_points
 from scissorcal.calibration.path.work import (
     Material,
-    TorqueNoise,
     material_of,
     mean_torque,
     torque_covariance,
@@ -13,7 +12,6 @@ from scissorcal.calibration.path.work import (
 __all__ = [
     "Material",
     "PathMotion",
-    "TorqueNoise",
     "material_of",
     "mean_torque",
     "path_motion",

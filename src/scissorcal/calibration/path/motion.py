@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import pieces_of, sheets_of
-from scissorcal.calibration.sensors import resolution_of
+from scissorcal.calibration.signals.segments import pieces_of, sheets_of
+from scissorcal.calibration.signals.sensors import resolution_of
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]

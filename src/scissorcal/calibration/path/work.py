@@ -8,24 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.path.motion import PathMotion
+from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 DEFAULT_SLOW_TIME_S = 0.012
-
-
-@dataclass(frozen=True)
-class TorqueNoise:
-    """Noise of the measured drive: white, plus a slow part with an exponential memory.
-
-    Gamma_ij = white^2 delta_ij + slow^2 exp(-|t_i - t_j| / slow_time).
-    """
-
-    white_Nm: float
-    slow_Nm: float
-    slow_time_s: float
 
 
 def torque_noise_of(diagnostics: Mapping[str, Any]) -> TorqueNoise:
@@ -63,7 +52,7 @@ def material_of(
     W = I omega^2 / 2 + sum of (F + offset - cog - drive) d(theta), so that between two samples the
     material's mean torque over the path is the difference of W over that of the opening. No
     acceleration enters, and it does not matter how fast the path was gone. ``cogging`` is
-    (cosine, sine, periods per radian) of a motor torque that is not in the measured drive.
+    (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
     """
     path = motion.opening
     step = np.diff(path)
@@ -75,9 +64,9 @@ def material_of(
     law = friction_torque(friction, middle, step / motion.tick_s, 0.0, state)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
-    cosine, sine, per_rad = cogging
-    if per_rad:
-        work = work - (cosine * np.sin(per_rad * path) - sine * np.cos(per_rad * path)) / per_rad
+    cosine, sine, number = cogging
+    if number:
+        work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
     return Material(np.asarray(work), np.asarray(torque))
@@ -115,10 +104,3 @@ def torque_covariance(
     covariance += (difference * energy) @ difference.T
     path = np.diff(motion.opening[ends])
     return np.asarray(covariance / np.outer(path, path) + offset_sd**2)
-
-
-def mean_noise(ticks: Array, tick_s: float, noise: TorqueNoise) -> Array:
-    """Variance of the drive's noise averaged over ``ticks`` samples, same shape."""
-    ratio = ticks * tick_s / noise.slow_time_s
-    kept = 2.0 / ratio * (1.0 - (1.0 - np.exp(-ratio)) / ratio)
-    return np.asarray(noise.white_Nm**2 / ticks + noise.slow_Nm**2 * kept)

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration import friction_law
-from scissorcal.calibration.conditioning import Bins, condition
-from scissorcal.calibration.cut import CUTOFF_HZ
-from scissorcal.calibration.cut_expected import ACCELERATION_CUTOFF_HZ
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.filtering import Bins, condition
 from scissorcal.errors import InputError
 from scissorcal.model import (
     Cutting,
@@ -32,6 +30,7 @@ from scissorcal.report.svg import INK, MUTED, PANEL, Svg, finish, look_of, new_a
 
 Places = NDArray[np.int64]
 
+CUTOFF_HZ, ACCELERATION_CUTOFF_HZ = 300.0, 150.0
 SHORTEST_CUT_M = 2e-3
 """Strokes that cut less than this have no work to speak of."""
 ADVANCED_SHARE = 0.05

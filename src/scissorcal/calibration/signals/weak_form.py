@@ -1,22 +1,26 @@
 """Motion and drive weighed over short windows, so that filtering treats both sides alike."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from scissorcal.calibration.conditioning import (
-    BIN_S,
-    EDGE_SAMPLES,
-    Bins,
-    low_pass,
+from scissorcal.calibration.signals.filtering import BIN_S, Bins, low_pass, rate_floor
+from scissorcal.calibration.signals.segments import (
+    edge_samples,
+    no_piece,
     pieces_of,
-    rate_floor,
     sheets_of,
+    stretches,
 )
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -42,10 +46,10 @@ class Windows:
     """A recording as weighed by short windows, and the samples beneath.
 
     ``bins`` (n,) hold weighted means: of the drive, and of the acceleration exactly, by moving both
-    derivatives from the position to the weight. ``opening``, ``rate`` and ``load`` (m,) are the
-    samples (``load`` None where none was measured), for what is not linear in them: friction is
-    taken at every sample and weighed by :meth:`average`, as the measured drive was. ``first`` (n,)
-    is where each window begins, ``weights`` (k,) its weights, ``starts`` where the pieces
+    derivatives from the position to the weight. ``opening``, ``rate``, ``load`` and ``drive`` (m,)
+    are the samples (``load`` None where none was measured), for what is not linear in them:
+    friction is taken at every sample and weighed by :meth:`average`, as the drive was. ``first``
+    (n,) is where each window begins, ``weights`` (k,) its weights, ``starts`` where the pieces
     without a gap begin. ``slope`` (n,) is the time derivative of the weighed drive, ``tick_s`` the
     time between samples; ``held`` says that commands held the drive from one to the next.
     """
@@ -54,6 +58,7 @@ class Windows:
     opening: Array
     rate: Array
     load: Array | None
+    drive: Array
     first: Integers
     weights: Array
     starts: Integers
@@ -63,8 +68,19 @@ class Windows:
 
     def average(self, values: Array) -> Array:
         """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
-        view = sliding_window_view(values, len(self.weights), axis=0)
-        return np.asarray(view[self.first] @ self.weights)
+        return np.asarray(self._weighing @ values)
+
+    @cached_property
+    def _weighing(self) -> "csr_array":
+        """The windows' weights as a sparse matrix (n, m)."""
+        from scipy.sparse import csr_array
+
+        count, length = len(self.first), len(self.weights)
+        places = (self.first[:, None] + np.arange(length)).ravel().astype(np.int32)
+        ends = np.arange(count + 1, dtype=np.int32) * length
+        return csr_array(
+            (np.tile(self.weights, count), places, ends), shape=(count, len(self.rate))
+        )
 
     @property
     def bears_load(self) -> bool:
@@ -114,11 +130,7 @@ def weigh(
             samples += high - low
         stroke_offset += len(recording.strokes)
     if not pieces:
-        names = ", ".join(recording.source or "recording" for recording in recordings)
-        raise InputError(
-            f"{names}: no stretch without gaps is longer than {4 * EDGE_SAMPLES} samples, "
-            "so no rate can be computed; record again without interruptions."
-        )
+        raise no_piece(recordings)
     if len({len(piece.weights) for piece in pieces}) > 1:
         raise InputError(
             "The recordings have different sampling rates; fit those of one rate together."
@@ -147,6 +159,7 @@ def _joined(pieces: list[Windows], loaded: bool) -> Windows:
         opening=together("opening"),
         rate=together("rate"),
         load=together("load") if loaded else None,
+        drive=together("drive"),
         first=np.concatenate([piece.first for piece in pieces]),
         weights=pieces[0].weights,
         starts=np.concatenate([piece.starts for piece in pieces]),
@@ -177,7 +190,8 @@ def _weigh_piece(
     weights, twice = _weights(knot, rate_Hz)
     driving = _widened(_spline(knot), HELD if held else SMOOTH)
     width = max(1, round(BIN_S * rate_Hz))
-    first = np.arange(EDGE_SAMPLES, len(time) - EDGE_SAMPLES - len(weights), width)
+    edge = edge_samples(rate_Hz)
+    first = np.arange(edge, len(time) - edge - len(weights), width)
     middle = first + len(weights) // 2
 
     def over(values: Array, kernel: Array, at: Integers) -> Array:
@@ -208,6 +222,7 @@ def _weigh_piece(
         opening=opening,
         rate=rate,
         load=low_pass(recording.handle_radius_m * hand, band_Hz, rate_Hz),
+        drive=drive,
         first=first,
         weights=weights,
         starts=np.zeros(1, dtype=np.int64),
@@ -246,8 +261,7 @@ def _rests(rate: Array, floor: float, tick_s: float) -> Mask:
     stands alone. Touches that follow each other within ``STICK_SLIP_S`` are sticking and slipping.
     """
     certain = np.abs(rate) > floor
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], certain, [True]]).astype(int)))
-    low, high = edges[::2], edges[1::2]
+    low, high = stretches(~certain)
     apart = round(3 * TURN_S / tick_s)
     before, after = np.maximum(low - apart, 0), np.minimum(high - 1 + apart, len(rate) - 1)
     turns = ((high - low) * tick_s <= TURN_S) & (low > 0) & (high < len(rate))

@@ -1,12 +1,18 @@
 """From raw samples to band-limited bins: derivatives without phase, gaps respected."""
 
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.sensors import resolution_of
+from scissorcal.calibration.signals.segments import (
+    edge_samples,
+    no_piece,
+    pieces_of,
+    sheets_of,
+    stretches,
+)
+from scissorcal.calibration.signals.sensors import resolution_of
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -14,11 +20,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BIN_S = 0.005
-EDGE_SAMPLES = 50
-"""Samples left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
-
-GAP_FACTOR = 1.5
-REST_MARGIN = 4
+REST_MARGIN_S = 0.02
 JITTER = 0.1
 """Motion slower than this share of the recording's rms rate is jitter, not sliding."""
 STICKS_PER_S = 5.0
@@ -89,11 +91,7 @@ def condition(
             )
         stroke_offset += len(recording.strokes)
     if not pieces:
-        names = ", ".join(recording.source or "recording" for recording in recordings)
-        raise InputError(
-            f"{names}: no stretch without gaps is longer than {4 * EDGE_SAMPLES} samples, "
-            "so no rate can be computed; record again without interruptions."
-        )
+        raise no_piece(recordings)
     joined = {
         f.name: np.concatenate([getattr(piece, f.name) for piece in pieces])
         for f in fields(Bins)
@@ -104,23 +102,6 @@ def condition(
         bin_s=pieces[0].bin_s,
         rate_floor=max(piece.rate_floor for piece in pieces),
     )
-
-
-def pieces_of(recording: Recording) -> list[tuple[int, int]]:
-    """Stretches without a gap that are long enough for a rate, as (first, one past the last)."""
-    time = recording.device_time_s
-    if len(time) < 2:
-        return []
-    step = np.diff(time)
-    usual = float(np.median(step))
-    if usual <= 0:
-        raise InputError(
-            f"{recording.source or 'The recording'}: its clock does not advance; "
-            "check the time column or the device's clock."
-        )
-    breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
-    bounds = [0, *breaks.tolist(), len(time)]
-    return [(low, high) for low, high in pairwise(bounds) if high - low > 4 * EDGE_SAMPLES]
 
 
 def _bin_piece(
@@ -141,16 +122,17 @@ def _bin_piece(
     acceleration = _central(_central(gentle, rate_Hz), rate_Hz)
     floor = rate_floor(position, cutoff_Hz, rate_Hz)
     width = max(1, round(BIN_S * rate_Hz))
-    count = (len(time) - 2 * EDGE_SAMPLES) // width
-    kept = slice(EDGE_SAMPLES, EDGE_SAMPLES + count * width)
+    edge = edge_samples(rate_Hz)
+    count = (len(time) - 2 * edge) // width
+    kept = slice(edge, edge + count * width)
 
     def binned(values: Array) -> Array:
         return np.asarray(values[kept].reshape(count, width).mean(axis=1))
 
     windows = rate[kept].reshape(count, width)
     certain = (windows.min(axis=1) > floor) | (windows.max(axis=1) < -floor)
-    moving = _away_from_rests(certain, windows.mean(axis=1))
-    middle = np.arange(count) * width + EDGE_SAMPLES + width // 2
+    moving = _away_from_rests(certain, windows.mean(axis=1), width / rate_Hz)
+    middle = np.arange(count) * width + edge + width // 2
     stroke = np.asarray(samples["stroke"], dtype=np.int64)
     return Bins(
         time_s=binned(time),
@@ -169,41 +151,42 @@ def _bin_piece(
     )
 
 
-def _away_from_rests(certain: NDArray[np.bool_], rate: Array) -> NDArray[np.bool_]:
+def _away_from_rests(certain: NDArray[np.bool_], rate: Array, bin_s: float) -> NDArray[np.bool_]:
     """Where the joint sticks and slips, leave out the neighbours of every rest and reversal.
 
     A stick is an interruption between motion in one direction that is no mere jitter on either
     side. A low-pass filter smears the rest into the slip, and then inertia comes out too large and
-    Stribeck friction too small; bins within ``REST_MARGIN`` of an interruption are therefore left
+    Stribeck friction too small; bins within ``REST_MARGIN_S`` of an interruption are therefore left
     out. Motion without sticks keeps all its bins: it passes zero once a reversal, and those
     bins tell Coulomb friction from the rest.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], certain, [True]]).astype(int)))
-    rests = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    low_ends, high_ends = stretches(~certain)
+    rests = list(zip(low_ends.tolist(), high_ends.tolist(), strict=True))
     if not np.any(certain):
         return certain
+    margin = max(1, round(REST_MARGIN_S / bin_s))
     fast = JITTER * float(np.sqrt(np.mean(rate[certain] ** 2)))
 
     def sticks(low: int, high: int) -> bool:
-        before, after = rate[max(low - REST_MARGIN, 0) : low], rate[high : high + REST_MARGIN]
+        before, after = rate[max(low - margin, 0) : low], rate[high : high + margin]
         if len(before) == 0 or len(after) == 0 or before[-1] * after[0] <= 0:
             return False
         return bool(min(np.abs(before).max(), np.abs(after).max()) > fast)
 
     kept = certain.copy()
     found = sum(sticks(low, high) for low, high in rests)
-    if found >= STICKS_PER_S * np.count_nonzero(certain) * BIN_S:
+    if found >= STICKS_PER_S * np.count_nonzero(certain) * bin_s:
         for low, high in rests:
-            kept[max(low - REST_MARGIN, 0) : high + REST_MARGIN] = False
+            kept[max(low - margin, 0) : high + margin] = False
     return kept
 
 
 def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
     """Low-pass forwards and backwards (4th-order Butterworth), so that nothing is late."""
-    from scipy.signal import butter, filtfilt
+    from scipy.signal import butter, sosfiltfilt
 
-    numerator, denominator = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2))
-    return np.asarray(filtfilt(numerator, denominator, values))
+    sections = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2), output="sos")
+    return np.asarray(sosfiltfilt(sections, values))
 
 
 def _central(values: Array, rate_Hz: float) -> Array:
@@ -221,13 +204,3 @@ def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
     share = min(2 * cutoff_Hz / rate_Hz, 1.0)
     noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
     return float(3 * noise)
-
-
-def sheets_of(recording: Recording) -> Integers:
-    """Sheet in place at each sample: a stroke's own, held until the next stroke names another."""
-    stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
-    of_stroke = np.array([s.sheet for s in recording.strokes] + [-1], dtype=np.int64)
-    known = np.where(stroke >= 0, stroke, len(recording.strokes))
-    sheet = of_stroke[known]
-    last = np.maximum.accumulate(np.where(stroke >= 0, np.arange(len(stroke)), -1))
-    return np.where(last >= 0, sheet[np.maximum(last, 0)], -1)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.sensors import channels_of, inspect_sensors, resolution_of
+from scissorcal.calibration.signals.filtering import low_pass
+from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors, resolution_of
 from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from tests.calibration.truth import Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
@@ -104,3 +105,75 @@ def test_a_step_is_seen_and_a_smooth_channel_has_none():
 def test_near_zero_rates_are_said_to_be_left_out(clean):
     fit = fit_friction((clean,), SIMPLE, effort="draft", rng=np.random.default_rng(5))
     assert any("leave the direction open" in note for note in fit.notes)
+
+
+def quantised(recording: Recording, bits: int) -> Recording:
+    step = np.ptp(recording.samples["motor_torque"]) / 2**bits
+    return changed(recording, lambda torque: np.round(torque / step) * step)
+
+
+def slow(recording: Recording) -> Recording:
+    """A sensor of 20 Hz whose steps are larger than its noise: it repeats 60 % of its values."""
+    return quantised(changed(recording, lambda torque: low_pass(torque, 20.0, 1000.0)), 10)
+
+
+def held(recording: Recording) -> Recording:
+    """A sensor that is read ten times for each time that it measures."""
+    return changed(recording, lambda torque: np.repeat(torque[::10], 10)[: len(torque)])
+
+
+def coarse(recording: Recording) -> Recording:
+    """Eight bits, which repeat a third of their values."""
+    return quantised(recording, 8)
+
+
+@pytest.mark.parametrize("sensor", [slow, held, coarse])
+@pytest.mark.parametrize("share", [0.086, 0.27])
+def test_a_sensor_that_repeats_its_values_is_examined_too(clean, sensor, share):
+    honest = sensor(clean)
+    assert np.all(inspect_sensors((honest,)).usable[0])
+    limit = float(np.quantile(np.abs(honest.samples["motor_torque"]), 1.0 - share))
+    found = inspect_sensors((clipped(honest, limit),), "fit.cut")
+    assert found.verdict.status == "fail"
+    assert found.verdict.scope == "fit.cut"
+    ends = np.abs(honest.samples["motor_torque"]) >= limit
+    assert not np.any(~found.usable[0] & ~ends)
+    assert np.mean(~found.usable[0]) > 0.6 * share
+
+
+@pytest.mark.parametrize("rate_Hz", [200.0, 1000.0, 10000.0])
+@pytest.mark.parametrize("bits", [6, 8, 12])
+@pytest.mark.parametrize("shape", ["sine", "triangle", "steps", "sweep"])
+def test_turns_and_dwells_are_not_called_saturation(rate_Hz, bits, shape):
+    """Noiseless and quantised: a sine turns at its extremes, a sweep's torque stays at its ends."""
+    time = np.arange(0.0, 20.0, 1.0 / rate_Hz)
+    phase = 2 * np.pi * 0.2 * time
+    torque = {
+        "sine": 0.02 * np.sin(phase),
+        "triangle": 0.02 * np.arcsin(np.sin(phase)),
+        "steps": 0.01 * np.sign(np.sin(phase)),
+        "sweep": 0.012 * np.tanh(30 * np.cos(phase)) * (1.0 + 0.3 * (time > 10)),
+    }[shape]
+    samples = np.zeros(len(time), SAMPLE_DTYPE)
+    samples["device_time_us"] = np.round(time * 1e6)
+    samples["opening"] = np.round(np.clip(0.5 + 0.4 * np.sin(phase), 0.2, 0.8) / 5e-5) * 5e-5
+    step = 0.04 / 2**bits
+    samples["motor_torque"] = np.round(torque / step) * step
+    samples["stroke"] = -1
+    found = inspect_sensors((Recording("friction", samples, source="a.mcap"),))
+    assert np.all(found.usable[0])
+
+
+@pytest.mark.parametrize("factor", [0.2, 10.0])
+def test_saturation_is_found_at_any_sampling_rate(factor):
+    """The same motion and noise sampled at 200 Hz and at 10 kHz."""
+    clean = friction_recording(Truth(), np.random.default_rng(1))
+    samples = clean.samples[:: round(1 / factor)] if factor < 1 else clean.samples
+    samples = np.repeat(samples, max(1, round(factor)))
+    noise = np.random.default_rng(2).standard_normal(len(samples))
+    samples["motor_torque"] += 3e-4 * noise
+    samples["device_time_us"] = np.arange(len(samples)) * round(1000 / factor)
+    one = dataclasses.replace(clean, samples=samples)
+    assert np.all(inspect_sensors((one,)).usable[0])
+    found = inspect_sensors((clipped(one, 0.0155),))
+    assert found.verdict.status == "fail"

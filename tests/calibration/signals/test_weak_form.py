@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.calibration.friction_basis import FrictionBasis
-from scissorcal.calibration.windows import next_cutoff, weigh
+from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording

@@ -1,0 +1,286 @@
+"""What the sensors did to a recording: steps, ends of range, dead bands, silence."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.signals.segments import still_clock, stretches
+from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Status, Verdict
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+Scope = Literal["fit.friction", "fit.cut"]
+
+SPOILT_LIMIT = 0.05
+"""Share of samples that a sensor may have spoilt before a fit is no calibration."""
+LONG_RUN_S = 0.005
+FEWEST_IN_RUN = 4
+"""A run of equal values is one that lasts so long, and has so many samples at any rate of them."""
+FEWEST_SPOILT_S = 0.02
+NEAR_S = 0.05
+"""The joint moves where its position changes more than twice within so long before and after."""
+NOISY = 0.2
+"""A channel whose neighbouring samples are equal less often than this has noise, and then chance
+alone does not hold a value."""
+WIGGLES = 0.2
+"""Noise turns at so many of its values at least (white noise at two of three), motion at few."""
+REGULAR = 0.9
+"""A sensor that is read faster than it measures holds this share of its values equally long."""
+UNUSUAL = 3.0
+"""Where a channel has no noise, a run at an end counts from so many times its usual length."""
+BAND_STEPS = 4.0
+FLAT = 3.0
+"""Such a run is flat if it lasts so many times longer than the way in and out of it, through the
+last few levels. A parabola's turn lasts 0.81 times as long, a fourth power's twice."""
+LONGEST = 1.5
+STANDS_OUT = 2.0
+"""A flat run must last so many times longer than any within the range, or all flat runs at an end
+so many times longer than the longer runs at any level within."""
+WITHIN = 0.5
+"""Share of moving samples that must lie within the range for its ends to stand out from them."""
+STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
+HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
+"""Flags of a device's state frame (docs/protocol.md)."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One sensor over one recording.
+
+    ``step`` is its resolution (NaN: none to be seen), ``saturated`` and ``dead`` (m,) mark
+    samples at an end of its range and within a dead band; ``low`` and ``high`` are those ends.
+    """
+
+    name: str
+    constant: bool
+    step: float
+    saturated: Mask
+    dead: Mask
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """All sensors over all recordings: which samples may be used, sentences, and a verdict."""
+
+    usable: tuple[Mask, ...]
+    notes: tuple[str, ...]
+    verdict: Verdict
+
+
+def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.friction") -> Sensors:
+    """Look for what sensors do to data, and mark the samples that they spoilt.
+
+    Saturation is a stretch of equal values at a channel's largest or smallest one, a dead band
+    such a stretch at zero while the joint moves. In a channel with noise chance does not hold a
+    value. A channel without any (quantised, or slow) holds values by itself: there a stretch at an
+    end is saturation if it is flat, unlike a turn, and if no level within the range is held as
+    long, unlike a plateau. A sample that is spoilt is no measurement and is left out of the
+    likelihood; where more than ``SPOILT_LIMIT`` are, what is left cannot stand for the whole, and
+    the verdict, on the fit that ``scope`` names, fails.
+    """
+    usable, notes = [], []
+    worst, named = 0.0, ""
+    for recording in recordings:
+        channels = channels_of(recording)
+        spoilt = _flagged(recording)
+        source = recording.source or "the recording"
+        for channel in channels:
+            spoilt |= channel.saturated | channel.dead
+            notes += [f"{source}: {said}" for said in _sentences(channel, recording)]
+            for share, what in (
+                (float(channel.saturated.mean()), "is at the end of its range"),
+                (float(channel.dead.mean()), "does not respond around zero"),
+            ):
+                if share > worst:
+                    worst, named = share, f"{channel.name} of {source} {what}"
+        usable.append(~spoilt)
+    return Sensors(tuple(usable), tuple(notes), _verdict(scope, worst, named))
+
+
+def channels_of(recording: Recording) -> tuple[Channel, ...]:
+    """Inspect the channels that a fit of this recording uses, the position first."""
+    samples = recording.samples
+    names = ["opening", "motor_torque"]
+    if np.isfinite(recording.handle_radius_m):
+        names.append("handle_force")
+    opening = np.asarray(samples["opening"], dtype=np.float64)
+    time = recording.device_time_s
+    tick_s = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if tick_s <= 0.0:
+        raise still_clock(recording)
+    moves = _moves(opening, max(1, round(NEAR_S / tick_s)))
+    return tuple(
+        _inspect(name, np.asarray(samples[name], dtype=np.float64), moves, tick_s) for name in names
+    )
+
+
+def resolution_of(values: Array) -> float:
+    """Step of a quantised channel (m,), NaN where its values are not multiples of one.
+
+    >>> f"{resolution_of(np.round(np.sin(np.arange(1000.0)) / 0.01) * 0.01):.6f}"
+    '0.010000'
+    """
+    levels = np.unique(values)
+    apart = np.diff(levels)
+    apart = apart[apart > SAME * np.ptp(values)]
+    if len(apart) < 2:
+        return float("nan")
+    least = float(apart.min())
+    step = float(apart.sum() / np.round(apart / least).sum())
+    away = np.abs(apart / step - np.round(apart / step))
+    return step if np.mean(away < NEAR_WHOLE) > STEADY_STEP else float("nan")
+
+
+def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
+    low, high = float(values.min()), float(values.max())
+    none = np.zeros(len(values), dtype=bool)
+    constant, step = low == high, resolution_of(values)
+    if constant or name == "opening":
+        return Channel(name, constant, step, none, none, low, high)
+    long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
+    fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_SPOILT_S / tick_s))
+    hold, alike = _repetition(values)
+    dead, ends = none, tuple[float, ...]()
+    if alike < NOISY:
+        long_run = max(long_run, FEWEST_IN_RUN * hold)
+        ends = tuple(end for end in (low, high) if _long_runs(values == end, long_run) >= fewest)
+        silent = (values == 0.0) & moves
+        if low < 0.0 < high and _long_runs(silent, long_run) >= fewest:
+            dead = silent
+    else:
+        ends = _held_ends(values, moves, step, long_run, fewest)
+    return Channel(name, constant, step, np.isin(values, ends), dead, low, high)
+
+
+def _repetition(values: Array) -> tuple[int, float]:
+    """Samples that a channel (m,) holds each value for, and the share of values that repeat.
+
+    A sensor that is read faster than it measures holds every value equally long; whether it has
+    noise shows in the values that it measures, not in the samples. A channel that hardly ever turns
+    has no noise, however fast it moves, and repeats all. The range's ends and zero do not count.
+    """
+    first, after = _runs(values)
+    level, length = values[first], after - first
+    inside = (level > values.min()) & (level < values.max()) & (level != 0.0)
+    if not np.any(inside):
+        return 1, 1.0
+    ways = np.sign(np.diff(level))
+    if np.mean(ways[1:] != ways[:-1]) < WIGGLES:
+        return 1, 1.0
+    hold = max(1, int(np.median(length[inside])))
+    if np.mean(length[inside] % hold == 0) < REGULAR:
+        hold = 1
+    measured = np.round(length[inside] / hold)
+    return hold, 1.0 - float(np.count_nonzero(inside) / measured.sum())
+
+
+def _held_ends(
+    values: Array, moves: Mask, step: float, long_run: int, fewest: int
+) -> tuple[float, ...]:
+    """Ends of the range at which a channel (m,) without noise looks cut off."""
+    first, after = _runs(values)
+    length, level = after - first, values[first]
+    ends = (float(values.min()), float(values.max()))
+    alive = np.concatenate([[0], np.cumsum(moves)])
+    moving = alive[after] - alive[first]
+    within = (level > ends[0]) & (level < ends[1]) & (moving > 0)
+    if moving[within].sum() < max(WITHIN * moving.sum(), 1):
+        return ()
+    usual = float(np.quantile(length[within], 0.95))
+    long = length >= max(long_run, UNUSUAL * usual)
+    inner = within & (level != 0.0)
+    longest = LONGEST * float(length[inner].max(initial=0))
+    _, place = np.unique(level, return_inverse=True)
+    most = STANDS_OUT * float(np.bincount(place, np.where(long & inner, moving, 0)).max())
+    change = float(np.median(np.abs(np.diff(level[moving > 0]))))
+    band = BAND_STEPS * max(change, step if np.isfinite(step) else 0.0)
+    found = []
+    for end in ends:
+        near = _runs_around(np.abs(values - end) <= band, first)
+        flat = length[long & (level == end) & (length > FLAT * (near - length))]
+        if flat.sum() >= fewest and (flat.sum() > most or flat.max() > longest):
+            found.append(end)
+    return tuple(found)
+
+
+def _runs(values: Array) -> tuple[Integers, Integers]:
+    """First samples, and ones past the last, of the runs of equal values (m,)."""
+    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
+    return np.concatenate([[0], edges]), np.concatenate([edges, [len(values)]])
+
+
+def _runs_around(near: Mask, first: Integers) -> Integers:
+    """Length of the stretch of ``near`` (m,) that each sample of ``first`` (k,) lies in, or 0."""
+    low, high = stretches(near)
+    if len(low) == 0:
+        return np.zeros(len(first), dtype=np.int64)
+    index = np.maximum(np.searchsorted(low, first, side="right") - 1, 0)
+    return np.where((first >= low[index]) & (first < high[index]), high[index] - low[index], 0)
+
+
+def _long_runs(held: Mask, long_run: int) -> int:
+    """Samples in the runs of ``held`` (m,) that are too long for chance."""
+    low, high = stretches(held)
+    lengths = high - low
+    return int(lengths[lengths >= long_run].sum())
+
+
+def _moves(opening: Array, reach: int) -> Mask:
+    """Samples (m,) near which the position changes."""
+    changed = np.concatenate([[0], np.cumsum(np.diff(opening, prepend=opening[:1]) != 0)])
+    index = np.arange(len(opening))
+    ahead = changed[np.minimum(index + reach, len(opening))]
+    return np.asarray(ahead - changed[np.maximum(index - reach, 0)] > 2)
+
+
+def _flagged(recording: Recording) -> Mask:
+    """Samples that the device itself says it could not measure."""
+    flags = np.asarray(recording.samples["flags"], dtype=np.int64)
+    wrong = ENCODER_FAULT
+    if np.isfinite(recording.handle_radius_m):
+        wrong |= HANDLE_FORCE_SATURATED
+    return np.asarray((flags & wrong) != 0)
+
+
+def _sentences(channel: Channel, recording: Recording) -> list[str]:
+    joint = recording.joint
+    unit = {"opening": joint.position_unit, "motor_torque": joint.effort_unit}.get(
+        channel.name, "N"
+    )
+    said = []
+    if channel.constant:
+        said.append(f"{channel.name} is {channel.low:.6g} {unit} throughout.")
+    elif np.isfinite(channel.step):
+        said.append(f"{channel.name} comes in steps of {channel.step:.3g} {unit}.")
+    if channel.saturated.any():
+        said.append(
+            f"{channel.name} is at an end of its range ({channel.low:.3g} to {channel.high:.3g} "
+            f"{unit}) in {channel.saturated.mean():.2%} of the samples, which are left out."
+        )
+    if channel.dead.any():
+        said.append(
+            f"{channel.name} is exactly 0 in {channel.dead.mean():.2%} of the samples although "
+            "the joint moves: a dead band. They are left out."
+        )
+    return said
+
+
+def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
+    if worst == 0.0:
+        why = "No sensor reached an end of its range, and none was silent around zero."
+        return Verdict(scope, "sensors", "pass", 0.0, SPOILT_LIMIT, why)
+    status: Status = "pass" if worst <= SPOILT_LIMIT else "fail"
+    why = f"{named} in {worst:.1%} of the samples; they are left out."
+    if status == "fail":
+        why += (
+            " That is too many for what is left to stand for the whole: record again with a "
+            "sensor of a larger range, or slower and with gentler turns."
+        )
+    return Verdict(scope, "sensors", status, worst, SPOILT_LIMIT, why)

@@ -1,0 +1,179 @@
+"""What was recorded and is not used: seconds by stroke and speed, each with its reason."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.signals.segments import pieces_of
+from scissorcal.calibration.signals.weak_form import Windows
+from scissorcal.recording.recording import Recording
+
+Mask = NDArray[np.bool_]
+Masks = tuple[Mask, ...]
+
+GAP, EDGE, SPOILT = "gap", "edge of a piece", "sensor spoilt"
+SLOW, OTHER = "rest or too slow", "no window"
+LITTLE = 0.5
+"""A stroke of which a smaller share is used is named."""
+
+
+@dataclass(frozen=True)
+class UsageRow:
+    """One stroke: seconds recorded, seconds used, and what became of the others, by reason.
+
+    ``stroke`` counts across recordings, -1 for what lies between strokes; ``speed`` is the nominal
+    one in rad/s or m/s, NaN where there is none.
+    """
+
+    recording: str
+    stroke: int
+    speed: float
+    recorded_s: float
+    used_s: float
+    reasons: Mapping[str, float]
+
+    @property
+    def share(self) -> float:
+        """Share of the recorded time that is used."""
+        return self.used_s / self.recorded_s if self.recorded_s > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a fit uses of its recordings, stroke by stroke."""
+
+    rows: tuple[UsageRow, ...]
+
+    @property
+    def by_speed(self) -> tuple[UsageRow, ...]:
+        """The strokes of one speed together, slowest first, ``stroke`` and ``recording`` left out.
+
+        What lies between strokes and strokes without a single speed come last, as one row.
+        """
+        speeds = np.round([row.speed for row in self.rows], 6)
+        rows = []
+        for speed in np.unique(speeds):
+            same = np.isnan(speeds) if np.isnan(speed) else speeds == speed
+            rows.append(_together([self.rows[i] for i in np.flatnonzero(same)], float(speed)))
+        return tuple(rows)
+
+    @property
+    def sentence(self) -> str:
+        """How much of the strokes is used, and of which speed least, with the main reason."""
+        strokes = [row for row in self.rows if row.stroke >= 0] or list(self.rows)
+        whole = _together(strokes, float("nan"))
+        text = f"{whole.used_s:.3g} s of {whole.recorded_s:.3g} s recorded in strokes are used."
+        speeds = Usage(tuple(strokes)).by_speed
+        if not speeds:
+            return text
+        worst = min(speeds, key=lambda row: row.share)
+        if worst.share >= LITTLE or not worst.reasons:
+            return text
+        reason = max(worst.reasons, key=lambda name: worst.reasons[name])
+        at = "without a single speed" if np.isnan(worst.speed) else f"at {worst.speed:.3g} per s"
+        return (
+            f"{text} Least is used of the strokes {at}: {worst.used_s:.2g} s of "
+            f"{worst.recorded_s:.3g} s, mostly because of: {reason} "
+            f"({worst.reasons[reason]:.3g} s)."
+        )
+
+
+def count_usage(
+    recordings: tuple[Recording, ...], used: Masks, reasons: Mapping[str, Masks]
+) -> Usage:
+    """Count what is used by stroke, and why the rest is not.
+
+    ``used`` masks the samples (m,) of each recording, ``reasons`` does so for each reason; the
+    first reason that holds for a sample counts, "no window" where none does.
+
+    >>> import numpy as np
+    >>> from scissorcal.recording.recording import SAMPLE_DTYPE
+    >>> samples = np.zeros(1000, SAMPLE_DTYPE)
+    >>> samples["device_time_us"] = np.arange(1000) * 1000
+    >>> recording = Recording("friction", samples, source="a.mcap")
+    >>> half = np.arange(1000) < 500
+    >>> count_usage((recording,), (half,), {"rest or too slow": (~half,)}).rows[0].reasons
+    {'rest or too slow': 0.5}
+    """
+    rows = []
+    offset = 0
+    for index, recording in enumerate(recordings):
+        time = recording.device_time_s
+        tick = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
+        why = np.full(len(stroke), len(reasons))
+        for number, masks in reversed(list(enumerate(reasons.values()))):
+            why[masks[index]] = number
+        names = [*reasons, OTHER]
+        for label in np.unique(stroke):
+            here = stroke == label
+            left = np.bincount(why[here & ~used[index]], minlength=len(names))
+            known = recording.strokes[label] if 0 <= label < len(recording.strokes) else None
+            rows.append(
+                UsageRow(
+                    recording=recording.source,
+                    stroke=int(label) + offset if label >= 0 else -1,
+                    speed=known.speed if known else float("nan"),
+                    recorded_s=tick * np.count_nonzero(here),
+                    used_s=tick * np.count_nonzero(here & used[index]),
+                    reasons={
+                        name: round(tick * int(count), 9)
+                        for name, count in zip(names, left, strict=True)
+                        if count
+                    },
+                )
+            )
+        offset += len(recording.strokes)
+    return Usage(tuple(rows))
+
+
+def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: Masks) -> Usage:
+    """Count what moving windows use of their recordings, each the bin that it stands for.
+
+    ``every`` are all windows of the recordings, ``usable`` the masks (m,) of samples that no sensor
+    spoilt.
+    """
+    width = max(1, round(every.bins.bin_s / every.tick_s))
+    length = len(every.weights)
+    used, gap, edge, spoilt, slow = ([], [], [], [], [])
+    windows = start = 0
+    for recording, good in zip(recordings, usable, strict=True):
+        size = len(recording.samples)
+        masks = {name: np.zeros(size, dtype=bool) for name in ("used", SPOILT, SLOW)}
+        inside, covered = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
+        bad = np.concatenate([[0], np.cumsum(~good)])
+        for low, high in pieces_of(recording):
+            inside[low:high] = True
+            count = int(np.count_nonzero(every.first[windows:] < start + high - low))
+            first = every.first[windows : windows + count] - start + low
+            moving = every.bins.moving[windows : windows + count]
+            touched = bad[first + length] > bad[first]
+            begin = first + (length - width) // 2
+            for name, chosen in (
+                ("used", moving),
+                (SPOILT, ~moving & touched),
+                (SLOW, ~moving & ~touched),
+            ):
+                masks[name][(begin[chosen, None] + np.arange(width)).ravel()] = True
+            covered[(begin[:, None] + np.arange(width)).ravel()] = True
+            windows, start = windows + count, start + high - low
+        used.append(masks["used"])
+        gap.append(~inside)
+        edge.append(inside & ~covered)
+        spoilt.append(masks[SPOILT])
+        slow.append(masks[SLOW])
+    reasons = {GAP: gap, EDGE: edge, SPOILT: spoilt, SLOW: slow}
+    return count_usage(
+        recordings, tuple(used), {name: tuple(masks) for name, masks in reasons.items()}
+    )
+
+
+def _together(rows: list[UsageRow], speed: float) -> UsageRow:
+    reasons: dict[str, float] = {}
+    for row in rows:
+        for name, seconds in row.reasons.items():
+            reasons[name] = reasons.get(name, 0.0) + seconds
+    recorded, used = sum(row.recorded_s for row in rows), sum(row.used_s for row in rows)
+    return UsageRow("", -1, speed, recorded, used, reasons)
