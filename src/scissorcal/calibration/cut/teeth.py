@@ -29,8 +29,8 @@ FASTEST_RATIO = (0.7, 1.4)
 SCAN = (0.25, 2.5)
 SCAN_STEP = 0.04
 COHERENT = 16.0
-"""Power that keeps its phase over what noise leaves. Without a line that is exponential with mean 1,
-so that one stroke speed in ten million passes by chance."""
+"""Power that keeps its phase over what noise leaves. Without a line it is exponential with mean
+1, so that one stroke speed in ten million passes by chance."""
 OVERLAP = 4.0
 """Windows half a cycle apart that count as one: the sum of the Hann window's squared
 autocorrelation."""

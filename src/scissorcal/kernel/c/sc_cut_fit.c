@@ -175,11 +175,11 @@ static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, co
         int32_t low = data->piece_first[i], high = data->piece_first[i + 1];
         int32_t rest = data->piece_rest[i];
         double moved = places[rest] - data->rest_place[rest];
-        double gain = data->piece_closing[i] ? 1.0 + p->load : 1.0 - p->load;
         double offset = data->piece_closing[i] ? p->offset_closing : p->offset_opening;
         const double *row = data->whitener + data->white_first[i];
         for (int32_t k = low; k < high; k++) {
             double slope, torque = elastic_torque(data, p, k, moved, &slope);
+            double gain = 1.0 - p->load * data->direction[k];
             residuals[k] = data->torque[k] - p->delay * data->late[k] - gain * torque - offset;
             zx[k] = -gain * slope;
         }
@@ -388,7 +388,7 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
                            departure(le, p->edge, data->edge_count);
             double peak = p->energy * lever / (blades * slope) *
                           damped(p->damping, data->run_sinking[k]);
-            double torque = (1.0 + p->load) * share * peak;
+            double torque = (1.0 - p->load * data->run_direction[k]) * share * peak;
             double period = 0.0;
             if (p->fracture == SC_CUT_RIPPLED) {
                 double power = between(cycles.power, at, weight);
