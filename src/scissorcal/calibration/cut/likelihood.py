@@ -20,8 +20,6 @@ TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
 """Knots of the response's table, evenly in the logarithm of the indentation from and to so many
 times the reference. A power law is exact, an exponential within 1e-8 of its value."""
-KNOWN_SD_M = 0.0
-"""A fresh sheet's near edge stands at 0 exactly, as the capture asks for."""
 
 
 class Evaluation(NamedTuple):
@@ -104,7 +102,7 @@ class CutLikelihood:
             "moving_blades": float(self.geometry.moving_blades),
             "reference_depth": self.geometry.reference_m,
             "edge_count": len(self.geometry.belief.names),
-            "known_sd": KNOWN_SD_M,
+            "known_sd": max(motion.advance_sd for motion in self.segments.motions),
         }
 
     def _elastic(self) -> dict[str, Any]:
