@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, load_fit, save_fit
-from scissorcal.calibration.signals.filtering import condition
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording
@@ -156,29 +155,6 @@ def test_poor_recordings_are_refused_with_what_is_missing(recording, spoil, says
 def test_no_recording_at_all_is_refused():
     with pytest.raises(InputError, match="no recording"):
         fit_friction((), SIMPLE, effort="draft", rng=np.random.default_rng(5))
-
-
-def test_a_gap_splits_a_recording_and_is_not_bridged(recording):
-    samples = recording.samples[:20000].copy()
-    holed = np.delete(samples, np.s_[9000:9400])
-    bins = condition((dataclasses.replace(recording, samples=holed),), 100.0)
-    assert set(bins.series) == {0, 1}
-    before = bins.time_s[bins.series == 0].max()
-    after = bins.time_s[bins.series == 1].min()
-    assert after - before > 0.4
-
-
-def test_derivatives_of_a_sine_are_right_in_the_band():
-    time = np.arange(20000) / 1000
-    samples = np.zeros(len(time), SAMPLE_DTYPE)
-    samples["device_time_us"] = np.round(time * 1e6)
-    samples["opening"] = 0.3 * np.sin(2 * np.pi * 2 * time)
-    samples["stroke"] = -1
-    bins = condition((Recording("friction", samples, source="sine"),), 100.0)
-    omega = 2 * np.pi * 2
-    assert bins.rate == pytest.approx(0.3 * omega * np.cos(omega * bins.time_s), abs=2e-3 * omega)
-    expected = -0.3 * omega**2 * np.sin(omega * bins.time_s)
-    assert bins.acceleration == pytest.approx(expected, abs=5e-3 * omega**2)
 
 
 def emps() -> Recording:

@@ -61,6 +61,7 @@ def strokes_of(
     found = []
     for recording, label in keys:
         places = np.flatnonzero((series.recording == recording) & (series.stroke == label))
+        places = places[np.argsort(series.time_s[places], kind="stable")]
         stroke = planned.get(int(label)) or _unplanned(fit, int(label), places)
         words = stroke_label(stroke, int(label), fit.position_unit)
         if several:

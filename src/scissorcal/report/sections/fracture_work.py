@@ -9,15 +9,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration import friction_law
+from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.path import path_motion
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.signals.filtering import Bins, condition
 from scissorcal.errors import InputError
 from scissorcal.model import (
     Cutting,
     cut_torque_along,
     edge_height,
-    friction_torque,
     ripple_moments,
 )
 from scissorcal.recording.recording import Recording
@@ -30,7 +29,6 @@ from scissorcal.report.svg import INK, MUTED, PANEL, Svg, finish, look_of, new_a
 
 Places = NDArray[np.int64]
 
-CUTOFF_HZ, ACCELERATION_CUTOFF_HZ = 300.0, 150.0
 SHORTEST_CUT_M = 2e-3
 """Strokes that cut less than this have no work to speak of."""
 ADVANCED_SHARE = 0.05
@@ -46,7 +44,7 @@ class StrokeWork:
 
     ``total`` is the work of the torque less friction and inertia, ``stored`` what of it the
     material still held at the end more than at the beginning, ``fracture`` the rest with its
-    standard deviation ``sd`` (friction's posterior and the noise). ``expected`` is J_c h times
+    standard deviation ``sd`` (friction's level and the drive's noise). ``expected`` is J_c h times
     ``length``, less what a ripple does not take, with 5 and 95 %. ``advanced`` says that the pivot
     moved along the cut meanwhile, whose work nobody measured.
     """
@@ -95,12 +93,10 @@ def fracture_work(
             (),
         )
     try:
-        every = condition(
-            tuple(r for r in chosen if r is not None), CUTOFF_HZ, ACCELERATION_CUTOFF_HZ
-        )
+        path = _path_of(tuple(r for r in chosen if r is not None), friction, cutting)
     except InputError as error:
         return FractureWork(str(error), ())
-    balance = _Balance(fit, friction, cutting, every.where(every.sheet >= 0))
+    balance = _Balance(fit, friction, cutting, path)
     names = {stroke.name.stroke: stroke.name for stroke in strokes}
     rows = [balance.of(label, name) for label, name in sorted(names.items()) if label >= 0]
     kept = tuple(row for row in rows if row is not None)
@@ -155,77 +151,70 @@ def _expected_words(row: StrokeWork) -> str:
     return f"{significant(_milli(row.expected))} ({low} to {high})"
 
 
-class _Balance:
-    """Energies of a cut's strokes from all bins with material in place."""
+@dataclass(frozen=True)
+class _Path:
+    """Samples of all motions with material in place, (n,) each, in order of time.
 
-    def __init__(self, fit: FitResult, friction: FitResult, cutting: Cutting, bins: Bins) -> None:
-        self.bins, self.cutting = bins, cutting
-        self.noise = float(fit.diagnostics.get("residual_rms", 0.0))
-        self.independent = float(fit.diagnostics.get("independent_share", 1.0)) or 1.0
+    ``spent`` (J) is what the blades put into the material from the sample before to this one,
+    ``cut`` (m) by how much the crack grew meanwhile; both are 0 at the first sample of a motion.
+    """
+
+    opening: Array
+    advance: Array
+    stroke: Places
+    tip: Array
+    spent: Array
+    cut: Array
+    tick_s: float
+
+
+class _Balance:
+    """Energies of a cut's strokes, from the work between openings."""
+
+    def __init__(self, fit: FitResult, friction: FitResult, cutting: Cutting, path: _Path) -> None:
+        self.path, self.cutting = path, cutting
+        self.known = KnownFriction.of(friction)
         self.drawn = cutting_of(fit, some_draws(fit, DRAWS)[:, None, :])
-        self.tip = np.concatenate(
-            [
-                cut_torque_along(cutting, bins.opening[run], bins.advance[run], 0.0)[1]
-                for run in _runs(bins)
-            ]
-            or [np.zeros(0)]
-        )
-        contact = self.tip - bins.advance
-        view = edge_height(cutting.edge, contact, bins.opening / cutting.moving_blades)
+        contact = path.tip - path.advance
+        view = edge_height(cutting.edge, contact, path.opening / cutting.moving_blades)
         self.slope = view.slope
         self.stored = cutting.moving_blades * cutting.response.energy_at(
             cutting.upper_face_m - view.height
         )
-        self.friction = some_draws(friction, DRAWS)
-        self.names = [parameter.name for parameter in friction.parameters]
-        self.center = float(friction.structure.get("angle_center", np.nan))
 
     def of(self, label: int, name: StrokeName) -> StrokeWork | None:
         """The balance of one stroke; None where it did not cut."""
-        bins = self.bins
-        at = np.flatnonzero(bins.stroke == label)
+        path = self.path
+        at = np.flatnonzero(path.stroke == label)
         if len(at) < 2 or name.kind == "opening":
             return None
-        moved = np.diff(self.tip[at])
+        moved = path.cut[at[1:]]
         length = float(moved.sum())
         if length < SHORTEST_CUT_M:
             return None
-        work = self._work(at)
+        work = float(path.spent[at[1:]].sum())
         stored = float(self.stored[at[-1]] - self.stored[at[0]])
-        step = bins.rate[at] * bins.bin_s
-        scatter = self.noise * float(np.sqrt(np.sum(step**2) / self.independent))
         expected = self._expected(at, moved) * length
         low, high = np.quantile(expected, [0.05, 0.95])
-        span = float(bins.advance[at].max() - bins.advance[at].min())
+        span = float(path.advance[at].max() - path.advance[at].min())
         return StrokeWork(
             name,
             finite(length),
-            finite(work.mean()),
+            finite(work),
             finite(stored),
-            finite(work.mean() - stored),
-            finite(np.hypot(work.std(), scatter)),
+            finite(work - stored),
+            finite(self._sd(at)),
             finite(expected.mean()),
             finite(low),
             finite(high),
             span > ADVANCED_SHARE * length,
         )
 
-    def _work(self, at: Places) -> Array:
-        """Work into the material over a stroke, by draws of friction (k,), in J.
-
-        At rest the sign of the rate is noise: friction is then taken in the stroke's direction,
-        and the noise of the rate averages out.
-        """
-        bins = self.bins
-        values = {name: self.friction[:, [i]] for i, name in enumerate(self.names)}
-        way = np.sign(np.sum(bins.rate[at])) or -1.0
-        rate = way * np.maximum(np.abs(bins.rate[at]), bins.rate_floor)
-        law = friction_law(values, self.center)
-        empty = friction_torque(law, bins.opening[at], rate)
-        offset = values.get("offset", np.zeros((1, 1)))
-        inertia = values.get("inertia", np.zeros((1, 1)))
-        material = inertia * bins.acceleration[at] + empty + offset - bins.drive[at]
-        return np.asarray(-np.sum(material * bins.rate[at], axis=-1) * bins.bin_s)
+    def _sd(self, at: Places) -> float:
+        """Standard deviation (J): friction's level, what strokes differ by, the drive's noise."""
+        gone = float(np.abs(np.diff(self.path.opening[at])).sum())
+        noise = self.known.noise.variance_of_mean(len(at), self.path.tick_s)
+        return gone * float(np.sqrt(self.known.closing_sd**2 + self.known.stroke_sd**2 + noise))
 
     def _expected(self, at: Places, moved: Array) -> Array:
         """Energy that a metre of cut takes on average, by draws (k,), in J/m."""
@@ -237,8 +226,32 @@ class _Balance:
         return np.ravel(energy * ripple_moments(self.drawn, peak).mean_share)
 
 
-def _runs(bins: Bins) -> list[slice]:
-    ends = [0, *(np.flatnonzero(np.diff(bins.sheet)) + 1).tolist(), len(bins.sheet)]
+def _path_of(recordings: tuple[Recording, ...], friction: FitResult, cutting: Cutting) -> _Path:
+    """Follow the crack and the material's work through all motions, sheet by sheet."""
+    known = KnownFriction.of(friction)
+    cracks: dict[tuple[int, int], float] = {}
+    rows = []
+    motions = path_motion(recordings, known.inertia)
+    for motion in motions:
+        work = known.material(motion).work
+        for run in _runs(motion.sheet):
+            sheet = (motion.recording, int(motion.sheet[run.start]))
+            if sheet[1] < 0:
+                continue
+            opening, advance = motion.opening[run], motion.advance[run]
+            _, tip = cut_torque_along(cutting, opening, advance, cracks.get(sheet, 0.0))
+            cracks[sheet] = float(tip[-1])
+            spent, cut = np.diff(work[run], prepend=work[run][:1]), np.diff(tip, prepend=tip[:1])
+            rows.append((opening, advance, motion.stroke[run], tip, -spent, cut))
+    if not rows:
+        raise InputError("No stroke of these recordings has material in place.")
+    columns_of = (np.concatenate(column) for column in zip(*rows, strict=True))
+    opening, advance, stroke, tip, spent, cut = columns_of
+    return _Path(opening, advance, stroke, tip, spent, cut, motions[0].tick_s)
+
+
+def _runs(sheet: Places) -> list[slice]:
+    ends = [0, *(np.flatnonzero(np.diff(sheet)) + 1).tolist(), len(sheet)]
     return [slice(a, b) for a, b in pairwise(ends) if b > a]
 
 

@@ -1,0 +1,146 @@
+"""The cut's likelihood in C against a twin in NumPy, and what its parameters must do."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from scissorcal.kernel import cut_log_likelihood
+from tests.calibration.cut.made_segments import made_data, made_parameters, responses
+from tests.calibration.cut.twin import Table, beliefs, log_likelihood
+
+FAMILIES = ("power", "exponential", "spline")
+FRACTURES = ("none", "smooth", "rippled")
+
+
+def far_apart(core, twin) -> dict[str, float]:
+    """Largest differences, relative to the largest value of each array."""
+    total, terms, residuals, scaled, places, period = core
+    pairs = {
+        "total": (total, twin.total),
+        "terms": (terms, twin.terms),
+        "residuals": (residuals, twin.residuals),
+        "standardised": (scaled, twin.standardised),
+        "places": (places, twin.places),
+        "log period": (period, twin.log_period),
+    }
+    return {
+        name: float(np.max(np.abs(np.asarray(a) - b)) / max(np.max(np.abs(b)), 1e-12))
+        for name, (a, b) in pairs.items()
+    }
+
+
+@pytest.mark.parametrize("fracture", FRACTURES)
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("edge_count", [0, 2])
+@pytest.mark.parametrize("plain", [True, False])
+def test_the_core_agrees_with_the_twin(family, fracture, edge_count, plain):
+    """To 1e-9, the core's interpolation of cycles over the edge's slope included in the twin."""
+    data = made_data(edge_count, edge_count)
+    given = made_parameters(responses()[family], fracture, edge_count=edge_count, plain=plain)
+    found = far_apart(cut_log_likelihood(data, given), log_likelihood(data, given))
+    assert max(found.values()) < 1e-9, found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_near_edge_that_is_not_quite_known_is_integrated_out_too(seed):
+    data = made_data(seed, known_sd=2e-5)
+    given = made_parameters(responses()["power"], "rippled")
+    core = cut_log_likelihood(data, given)
+    found = far_apart(core, log_likelihood(data, given))
+    assert max(found.values()) < 1e-9, found
+    assert core[4][0] != 0.0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_cycles_may_be_interpolated_over_the_slope(family):
+    """Slopes from 0.15 to 0.45, far more than a stroke has; a spline's exponent has kinks."""
+    data = made_data(3)
+    given = made_parameters(responses()[family], "rippled")
+    exact = log_likelihood(data, given, exact_cycles=True)
+    found = far_apart(cut_log_likelihood(data, given), exact)
+    limit = 1e-4 if family == "spline" else 1e-5
+    assert found["residuals"] < limit, found
+    assert found["log period"] < limit, found
+
+
+def test_places_of_rests_are_where_the_density_is_highest():
+    """By a search that shares no step with the core: one rest moved, the others held."""
+    data, given = made_data(4), made_parameters(responses()["power"], "rippled")
+    places = cut_log_likelihood(data, given)[4]
+
+    def density(rest: int, place: float) -> float:
+        """Least squares of one rest, from a density whose rests are all known at their places."""
+        here = places.copy()
+        here[rest] = place
+        known = replace(
+            data,
+            rest_known=np.ones(3, dtype=np.int32),
+            rest_place=np.zeros(3),
+            depth=data.depth + data.depth_dx * _by_node(data, here - data.rest_place),
+            lever=data.lever + data.lever_dx * _by_node(data, here - data.rest_place),
+        )
+        return cut_log_likelihood(known, given)[0]
+
+    for rest in (1, 2):
+        centre, spread = _belief(data, given, rest)
+        best = minimize_scalar(
+            lambda x, rest=rest, centre=centre, spread=spread: (
+                0.5 * ((x - centre) / spread) ** 2 - density(rest, x)
+            ),
+            bracket=(places[rest] - 2e-5, places[rest] + 2e-5),
+            tol=1e-12,
+        )
+        assert best.x == pytest.approx(places[rest], abs=0.02 * spread)
+
+
+def test_spoilt_numbers_give_no_likelihood():
+    data, given = made_data(5), made_parameters(responses()["power"], "rippled")
+    assert cut_log_likelihood(data, replace(given, energy=math.nan))[0] == -math.inf
+    broken = replace(data, run_torque=np.full_like(data.run_torque, math.nan))
+    assert cut_log_likelihood(broken, given)[0] == -math.inf
+
+
+def test_parameters_pull_where_they_should():
+    """Load adds to closing and takes from opening; a delay lowers by what the data say it does."""
+    data = made_data(6)
+    given = made_parameters(responses()["power"], "smooth", plain=True)
+    base, loaded, late = (
+        cut_log_likelihood(replace(data, rest_known=np.ones(3, dtype=np.int32)), p)[2]
+        for p in (given, replace(given, load=0.1), replace(given, delay=1.0))
+    )
+    closing = np.repeat(data.piece_closing == 1, np.diff(data.piece_first))
+    count = len(closing)
+    held = data.torque - base[:count]
+    change = base - loaded
+    assert change[:count][closing] == pytest.approx(0.1 * held[closing])
+    assert change[:count][~closing] == pytest.approx(-0.1 * held[~closing])
+    assert change[count:] == pytest.approx(0.1 * (data.run_torque - base[count:]))
+    every_late = np.concatenate([data.late, data.run_late])
+    assert base - late == pytest.approx(every_late, abs=1e-13)
+
+
+def test_no_sheet_and_no_rest_are_allowed():
+    """A press has no running crack; a day of fresh sheets that never opened has no rest."""
+    data = made_data(7)
+    empty = {
+        name: getattr(data, name)[:0]
+        for name in vars(data)
+        if name.startswith("run_") or name in ("joined", "start_noise", "end_noise", "line_weight")
+    }
+    pressed = replace(data, **{**empty, "run_first": np.zeros(1, dtype=np.int32)})
+    given = made_parameters(responses()["power"], "rippled")
+    found = far_apart(cut_log_likelihood(pressed, given), log_likelihood(pressed, given))
+    assert max(found.values()) < 1e-9
+
+
+def _by_node(data, by_rest):
+    segments = np.repeat(by_rest[data.piece_rest], np.diff(data.piece_first))
+    return np.repeat(segments, 2)
+
+
+def _belief(data, given, rest):
+    centre, spread = beliefs(data, given, Table(given))
+    return centre[rest], spread[rest]
