@@ -61,7 +61,7 @@ class Guess:
         return float((height * period)[0] / np.sqrt(720.0))
 
     def torque(self, geometry: Geometry, opening: Array, contact: Array) -> tuple[Array, Array]:
-        """Torque (k,) of a standing crack as opening blades show it, and its derivative by place."""
+        """Torque (k,) that opening blades show of a standing crack, and its derivative by place."""
         depth, lever = geometry.depth_and_lever(geometry.edge, opening, contact)
         inside = depth > LEAST_DEPTH_M
         held = np.where(inside, depth, LEAST_DEPTH_M)

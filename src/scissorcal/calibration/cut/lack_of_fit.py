@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 
 PERTURBATION = 1e-3
 LOAD_ERROR = 0.1
-"""Share by which friction that grows with the load may depart from proportion: with 0.1 of the torque
-as friction, a rig of other construction was recovered within 1.3 % of the force."""
+"""Share by which friction that grows with the load may depart from proportion: with 0.1 of the
+torque as friction, a rig of other construction was recovered within 1.3 % of the force."""
 
 
 @dataclass(frozen=True)

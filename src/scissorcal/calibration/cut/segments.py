@@ -63,8 +63,8 @@ class Rest:
 class Piece:
     """Elastic segments between the samples ``ends`` (k + 1,) of a motion, all at one rest.
 
-    ``torque`` (k,) is the mean over the path, ``late`` its fall for one tick of delay, ``direction``
-    the mean direction by which friction acts, from -1 (closing) to 1.
+    ``torque`` (k,) is the mean over the path, ``late`` its fall for one tick of delay,
+    ``direction`` the mean direction by which friction acts, from -1 (closing) to 1.
     """
 
     kind: str
