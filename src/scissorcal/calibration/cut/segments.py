@@ -169,6 +169,8 @@ def cut_into_segments(
 
 def split(path: Array, low: int, high: int, step: float) -> Integers:
     """Samples from ``low`` on, each ``step`` further along the path than the last."""
+    if not step > 0.0:
+        raise ValueError(f"segments need a positive length, not {step}")
     away = np.sign(path[high] - path[low]) * (path[low : high + 1] - path[low])
     farthest = np.maximum.accumulate(away)
     ends, at = [low], 0.0

@@ -239,7 +239,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             if (fabs(move) > largest) largest = fabs(move);
             if (step < SC_CUT_REST_STEPS) places[r] += move;
         }
-        if (step >= SC_CUT_REST_STEPS || largest < 1e-10) break;
+        if (step >= SC_CUT_REST_STEPS || largest < 1e-8) break;
     }
     double sum = 0.0, log_scale = log(p->noise_scale);
     for (int32_t i = 0; i < data->pieces; i++) {
@@ -305,11 +305,13 @@ static double observe(filter *f, const double *row, double residual, double nois
         innovation -= row[i] * f->mean[i];
     }
     for (int32_t i = 0; i < 4; i++) variance += row[i] * gain[i];
+    double inverse = 1.0 / variance, weight = innovation * inverse;
     for (int32_t i = 0; i < 4; i++) {
-        f->mean[i] += gain[i] / variance * innovation;
-        for (int32_t j = 0; j < 4; j++) f->cov[i][j] -= gain[i] * gain[j] / variance;
+        double share = gain[i] * inverse;
+        f->mean[i] += gain[i] * weight;
+        for (int32_t j = i; j < 4; j++) f->cov[j][i] = f->cov[i][j] -= share * gain[j];
     }
-    *standard = innovation / sqrt(variance);
+    *standard = innovation * sqrt(inverse);
     return -0.5 * *standard * *standard - 0.5 * log(variance);
 }
 
