@@ -1,0 +1,140 @@
+"""A recording of cuts in pieces: turns, rests, cracks that wait and cracks that run."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scissorcal.calibration.cut.segments import cut_into_segments, find_runs, split
+from tests.calibration.cut.made_cuts import (
+    GEOMETRY,
+    GUESS,
+    HIGH,
+    LOW,
+    NOISE,
+    Cut,
+    cut,
+    way,
+)
+
+
+def segments_of(made: Cut, cuts: bool = True):
+    return cut_into_segments(made.motions, made.materials, GEOMETRY, GUESS, NOISE, 1e-4, cuts)
+
+
+@pytest.fixture(scope="module")
+def two_strokes() -> Cut:
+    return cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH))
+
+
+def test_a_sheet_is_touched_let_go_touched_again_and_run_through(two_strokes):
+    found = segments_of(two_strokes)
+    assert [piece.kind for piece in found.pieces] == ["fresh", "unloading", "loading", "unloading"]
+    assert [rest.fresh for rest in found.rests] == [True, False, False]
+    assert [piece.rest for piece in found.pieces] == [0, 1, 1, 2]
+    assert [stretch.sheet for stretch in found.stretches] == [0, 0]
+
+
+def test_rests_lie_where_the_crack_stands(two_strokes):
+    found = segments_of(two_strokes)
+    length = len(two_strokes.tip) // 2
+    for rest, tip in zip(found.rests[1:], two_strokes.tip[[length - 1, -1]], strict=True):
+        assert rest.place == pytest.approx(tip, abs=2e-5)
+        assert rest.opening == pytest.approx(LOW, abs=1e-4)
+
+
+def test_mean_torques_are_those_of_the_truth(two_strokes):
+    """Means over the path of the true torque, to 0.5 % of the largest."""
+    found = segments_of(two_strokes)
+    opening, torque = two_strokes.made.opening, two_strokes.torque
+    path = np.diff(opening)
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * path)])
+    for part in (*found.pieces, *found.stretches):
+        expected = np.diff(work[part.ends]) / np.diff(opening[part.ends])
+        assert part.torque == pytest.approx(expected, abs=5e-3 * torque.max()), part
+    for stretch in found.stretches:
+        assert stretch.path == pytest.approx(np.diff(opening[stretch.ends]), rel=1e-3)
+        assert stretch.speed == pytest.approx(0.4, rel=0.2)
+
+
+def test_each_sheet_begins_fresh():
+    found = segments_of(
+        cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), places=(-0.018,) * 2, kinds=(0, 1))
+    )
+    assert [piece.kind for piece in found.pieces] == ["fresh", "unloading"] * 2
+    assert [stretch.sheet for stretch in found.stretches] == [0, 1]
+
+
+def test_a_pause_and_a_tremor_within_a_stroke_part_nothing(two_strokes):
+    """A servo that stops for a while in the middle and moves back by 2 mrad."""
+    found = segments_of(two_strokes)
+    paused = segments_of(cut(way(HIGH, 0.5, 0.502, LOW, HIGH), way(HIGH, LOW, HIGH)))
+    assert [p.kind for p in paused.pieces] == [p.kind for p in found.pieces]
+    assert len(paused.stretches) == len(found.stretches)
+    before, after = found.stretches[0], paused.stretches[0]
+    assert abs(after.path.sum()) == pytest.approx(abs(before.path.sum()), abs=6e-3)
+    assert np.all(after.path < 0.0)
+
+
+def test_an_interrupted_stroke_rests_where_it_turned_and_runs_on_from_beyond():
+    """Back by 60 mrad at 0.5 rad: the crack waits, is loaded again and runs on only beyond."""
+    found = segments_of(cut(way(HIGH, 0.5, 0.56, LOW, HIGH)))
+    assert [rest.fresh for rest in found.rests] == [True, False, False]
+    assert found.rests[1].opening == pytest.approx(0.5, abs=1e-4)
+    first, second = found.stretches
+    opening = found.motions[0].opening
+    assert opening[first.ends[-1]] >= 0.5
+    assert opening[second.ends[0]] < 0.5
+    assert [p.kind for p in found.pieces][:2] == ["fresh", "unloading"]
+
+
+def test_spoilt_samples_part_a_stretch_and_take_no_other_segment(two_strokes):
+    whole = segments_of(two_strokes)
+    usable = np.ones(len(two_strokes.tip), dtype=bool)
+    middle = int(whole.stretches[0].ends[len(whole.stretches[0].ends) // 2])
+    usable[middle : middle + 3] = False
+    spoilt = segments_of(
+        cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable),
+    )
+    assert len(spoilt.stretches) == 3
+    for stretch in spoilt.stretches:
+        assert np.all(usable[stretch.ends[0] : stretch.ends[-1] + 1])
+    lost = sum(len(s.torque) for s in whole.stretches) - sum(
+        len(s.torque) for s in spoilt.stretches
+    )
+    assert 1 <= lost <= 2
+
+
+def test_a_spoilt_piece_is_left_out(two_strokes):
+    whole = segments_of(two_strokes)
+    usable = np.ones(len(two_strokes.tip), dtype=bool)
+    usable[whole.pieces[1].ends[2]] = False
+    spoilt = segments_of(cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable))
+    assert [piece.kind for piece in spoilt.pieces] == ["fresh", "loading", "unloading"]
+
+
+def test_where_nothing_is_cut_the_near_edge_is_the_only_place():
+    pressed = cut(way(HIGH, 0.62, HIGH), places=(-0.02,), cuts=False)
+    found = segments_of(pressed, cuts=False)
+    assert found.stretches == ()
+    assert {piece.rest for piece in found.pieces} == {0}
+    assert found.rests[0].place == 0.0
+    assert "unloading" in [piece.kind for piece in found.pieces]
+
+
+def test_strokes_without_a_sheet_have_no_runs():
+    made = cut(way(HIGH, LOW, HIGH), kinds=(-1,))
+    assert find_runs(made.motions) == []
+
+
+@given(
+    steps=st.lists(st.floats(-1e-4, 8e-4), min_size=30, max_size=200),
+    step=st.floats(1e-3, 1e-2),
+)
+def test_segments_go_forward_by_a_step_at_least(steps, step):
+    path = -np.cumsum(np.array([1e-4, *steps]))
+    ends = split(path, 0, len(path) - 1, step)
+    if path[-1] < path[0]:
+        assert ends[0] == 0
+        assert np.all(np.diff(ends) > 0)
+        assert np.all(-np.diff(path[ends]) >= step * (1 - 1e-9))
