@@ -12,7 +12,7 @@ CHAINS, BURN, SWEEPS = 40, 30, 40
 GRID = np.geomspace(3e-3, 50.0, 40)
 """Standard deviations between groups that are weighed, in units of their scale."""
 COMMON_GRID = np.geomspace(1e-2, 10.0, 25)
-SLAB = 12.5
+SLAB = 10.0
 """Size of a difference that nobody would call small, in units of the scale."""
 FREE = 0.5
 """Prior probability that a parameter's scatter is of that size, whatever the others do."""
