@@ -175,9 +175,7 @@ def predict_far_load(
     return _banded(windows, windows.average(windows.load), predicted, band)
 
 
-def half_width(
-    errors: Array, units: Integers, level: float, freedom: float
-) -> tuple[float, bool]:
+def half_width(errors: Array, units: Integers, level: float, freedom: float) -> tuple[float, bool]:
     """Half-width that holds a random sample of a new unit with probability ``level``.
 
     ``errors`` and ``units`` (n,). Every unit has a mass of 1 / (K + 1), shared evenly by its

@@ -61,7 +61,7 @@ def between_groups(
     kept: list[tuple[Array, Array]] = []
     for sweep in range(BURN + SWEEPS):
         spread = state.tau[:, None, :, None] ** 2 * np.eye(p)
-        inverse = np.linalg.inv(covariances + spread)
+        inverse = np.asarray(np.linalg.inv(covariances + spread), dtype=np.float64)
         _move_population(state, means, inverse, rng)
         for j in range(p):
             _move_sd(state, j, float(scale[j]), means, inverse, rng)
@@ -80,9 +80,7 @@ class _State:
     common: Array
 
 
-def _move_population(
-    state: _State, means: Array, inverse: Array, rng: np.random.Generator
-) -> None:
+def _move_population(state: _State, means: Array, inverse: Array, rng: np.random.Generator) -> None:
     """Draw theta given tau; ``inverse`` (c, r, p, p) are precisions of estimates about theta."""
     covariance = np.linalg.inv(inverse.sum(axis=1))
     centre = np.einsum("cij,crjk,rk->ci", covariance, inverse, means)
