@@ -58,9 +58,9 @@ class BetweenRecordings:
     """What a law's parameters differ by from recording to recording.
 
     ``points`` (r, p) are those of the recordings by themselves, in unconstrained coordinates,
-    ``precisions`` (r, p, p) those of their likelihoods alone, ``prior`` (p, p) that of the prior. ``sd`` (n, p) are draws of the
-    standard deviation between recordings. ``largest_z`` (p,) is the largest difference of two
-    recordings over its standard deviation. ``errors`` are those by the other recordings.
+    ``precisions`` (r, p, p) those of their likelihoods alone, ``prior`` (p, p) that of the prior.
+    ``sd`` (n, p) are draws of the standard deviation between recordings. ``largest_z`` (p,) is the
+    largest difference of two recordings over its standard deviation. ``errors`` are those by the other recordings.
     """
 
     layout: Layout
@@ -173,7 +173,7 @@ def compare_recordings(
     for label in labels:
         here = index == label
         own = _inferred(design, law, here, point, rng)
-        likelihood = _less_prior(np.linalg.inv(own.covariance), prior)
+        likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), dtype=np.float64), prior)
         points.append(own.optimum.point)
         covariances.append(own.covariance)
         precisions.append(likelihood)

@@ -239,7 +239,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             if (fabs(move) > largest) largest = fabs(move);
             if (step < SC_CUT_REST_STEPS) places[r] += move;
         }
-        if (step >= SC_CUT_REST_STEPS || largest < 1e-8) break;
+        if (step >= SC_CUT_REST_STEPS || largest < 1e-10) break;
     }
     double sum = 0.0, log_scale = log(p->noise_scale);
     for (int32_t i = 0; i < data->pieces; i++) {
