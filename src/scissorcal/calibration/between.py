@@ -60,7 +60,8 @@ class BetweenRecordings:
     ``points`` (r, p) are those of the recordings by themselves, in unconstrained coordinates,
     ``precisions`` (r, p, p) those of their likelihoods alone, ``prior`` (p, p) that of the prior.
     ``sd`` (n, p) are draws of the standard deviation between recordings. ``largest_z`` (p,) is the
-    largest difference of two recordings over its standard deviation. ``errors`` are those by the other recordings.
+    largest difference of two recordings over its standard deviation. ``errors`` are those by the
+    other recordings.
     """
 
     layout: Layout
