@@ -64,6 +64,24 @@ def test_inertias_five_sds_apart_widen_the_interval_and_fail_the_halves_of_one_t
     assert status(halves(given, fit)) == {"halves": "pass", "halves-effort": "pass"}
 
 
+def test_a_second_recording_of_emps_with_another_inertia_is_found():
+    """The real one, and itself with 2 kg more: some 6 of its own combined standard deviations."""
+    real = emps()
+    samples = real.samples.copy()
+    smooth = np.convolve(samples["opening"], np.full(41, 1 / 41), "same")
+    samples["motor_torque"] += 2.0 * np.gradient(np.gradient(smooth)) * 1e6 * (smooth != 0)
+    samples["motor_torque"][:60] = real.samples["motor_torque"][:60]
+    samples["motor_torque"][-60:] = real.samples["motor_torque"][-60:]
+    given = (real, dataclasses.replace(real, samples=samples, source="second.mat"))
+    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    single, fit = fitted(given[:1], settings), fitted(given, settings)
+    assert fit.diagnostics["between_recordings_z"]["inertia"] > 5
+    inertia, before = fit.parameter("inertia"), single.parameter("inertia")
+    assert inertia.q95 - inertia.q05 > 5 * (before.q95 - before.q05)
+    assert inertia.q05 < before.mean < inertia.q95
+    assert any("They differ in inertia" in note for note in fit.notes)
+
+
 def test_a_coulomb_level_that_jumps_is_no_calibration():
     stiffer = dataclasses.replace(Truth(), coulomb_pos=0.0195, coulomb_neg=0.024)
     fit = fitted(recordings(Truth(), stiffer))
