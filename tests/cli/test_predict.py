@@ -37,7 +37,7 @@ def test_a_fresh_recording_lies_in_the_band_as_often_as_promised(
     assert said.code == 0
     assert "90% band: +- " in said.out
     assert "A measured sample of a new stroke" in said.out
-    assert "prediction: done" in said.err
+    assert "prediction: reading recordings" in said.err
     assert plot.read_text().startswith("<?xml")
     head, *rows = table.read_text().splitlines()
     assert head.split(",")[:4] == ["time_s", "opening_rad", "opening_rate_rad_per_s", "moving"]

@@ -28,6 +28,8 @@ FEWEST_BINS = 100
 """Moving bins from which a recording is fitted by itself."""
 MISFIT = 1.5
 """Factor on the error of a recording's own fit from which the fit to all is one to none."""
+REPEATED = 0.5
+"""Share of a parameter's information that every stroke must leave to the others for a jackknife."""
 FAR_APART = 3.0
 """Standard deviations from which two recordings are said to differ."""
 
@@ -174,7 +176,7 @@ def compare_recordings(
     for label in labels:
         here = index == label
         own = _inferred(design, law, here, point, rng)
-        likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), dtype=np.float64), prior)
+        likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), float), prior)
         points.append(own.optimum.point)
         covariances.append(own.covariance)
         precisions.append(likelihood)
@@ -204,17 +206,20 @@ def jackknife(
 
     It estimates how far the estimate would move over repeats of such strokes: a lack of fit that
     every stroke repeats cancels and is not in it. Strokes of unequal length count by their bins
-    (Busing, Meijer and van der Leeden 1999, doi:10.1023/A:1008800423698). Empty for fewer than
+    (Busing, Meijer and van der Leeden 1999, doi:10.1023/A:1008800423698). Parameters that owe most
+    of their information to one stroke are left out, as no other repeats it; empty for fewer than
     three strokes.
     """
     rung = design.rung(design.observed)
     law, problem = rung.reduced, rung.problem(design.series)
     if law is None or len(law.moments.labels) < 3:
         return {}
-    full = design.layout.columns(point)
-    left = []
+    full, every = design.layout.columns(point), np.diag(law.information(point))
+    left, repeated = [], np.ones(len(point), dtype=bool)
     for label in law.moments.labels:
-        seen = replace(problem, reduced=law.without(np.array([label])))
+        rest = law.without(np.array([label]))
+        repeated &= np.diag(rest.information(point)) > REPEATED * every
+        seen = replace(problem, reduced=rest)
         left.append(design.layout.columns(ascend(seen, point).point))
     size = (law.counted / law.moments.counts)[:, None]
     pseudo = size * full - (size - 1.0) * np.stack(left)
@@ -222,8 +227,8 @@ def jackknife(
     variance = np.mean((pseudo - centre) ** 2 / (size - 1.0), axis=0)
     return {
         name: float(np.sqrt(value))
-        for name, value in zip(design.layout.names, variance, strict=True)
-        if name not in nuisance
+        for name, value, told in zip(design.layout.names, variance, repeated, strict=True)
+        if told and name not in nuisance
     }
 
 

@@ -195,7 +195,8 @@ def half_width(errors: Array, units: Integers, level: float, freedom: float) -> 
     mass = np.cumsum(1.0 / counts[place][order]) / len(labels)
     conformal = len(labels) / (len(labels) + 1) >= level - 1e-12
     wanted = level * (len(labels) + 1) / len(labels) if conformal else level
-    found = float(size[order][min(int(np.searchsorted(mass, wanted - 1e-9)), len(size) - 1)])
+    place_of = min(int(np.searchsorted(mass, wanted - 1e-9)), len(size) - 1)
+    found = float(size[order][place_of])
     if conformal:
         return found, True
     tail = 0.5 + 0.5 * level

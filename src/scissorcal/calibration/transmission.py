@@ -26,8 +26,8 @@ class LoadPrediction:
     ``predicted`` is by the fit's best point, ``low`` and ``high`` are 5 % and 95 % of its draws,
     parameters' uncertainty alone: a measured load lies outside far more often, and
     :func:`scissorcal.calibration.predict.load_band` says how far. ``measured`` is what the second
-    sensor says. ``moving`` marks where the direction of motion is certain. Efforts in
-    the joint's unit, positive as handle_radius * handle_force is.
+    sensor says. ``moving`` marks where the direction of motion is certain. Efforts in the joint's
+    unit, positive as handle_radius * handle_force is.
     """
 
     time_s: Array

@@ -69,11 +69,8 @@ def import_table(
     """
     path, joint = Path(path), joint or Joint()
     units, scale = units or {}, scale or {}
-    if not motion_only and not {"motor_torque", "handle_force"} & set(columns):
-        raise InputError(
-            f"{path}: no column is named for motor_torque or handle_force. Say which one holds it."
-        )
-    _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel)
+    wanted = () if motion_only else ("motor_torque", "handle_force")
+    _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel, wanted)
     table = read_table(path, columns, delimiter)
     quantities = {
         channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
@@ -108,7 +105,9 @@ def _check_request(
     rate_Hz: float | None,
     handle_radius_m: float,
     min_travel: float | None,
+    wanted: tuple[str, ...],
 ) -> None:
+    """Refuse what cannot be read; of the channels ``wanted`` one must be named, if any."""
     known = ("time", *CHANNELS)
     for name in (*columns, *units, *scale):
         if name not in known:
@@ -121,6 +120,10 @@ def _check_request(
             )
     if "opening" not in columns:
         raise InputError(f"{path}: no column is named for opening. Say which one holds it.")
+    if wanted and not set(wanted) & set(columns):
+        raise InputError(
+            f"{path}: no column is named for {' or '.join(wanted)}. Say which one holds it."
+        )
     if "handle_force" in columns and not handle_radius_m > 0:
         raise InputError(
             f"{path}: handle_force acts at a radius that is not known. Give the handle radius."

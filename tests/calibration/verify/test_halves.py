@@ -56,6 +56,16 @@ def test_sheets_stay_whole():
     assert "whole sheets" in split.words
 
 
+def test_recordings_stay_whole_before_sheets_and_speeds():
+    strokes = np.repeat(np.arange(6), 5)
+    rows = [StrokeFacts(i, "closing", 0.1 * i, i, recording=i // 2) for i in range(6)]
+    split = split_strokes(strokes, rows)
+    assert split is not None
+    assert sorted(set(strokes[split.first])) == [0, 1, 4, 5]
+    assert split.recordings == (2, 1)
+    assert split.words == "whole recordings, 2 of 3 in one half"
+
+
 def test_one_stroke_cannot_be_parted():
     assert split_strokes(np.zeros(10, dtype=int), [StrokeFacts(0, "closing", 0.1)]) is None
 
