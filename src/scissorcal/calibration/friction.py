@@ -8,6 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.between import (
+    NOT_KNOWN,
+    BetweenRecordings,
+    compare_recordings,
+    jackknife,
+)
 from scissorcal.calibration.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.friction_experiment import FrictionExperiment, design
@@ -78,7 +84,8 @@ def fit_friction(
     alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
     the handles, and an offset of a sensor is not. The rung that unseen strokes
     cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
-    for a rotary joint and for a linear one; units follow the recordings' joint.
+    for a rotary joint and for a linear one; units follow the recordings' joint. Two or more
+    recordings are also fitted each by itself, and draws widened by what they differ in.
 
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
     InputError where the recordings hold too little motion, and says what is missing.
@@ -113,8 +120,11 @@ def fit_friction(
         stop=stop,
         progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
     )
+    between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     noise = sample_noise(law, chosen.optimum.point)
     diagnostics = {
+        "jackknife_sd": jackknife(law, chosen.optimum.point, NUISANCE),
+        **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(
             chosen.rung.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
@@ -124,7 +134,7 @@ def fit_friction(
     return assemble(
         what="friction",
         effort=effort,
-        posterior=posterior,
+        posterior=_widened(posterior, between, rng),
         climbed=climbed,
         chosen=chosen,
         structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
@@ -143,6 +153,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
             sensors.verdict,
+            *((between.verdict(),) if between else ()),
         ),
         extra_notes=(
             *sensors.notes,
@@ -150,6 +161,7 @@ def fit_friction(
             *draft_note(effort, every_law, ladder),
             *cogging_notes(cogging, posterior, joint),
             usage.sentence,
+            *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics=diagnostics,
     )
@@ -171,6 +183,15 @@ def friction_experiment(
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
     found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+
+
+def _widened(
+    posterior: Posterior, between: BetweenRecordings | None, rng: np.random.Generator
+) -> Posterior:
+    """The posterior with what recordings differ by in its draws."""
+    if between is None:
+        return posterior
+    return replace(posterior, draws=between.widened(posterior.draws, rng))
 
 
 def _with_tails(

@@ -24,9 +24,10 @@ class LoadPrediction:
     """Load at the passive end, predicted without having been measured: all arrays (n,).
 
     ``predicted`` is by the fit's best point, ``low`` and ``high`` are 5 % and 95 % of its draws,
-    parameters' uncertainty alone. ``measured`` is what the second sensor says. ``moving`` marks
-    where the direction of motion is certain. Efforts in the joint's unit, positive as
-    handle_radius * handle_force is.
+    parameters' uncertainty alone: a measured load lies outside far more often, and
+    :func:`scissorcal.calibration.predict.load_band` says how far. ``measured`` is what the second
+    sensor says. ``moving`` marks where the direction of motion is certain. Efforts in
+    the joint's unit, positive as handle_radius * handle_force is.
     """
 
     time_s: Array
@@ -60,17 +61,9 @@ def predict_load(
     known, and the first way of ``presliding_length`` is a guess. Raises InputError for a law
     without load, or recordings without both ends.
     """
-    if not LawParts.of(str(fit.structure["law"])).load:
-        raise InputError(
-            f'The law "{fit.rung}" knows no load: fit one that does (fit.friction.rung with '
-            '"+load") to recordings of both ends.'
-        )
-    every = weigh(recordings, cutoff_Hz)
-    if every.load is None:
-        sources = ", ".join(recording.source or "the recording" for recording in recordings)
-        raise InputError(f"{sources}: there is no second end (handle_force and handle_radius).")
-    windows = _resting_as_built_up(every)
-    solver = _Solver(fit, windows)
+    windows = two_ended(fit, recordings, cutoff_Hz)
+    assert windows.load is not None
+    solver = LoadSolver(fit, windows)
     names = [parameter.name for parameter in fit.parameters]
     every_other = max(1, len(fit.draws) // BAND_DRAWS)
     band = np.stack(
@@ -83,14 +76,31 @@ def predict_load(
         recording=bins.recording,
         opening=bins.opening,
         moving=bins.moving,
-        measured=every.average(every.load),
+        measured=windows.average(windows.load),
         predicted=solver(dict(zip(names, fit.map_point, strict=True))),
         low=low,
         high=high,
     )
 
 
-class _Solver:
+def two_ended(fit: FitResult, recordings: tuple[Recording, ...], cutoff_Hz: float) -> Windows:
+    """Weigh recordings of both ends, at rest with friction as it was built up.
+
+    Raises InputError as :func:`predict_load` does.
+    """
+    if not LawParts.of(str(fit.structure["law"])).load:
+        raise InputError(
+            f'The law "{fit.rung}" knows no load: fit one that does (fit.friction.rung with '
+            '"+load") to recordings of both ends.'
+        )
+    every = weigh(recordings, cutoff_Hz)
+    if every.load is None:
+        sources = ", ".join(recording.source or "the recording" for recording in recordings)
+        raise InputError(f"{sources}: there is no second end (handle_force and handle_radius).")
+    return _resting_as_built_up(every)
+
+
+class LoadSolver:
     """Solves a law for the load: linear in it on either side of zero."""
 
     def __init__(self, fit: FitResult, windows: Windows) -> None:

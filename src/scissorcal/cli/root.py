@@ -26,6 +26,7 @@ _COMMANDS = {
     "recording": ("scissorcal.cli.recording:recording", "Look into recordings."),
     "fit": ("scissorcal.cli.fit:fit", "Fit what the scene requires; cached."),
     "verify": ("scissorcal.cli.verify:verify", "Check whether a fit's intervals can be trusted."),
+    "predict": ("scissorcal.cli.predict:predict", "Predict efforts of a motion, with a band."),
     "report": ("scissorcal.cli.report:report", "One HTML file to review; compare two; sign."),
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),

@@ -38,6 +38,7 @@ class CutFitData:
     whitener: Array
     torque: Array
     late: Array
+    direction: Array
     depth: Array
     depth_dx: Array
     lever: Array
@@ -54,6 +55,7 @@ class CutFitData:
     joined: Integers
     run_torque: Array
     run_late: Array
+    run_direction: Array
     run_lever: Array
     run_lever_dd: Array
     run_slope: Array

@@ -107,7 +107,7 @@ def build_package(
     if record.friction and model.friction:
         said = (
             *record.friction.warnings,
-            *left_out(model.friction, bound.scene_torque_Nm, friction),
+            *left_out(model.friction, bound.scene_torque_Nm),
         )
         told = record.friction.model_copy(update={"warnings": said})
         record = record.model_copy(update={"friction": told})

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction import angle_factor
@@ -65,15 +64,13 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
     return laws
 
 
-def left_out(
-    law: FrictionLaw, scene_torque: float, fit: FitResult | None = None
-) -> tuple[str, ...]:
+def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     """Sentences on what of a law the tables leave out, and what that costs in torque.
 
-    ``scene_torque`` (N m) is the largest that the scene renders; ``fit`` is where the law is from,
-    for what belongs to the rig alone.
+    ``scene_torque`` (N m) is the largest that the scene renders. Cogging is the rig's own and is
+    left out without a word: the friction fit's notes tell of it.
     """
-    said = list(_rigs_own(fit)) if fit is not None else []
+    said = []
     share = float(np.asarray(law.load_share))
     if share:
         said.append(
@@ -91,20 +88,6 @@ def left_out(
             f"right after one, {2 * sudden * dry / math.e:.2g} N m {length:.2g} rad later."
         )
     return tuple(said)
-
-
-def _rigs_own(fit: FitResult) -> tuple[str, ...]:
-    """Cogging is the rig's motor's: what is rendered must not have it."""
-    periods = float(fit.structure.get("cogging_periods_per_turn", 0.0))
-    if not periods:
-        return ()
-    means = {one.name: one.mean for one in fit.nuisance}
-    size = float(np.hypot(means["cogging_cos"], means["cogging_sin"]))
-    return (
-        f"fit.friction, cogging: the rig's motor adds {size:.2g} N m that repeat {periods:.1f} "
-        "times a turn of the opening. The fit takes it out of friction, and the package does not "
-        "render it: it is the rig's own.",
-    )
 
 
 def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:

@@ -38,14 +38,16 @@ def import_table(
     min_travel: float | None = None,
     allow_gaps: bool = False,
     delimiter: str | None = None,
+    motion_only: bool = False,
 ) -> Recording:
     """Read a table as a recording, in SI, with strokes found from the motion.
 
     ``columns`` says which column holds which channel: ``time``, ``opening``, ``advance``,
     ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
     number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
-    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``); and ``time`` or
-    ``rate_Hz``. What is not named is 0 throughout, which a note says.
+    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``), unless
+    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. What is not
+    named is 0 throughout, which a note says.
 
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
@@ -67,6 +69,10 @@ def import_table(
     """
     path, joint = Path(path), joint or Joint()
     units, scale = units or {}, scale or {}
+    if not motion_only and not {"motor_torque", "handle_force"} & set(columns):
+        raise InputError(
+            f"{path}: no column is named for motor_torque or handle_force. Say which one holds it."
+        )
     _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel)
     table = read_table(path, columns, delimiter)
     quantities = {
@@ -115,10 +121,6 @@ def _check_request(
             )
     if "opening" not in columns:
         raise InputError(f"{path}: no column is named for opening. Say which one holds it.")
-    if "motor_torque" not in columns and "handle_force" not in columns:
-        raise InputError(
-            f"{path}: no column is named for motor_torque or handle_force. Say which one holds it."
-        )
     if "handle_force" in columns and not handle_radius_m > 0:
         raise InputError(
             f"{path}: handle_force acts at a radius that is not known. Give the handle radius."

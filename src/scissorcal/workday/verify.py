@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
-ALGORITHM = 2
+ALGORITHM = 3
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")

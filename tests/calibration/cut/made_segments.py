@@ -50,6 +50,9 @@ def _pieces(rng, q):
     depth = np.concatenate(depth)
     n = len(depth)
     lever = rng.uniform(0.02, 0.05, n)
+    side = np.concatenate(
+        [np.full(count, -1.0 if closing else 1.0) for _, closing, count in PIECES]
+    )
     held = 0.66 * np.maximum(depth / REFERENCE_M, 0.0) ** 1.6 * lever
     return {
         "piece_first": _starts(lengths),
@@ -59,6 +62,7 @@ def _pieces(rng, q):
         "whitener": np.concatenate(whiteners),
         "torque": held.reshape(-1, 2).mean(axis=1) + 3e-3 * rng.standard_normal(n // 2),
         "late": 1e-3 * rng.standard_normal(n // 2),
+        "direction": side * rng.uniform(0.4, 1.0, n // 2),
         "depth": depth,
         "depth_dx": -rng.uniform(0.2, 0.4, n),
         "lever": lever,
@@ -90,6 +94,7 @@ def _runs(rng, q):
         "joined": np.concatenate([np.arange(c) > 0 for c in counts]).astype(np.int32),
         "run_torque": 0.06 + 0.01 * rng.standard_normal(n),
         "run_late": 1e-3 * rng.standard_normal(n),
+        "run_direction": -rng.uniform(0.8, 1.0, n),
         "run_lever": rng.uniform(0.02, 0.05, n),
         "run_lever_dd": rng.uniform(-3.0, 3.0, n),
         "run_slope": rng.uniform(0.15, 0.45, n),

@@ -113,13 +113,12 @@ def test_parameters_pull_where_they_should():
         cut_log_likelihood(replace(data, rest_known=np.ones(3, dtype=np.int32)), p)[2]
         for p in (given, replace(given, load=0.1), replace(given, delay=1.0))
     )
-    closing = np.repeat(data.piece_closing == 1, np.diff(data.piece_first))
-    count = len(closing)
+    count = len(data.torque)
     held = data.torque - base[:count]
     change = base - loaded
-    assert change[:count][closing] == pytest.approx(0.1 * held[closing])
-    assert change[:count][~closing] == pytest.approx(-0.1 * held[~closing])
-    assert change[count:] == pytest.approx(0.1 * (data.run_torque - base[count:]))
+    assert change[:count] == pytest.approx(-0.1 * data.direction * held)
+    mean = data.run_torque - base[count:]
+    assert change[count:] == pytest.approx(-0.1 * data.run_direction * mean)
     every_late = np.concatenate([data.late, data.run_late])
     assert base - late == pytest.approx(every_late, abs=1e-13)
 

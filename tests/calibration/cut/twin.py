@@ -160,7 +160,7 @@ def _elastic(data: CutFitData, given: CutFitParameters, table: Table):
     count = len(data.torque)
     piece = np.repeat(np.arange(len(data.piece_rest)), np.diff(data.piece_first))
     rest, closing = data.piece_rest[piece], data.piece_closing[piece] == 1
-    gain = np.where(closing, 1.0 + given.load, 1.0 - given.load)
+    gain = 1.0 - given.load * data.direction
     offset = np.where(closing, given.offset_closing, given.offset_opening)
     white = np.zeros((count, count))
     for i in range(len(data.piece_rest)):
@@ -226,7 +226,7 @@ def _running(data: CutFitData, given: CutFitParameters, table: Table, exact: boo
         + data.run_lever_de.reshape(len(data.run_lever), q) @ given.edge
     )
     peak = given.energy * lever / (m * slope) * _damped(given.damping, data.run_sinking)
-    torque = (1.0 + given.load) * share * peak
+    torque = (1.0 - given.load * data.run_direction) * share * peak
     residuals = data.run_torque - given.delay * data.run_late - torque - given.offset_closing
     log_period = 0.0
     if given.fracture == "rippled":

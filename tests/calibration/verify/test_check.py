@@ -57,6 +57,9 @@ def fit_of(experiment: Linear) -> FitResult:
         "inputs_hash": "0" * 64,
         "effort_unit": "N m",
         "diagnostics": {"effective_samples": posterior.effective},
+        "series": SimpleNamespace(
+            stroke=experiment.strokes, recording=np.zeros(len(experiment.strokes), dtype=int)
+        ),
         "parameter": lambda name: next(p for p in fitted if p.name == name),
     }
     return cast(FitResult, SimpleNamespace(**facts))

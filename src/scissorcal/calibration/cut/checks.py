@@ -64,10 +64,11 @@ def line_notes(
         for name, sd in zip(names, budget.sd, strict=True)
         if name in ("response_force", "response_exponent", "fracture_energy")
     ]
-    if budget.share > 0 and shown:
+    allowed = max(budget.shares.values(), default=0.0)
+    if allowed > 0 and shown:
         notes.append(
-            f"A lack of fit of {budget.share:.2%} in each kind of segment was allowed for: it adds "
-            f"{', '.join(shown)} to the standard deviations."
+            f"A lack of fit of up to {allowed:.2%} in each kind of segment was allowed for: by "
+            f"itself it is worth a standard deviation of {', '.join(shown)}."
         )
     return tuple(notes)
 

@@ -31,11 +31,13 @@ class Guess:
     """Response and mean fracture energy (J/m), with the peak's ratio to that mean.
 
     ``mean_energy`` is what running costs on average; a crack starts at ``peak_ratio`` times that.
+    ``load`` is the share of the torque that friction takes off while the blades open.
     """
 
     response: Response
     mean_energy: float
     peak_ratio: float = 1.14
+    load: float = 0.0
 
     def critical_depth(self, slope: Array, moving_blades: int) -> Array:
         """Indentation (m) at which a crack starts where the edge has a slope."""
@@ -59,7 +61,7 @@ class Guess:
         return float((height * period)[0] / np.sqrt(720.0))
 
     def torque(self, geometry: Geometry, opening: Array, contact: Array) -> tuple[Array, Array]:
-        """Torque (k,) of a standing crack, and its derivative by the crack's place."""
+        """Torque (k,) that opening blades show of a standing crack, and its derivative by place."""
         depth, lever = geometry.depth_and_lever(geometry.edge, opening, contact)
         inside = depth > LEAST_DEPTH_M
         held = np.where(inside, depth, LEAST_DEPTH_M)
@@ -67,7 +69,8 @@ class Guess:
         slope = geometry.slope(opening, contact)
         stiffness = np.where(inside, self.response.stiffness_at(held), 0.0)
         by_place = -stiffness * slope * lever + force * (1.0 + slope**2)
-        return force * lever, by_place
+        kept = 1.0 - self.load
+        return kept * force * lever, kept * by_place
 
     def place_at_torque(
         self, geometry: Geometry, opening: float, advance: float, torque: float
@@ -77,7 +80,9 @@ class Guess:
         contact = geometry.place(theta, 0.0)
         for _ in range(4):
             _, lever = geometry.depth_and_lever(geometry.edge, theta, contact)
-            depth = self.response.indentation_at(torque / max(float(lever), 1e-4))
+            depth = self.response.indentation_at(
+                torque / max(float(lever), 1e-4) / (1.0 - self.load)
+            )
             contact = geometry.place(theta, depth)
         return float(contact) + advance
 

@@ -12,6 +12,9 @@ from scissorcal.inference.curvature import gradient, natural_step
 Array = NDArray[np.float64]
 
 PERTURBATION = 1e-3
+LOAD_ERROR = 0.1
+"""Share by which friction that grows with the load may depart from proportion: with 0.1 of the
+torque as friction, a rig of other construction was recovered within 1.3 % of the force."""
 
 
 @dataclass(frozen=True)
@@ -19,23 +22,23 @@ class Budget:
     """How far each kind of segment would move the parameters if the law were wrong in it.
 
     ``shifts`` has by kind the change (p,) of the unconstrained parameters for a relative error of
-    one; ``share`` is the relative error that is allowed for in each kind.
+    one; ``shares`` the relative error that is allowed for in each kind.
     """
 
-    share: float
+    shares: Mapping[str, float]
     shifts: Mapping[str, Array]
 
     @property
     def sd(self) -> Array:
         """Standard deviation (p,) that the budget adds, in unconstrained parameters."""
-        rows = list(self.shifts.values())
-        return np.asarray(self.share * np.sqrt(np.sum(np.square(rows), axis=0)))
+        rows = [self.shares[kind] * shift for kind, shift in self.shifts.items()]
+        return np.asarray(np.sqrt(np.sum(np.square(rows), axis=0)))
 
     def widen(self, draws: Array, rng: np.random.Generator) -> Array:
         """Draws (n, p) with an error of every kind's own added to each."""
         wider = draws.copy()
-        for shift in self.shifts.values():
-            wider += self.share * rng.standard_normal((len(draws), 1)) * shift
+        for kind, shift in self.shifts.items():
+            wider += self.shares[kind] * rng.standard_normal((len(draws), 1)) * shift
         return wider
 
 
@@ -60,7 +63,10 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
 
         score = gradient(gained, point, step)[0] / PERTURBATION
         shifts[kind] = covariance @ score
-    return Budget(share, shifts)
+    load = float(design.layout.natural(point).get("load_share", 0.0))
+    elastic = float(np.hypot(share, LOAD_ERROR * load))
+    shares = {kind: elastic if kind.endswith("loading") else share for kind in shifts}
+    return Budget(shares, shifts)
 
 
 def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:

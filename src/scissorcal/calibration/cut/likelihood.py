@@ -20,8 +20,6 @@ TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
 """Knots of the response's table, evenly in the logarithm of the indentation from and to so many
 times the reference. A power law is exact, an exponential within 1e-8 of its value."""
-KNOWN_SD_M = 0.0
-"""A fresh sheet's near edge stands at 0 exactly, as the capture asks for."""
 
 
 class Evaluation(NamedTuple):
@@ -104,7 +102,7 @@ class CutLikelihood:
             "moving_blades": float(self.geometry.moving_blades),
             "reference_depth": self.geometry.reference_m,
             "edge_count": len(self.geometry.belief.names),
-            "known_sd": KNOWN_SD_M,
+            "known_sd": max(motion.advance_sd for motion in self.segments.motions),
         }
 
     def _elastic(self) -> dict[str, Any]:
@@ -138,6 +136,7 @@ class CutLikelihood:
             "whitener": _joined(whiteners),
             "torque": measured,
             "late": _joined([p.late for p in pieces]),
+            "direction": _joined([p.direction for p in pieces]),
             "depth": nodes.depth,
             "depth_dx": nodes.depth_dx,
             "lever": nodes.lever,
@@ -200,6 +199,7 @@ class CutLikelihood:
             "joined": np.concatenate(joined).astype(np.int32) if runs else np.zeros(0, np.int32),
             "run_torque": self._measured(runs, self.elastic_count),
             "run_late": _joined([run.late for run in runs]),
+            "run_direction": _joined([run.direction for run in runs]),
             "run_lever": view.lever,
             "run_lever_dd": view.lever_dd,
             "run_slope": view.slope,

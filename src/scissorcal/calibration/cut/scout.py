@@ -76,20 +76,21 @@ def scout(
         median_exponent=exponent.median,
         log_sd_exponent=exponent.log_sd,
     )
-    law = CutLaw("power", fracture)
     values = _values_of(guess, fracture)
     evaluations = 0
-    for _ in range(ROUNDS):
-        segments = cut_into_segments(
-            motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
-        )
-        if not segments.pieces:
-            raise ValueError("no unloading was seen")
-        design = make_experiment(segments, geometry, recipe, law, known, values)
-        optimum = find_optimum(design.rung(design.observed).problem(design.series))
-        evaluations += optimum.evaluations
-        values = _natural(design, optimum.point)
-        guess = _guess_of(design, values)
+    for loaded in (False, recipe.fit.cut.load_share != "none"):
+        law = CutLaw("power", fracture, loaded=loaded)
+        for _ in range(ROUNDS if loaded else 1):
+            segments = cut_into_segments(
+                motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
+            )
+            if not segments.pieces:
+                raise ValueError("no unloading was seen")
+            design = make_experiment(segments, geometry, recipe, law, known, values)
+            optimum = find_optimum(design.rung(design.observed).problem(design.series))
+            evaluations += optimum.evaluations
+            values = _natural(design, optimum.point)
+            guess = _guess_of(design, values)
     found = Scouted(segments, materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
         return found
@@ -254,7 +255,7 @@ def _guess_of(design: CutExperiment, values: Mapping[str, float]) -> Guess:
         return Guess(response, np.inf)
     kappa = values.get("kappa", 1.0)
     mean = values["fracture_energy"] * (1.0 + kappa) / 2.0
-    return Guess(response, mean, 2.0 / (1.0 + kappa))
+    return Guess(response, mean, 2.0 / (1.0 + kappa), values.get("load_share", 0.0))
 
 
 def _natural(design: CutExperiment, point: Array) -> dict[str, float]:

@@ -61,7 +61,11 @@ class Rest:
 
 @dataclass(frozen=True)
 class Piece:
-    """Elastic segments between the samples ``ends`` (k + 1,) of a motion, all at one rest."""
+    """Elastic segments between the samples ``ends`` (k + 1,) of a motion, all at one rest.
+
+    ``torque`` (k,) is the mean over the path, ``late`` its fall for one tick of delay,
+    ``direction`` the mean direction by which friction acts, from -1 (closing) to 1.
+    """
 
     kind: str
     rest: int
@@ -69,6 +73,7 @@ class Piece:
     ends: Integers
     torque: Array
     late: Array
+    direction: Array
     covariance: Array
 
 
@@ -86,6 +91,7 @@ class Stretch:
     ends: Integers
     torque: Array
     late: Array
+    direction: Array
     path: Array
     noise: Array
     speed: float
@@ -163,6 +169,8 @@ def cut_into_segments(
 
 def split(path: Array, low: int, high: int, step: float) -> Integers:
     """Samples from ``low`` on, each ``step`` further along the path than the last."""
+    if not step > 0.0:
+        raise ValueError(f"segments need a positive length, not {step}")
     away = np.sign(path[high] - path[low]) * (path[low : high + 1] - path[low])
     farthest = np.maximum.accumulate(away)
     ends, at = [low], 0.0
@@ -294,7 +302,8 @@ class _Builder:
         torque, late = mean_torque(motion, self.materials[index].work, ends)
         covariance = torque_covariance(motion, ends, self.noise, self.offset_sd)
         rest = len(self.rests) - 1
-        self.pieces.append(Piece(kind, rest, index, ends, torque, late, covariance))
+        direction = mean_direction(motion, self.materials[index], ends)
+        self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
 
     def _stretch(self, run: Run, low: int) -> None:
         """Running segments; those with a spoilt sample part a stretch in two."""
@@ -314,6 +323,7 @@ class _Builder:
                     ends=ends,
                     torque=work / path,
                     late=late * turned / path,
+                    direction=mean_direction(motion, material, ends, by_torque=True),
                     path=path,
                     noise=np.array(
                         [self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks]
@@ -342,6 +352,21 @@ def free_path(
     extra = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * moved)])
     at = ends - low
     return np.diff(path[at]), np.diff(material.work[ends]) - np.diff(extra[at])
+
+
+def mean_direction(
+    motion: PathMotion, material: Material, ends: Integers, by_torque: bool = False
+) -> Array:
+    """Mean direction (k,) of friction between samples ``ends`` (k + 1,), weighed by the path.
+
+    With ``by_torque`` also by the material's torque: blades that swing back do so while it is high.
+    """
+    step = np.diff(motion.opening)
+    if by_torque:
+        step = step * 0.5 * (material.torque[1:] + material.torque[:-1])
+    total = np.concatenate([[0.0], np.cumsum(step)])
+    signed = np.concatenate([[0.0], np.cumsum(step * material.direction)])
+    return np.clip(np.diff(signed[ends]) / np.diff(total[ends]), -1.0, 1.0)
 
 
 def sledge_share(motion: PathMotion, geometry: Geometry, low: int, high: int) -> Array:

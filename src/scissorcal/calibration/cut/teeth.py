@@ -29,8 +29,8 @@ FASTEST_RATIO = (0.7, 1.4)
 SCAN = (0.25, 2.5)
 SCAN_STEP = 0.04
 COHERENT = 16.0
-"""Power that keeps its phase over what noise leaves. Without a line that is exponential with mean 1,
-so that one stroke speed in ten million passes by chance."""
+"""Power that keeps its phase over what noise leaves. Without a line it is exponential with mean
+1, so that one stroke speed in ten million passes by chance."""
 OVERLAP = 4.0
 """Windows half a cycle apart that count as one: the sum of the Hann window's squared
 autocorrelation."""
@@ -256,10 +256,13 @@ def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
 
 
 def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """The frequency or one that gains a whole cycle more or less between two windows."""
+    """The frequency or one that gains a whole cycle more or less between two windows.
+
+    Power tells them apart where jitter limits the coherence, the gain where noise limits the power.
+    """
     apart = 1.0 / WINDOW_CYCLES
     tried = [_refined(signals, frequency * (1.0 + k * apart)) for k in (-1, 0, 1)]
-    return max(tried, key=lambda f: _coherent(signals, f))
+    return max(tried, key=lambda f: max(_coherent(signals, f), 0.0) * _shown(signals, f))
 
 
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:

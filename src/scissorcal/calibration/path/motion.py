@@ -19,6 +19,8 @@ CLEAR = 3.0
 of the encoder's steps so many times."""
 FINEST_STEP = 1e-7
 """Encoder step in rad (m) that is assumed where positions show none."""
+LEAST_PLACE_SD_M = 1e-6
+"""Error of a place along the cut where the sledge's encoder shows no coarser steps."""
 HELD = 0.5
 """Share of a tick by which a torque that follows its command is measured late, less the delay."""
 
@@ -32,7 +34,8 @@ class PathMotion:
     ``drive_step`` its change over that tick, by which a delay of one tick would lower it.
     ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
     unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor
-    spoilt a sample. ``rate_sd`` is the error of the rate, ``resolution`` the encoder's step.
+    spoilt a sample. ``rate_sd`` is the error of the rate, ``resolution`` the encoder's step,
+    ``advance_sd`` (m) the error of a place along the cut.
     """
 
     recording: int
@@ -51,6 +54,7 @@ class PathMotion:
     inertia: float
     rate_sd: float
     resolution: float
+    advance_sd: float
 
 
 def path_motion(
@@ -116,7 +120,13 @@ def _piece(
         inertia=inertia,
         rate_sd=_rate_sd(tick_s, inertia, resolution, walk),
         resolution=resolution,
+        advance_sd=_place_sd(np.asarray(samples["advance"], dtype=np.float64)),
     )
+
+
+def _place_sd(advance: Array) -> float:
+    step = resolution_of(advance) if np.ptp(advance) > 0 else float("nan")
+    return max(LEAST_PLACE_SD_M, step / np.sqrt(12.0)) if np.isfinite(step) else LEAST_PLACE_SD_M
 
 
 def turning_points(opening: Array, least: float) -> list[int]:

@@ -34,11 +34,13 @@ class Material:
     """What the material does to the opening at each sample (n,).
 
     ``work`` (J) is what it did so far, ``torque`` (N m) what it does now: the former is summed and
-    exact, the latter carries the noise of an acceleration.
+    exact, the latter carries the noise of an acceleration. ``direction`` (n - 1,) is how dry
+    friction acts between samples, from -1 (closing) to 1, less where it has not built up.
     """
 
     work: Array
     torque: Array
+    direction: Array
 
 
 def material_of(
@@ -57,10 +59,11 @@ def material_of(
     path = motion.opening
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
-    state = None
+    state, direction = None, np.sign(step)
     if np.any(friction.presliding_share):
         built = presliding_state(path, float(friction.presliding_length))
         state = 0.5 * (built[1:] + built[:-1])
+        direction = direction + float(friction.presliding_share) * (state - direction)
     law = friction_torque(friction, middle, step / motion.tick_s, 0.0, state)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
@@ -69,7 +72,7 @@ def material_of(
         work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
-    return Material(np.asarray(work), np.asarray(torque))
+    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
 
 
 def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:

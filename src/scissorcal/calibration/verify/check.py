@@ -58,6 +58,7 @@ def make_study(
         start=start,
         draws=FEWEST_DRAWS if _even(fit) else max(FEWEST_DRAWS, len(fit.draws)),
         split=split_strokes(experiment.strokes, _facts(fit, sheets or {})),
+        between=_between(experiment, fit),
     )
 
 
@@ -140,10 +141,26 @@ def _even(fit: FitResult) -> bool:
 
 
 def _facts(fit: FitResult, sheets: Mapping[int, int]) -> tuple[StrokeFacts, ...]:
+    labels, at = np.unique(fit.series.stroke, return_index=True)
+    recordings = dict(zip(labels.tolist(), fit.series.recording[at].tolist(), strict=True))
     return tuple(
-        StrokeFacts(error.stroke, error.kind, error.speed, sheets.get(error.stroke))
+        StrokeFacts(
+            error.stroke,
+            error.kind,
+            error.speed,
+            sheets.get(error.stroke),
+            recordings.get(error.stroke, 0),
+        )
         for error in fit.held_out
     )
+
+
+def _between(experiment: Experiment, fit: FitResult) -> Array | None:
+    """Variance between recordings (p,) that the fit's own draws contain; None where they do not."""
+    found = fit.diagnostics.get("between_recordings_sd")
+    if found is None:
+        return None
+    return np.array([float(found.get(name, 0.0)) ** 2 for name in experiment.layout.names])
 
 
 def _broken(records: Sequence[Record], what: str) -> list[str]:

@@ -11,6 +11,9 @@ Integers = NDArray[np.int64]
 
 PIECES = 4
 
+BY_RECORDING = "whole recordings"
+"""How the words of a split begin that parts recordings."""
+
 SILENT = 0.02
 """Share of the variance of two unrelated halves below which they only repeat their prior."""
 
@@ -19,21 +22,29 @@ MIXTURE_DRAWS = 50_000
 
 @dataclass(frozen=True)
 class StrokeFacts:
-    """What a split needs to know of a stroke: its label, kind, speed and piece of material."""
+    """What a split needs to know of a stroke.
+
+    Its label, kind, speed, piece of material, and the index of its recording.
+    """
 
     label: int
     kind: str
     speed: float
     sheet: int | None = None
+    recording: int = 0
 
 
 @dataclass(frozen=True)
 class Split:
-    """Two disjoint halves of the bins (n,), and how they were parted."""
+    """Two disjoint halves of the bins (n,), and how they were parted.
+
+    ``recordings`` are how many each half has where whole recordings were parted, else None.
+    """
 
     first: NDArray[np.bool_]
     second: NDArray[np.bool_]
     words: str
+    recordings: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -68,16 +79,24 @@ class Difference:
 def split_strokes(strokes: Integers, facts: Sequence[StrokeFacts]) -> Split | None:
     """Part bins (n,), labelled by ``strokes`` (n,), into two halves of whole strokes.
 
-    Where strokes belong to two sheets or more, whole sheets alternate. Otherwise strokes of a kind
-    are ranked by speed and alternate, opening ones against closing ones, so that both halves see
-    both directions and all speeds. A stroke that is the only one of its kind (an excitation) is cut
+    Where there are two recordings or more, whole recordings alternate: halves that share recordings
+    cannot show a change between them. Else, where strokes belong to two sheets or more, whole
+    sheets alternate. Otherwise strokes of a kind are ranked by speed and alternate, opening ones
+    against closing ones, so that both halves see both directions and all speeds. A stroke that is the only one of its kind (an excitation) is cut
     into four pieces, the outer two for one half. None where there is only one stroke.
     """
     present = [fact for fact in facts if np.any(strokes == fact.label)]
     if len(present) < 2:
         return None
     sheets = sorted({fact.sheet for fact in present if fact.sheet is not None})
+    recordings = sorted({fact.recording for fact in present})
     first = np.zeros(len(strokes), dtype=bool)
+    if len(recordings) > 1:
+        for fact in present:
+            first[strokes == fact.label] = fact.recording in recordings[::2]
+        counts = len(recordings[::2]), len(recordings[1::2])
+        words = f"{BY_RECORDING}, {counts[0]} of {len(recordings)} in one half"
+        return Split(first, ~first, words, counts)
     if len(sheets) > 1:
         taken = {sheet for index, sheet in enumerate(sheets) if index % 2 == 0}
         for fact in present:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from scissorcal.calibration.verify.halves import BY_RECORDING
 from scissorcal.calibration.verify.result import (
     Calibration,
     Check,
@@ -110,6 +111,7 @@ def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
     largest = max((row for row in found.rows if row.z is not None), key=lambda r: abs(r.z or 0.0))
     size = f"{largest.name} differs most, by {abs(largest.z or 0.0):.1f} standard deviations"
     p, effort_p = found.p_value, found.effort_p_value
+    by_recording = found.split.startswith(BY_RECORDING)
     if p >= HALVES_SHARE:
         why = f"Two halves of the data agree within what each claims (p = {p:.2g}; {size})."
         if p > 1.0 - HALVES_SHARE:
@@ -117,11 +119,14 @@ def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
                 " They agree better than chance would have it: what the law lacks repeats in every "
                 "stroke, and the intervals allow for it as if it were noise."
             )
+        if not by_recording:
+            why += " How much recordings differ is not known, as there is only one."
         one = Verdict(scope, checks[0], "pass", p, HALVES_SHARE, why)
     else:
+        units = "recordings" if by_recording else "strokes"
         why = (
             f"Two halves of the data differ by more than each claims (p = {p:.2g}; {size}): the "
-            "law or the rig changes between strokes. Look at the residuals by stroke, and repeat "
+            f"law or the rig changes between {units}. Look at the residuals by stroke, and repeat "
             "some."
         )
         one = Verdict(scope, checks[0], "fail", p, HALVES_SHARE, why)

@@ -49,7 +49,7 @@ class Study:
 
     ``generating`` and ``noise`` make simulated data; ``start`` (p,) is where the fit ended,
     ``draws`` how many are taken of each posterior; ``split`` parts the data (None where it cannot
-    be parted).
+    be parted). ``between`` (p,) is the variance between recordings that the fit claims, if any.
     """
 
     experiment: Experiment
@@ -60,6 +60,7 @@ class Study:
     start: Array
     draws: int
     split: Split | None
+    between: Array | None = None
 
     @property
     def wanted(self) -> list[int]:

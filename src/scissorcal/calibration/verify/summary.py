@@ -81,7 +81,10 @@ def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Gen
     experiment, layout = study.experiment, study.experiment.layout
     assert study.split is not None
     first, second = (
-        HalfFit(np.array(r["mean"]), np.array(r["covariance"]), r["independent"]) for r in records
+        HalfFit(
+            np.array(r["mean"]), np.array(r["covariance"]) + _scatter(study, half), r["independent"]
+        )
+        for half, r in enumerate(records)
     )
     prior = experiment.rung(experiment.observed).prior_precision
     found = compare(first, second, prior)
@@ -105,6 +108,15 @@ def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Gen
         effort_expected=expected / size,
         effort_p_value=_finite(probability) if found.dimensions else None,
     )
+
+
+def _scatter(study: Study, half: int) -> Array:
+    """Covariance (p, p) of a half's mean over recordings, where the fit claims that they differ."""
+    assert study.split is not None
+    p = len(study.experiment.layout.names)
+    if study.between is None or study.split.recordings is None:
+        return np.zeros((p, p))
+    return np.diag(study.between) / study.split.recordings[half]
 
 
 def summarise_sensitivity(study: Study, record: Record) -> Sensitivity:

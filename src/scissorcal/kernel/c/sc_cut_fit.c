@@ -175,11 +175,11 @@ static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, co
         int32_t low = data->piece_first[i], high = data->piece_first[i + 1];
         int32_t rest = data->piece_rest[i];
         double moved = places[rest] - data->rest_place[rest];
-        double gain = data->piece_closing[i] ? 1.0 + p->load : 1.0 - p->load;
         double offset = data->piece_closing[i] ? p->offset_closing : p->offset_opening;
         const double *row = data->whitener + data->white_first[i];
         for (int32_t k = low; k < high; k++) {
             double slope, torque = elastic_torque(data, p, k, moved, &slope);
+            double gain = 1.0 - p->load * data->direction[k];
             residuals[k] = data->torque[k] - p->delay * data->late[k] - gain * torque - offset;
             zx[k] = -gain * slope;
         }
@@ -305,11 +305,13 @@ static double observe(filter *f, const double *row, double residual, double nois
         innovation -= row[i] * f->mean[i];
     }
     for (int32_t i = 0; i < 4; i++) variance += row[i] * gain[i];
+    double inverse = 1.0 / variance, weight = innovation * inverse;
     for (int32_t i = 0; i < 4; i++) {
-        f->mean[i] += gain[i] / variance * innovation;
-        for (int32_t j = 0; j < 4; j++) f->cov[i][j] -= gain[i] * gain[j] / variance;
+        double share = gain[i] * inverse;
+        f->mean[i] += gain[i] * weight;
+        for (int32_t j = i; j < 4; j++) f->cov[j][i] = f->cov[i][j] -= share * gain[j];
     }
-    *standard = innovation / sqrt(variance);
+    *standard = innovation * sqrt(inverse);
     return -0.5 * *standard * *standard - 0.5 * log(variance);
 }
 
@@ -388,7 +390,7 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
                            departure(le, p->edge, data->edge_count);
             double peak = p->energy * lever / (blades * slope) *
                           damped(p->damping, data->run_sinking[k]);
-            double torque = (1.0 + p->load) * share * peak;
+            double torque = (1.0 - p->load * data->run_direction[k]) * share * peak;
             double period = 0.0;
             if (p->fracture == SC_CUT_RIPPLED) {
                 double power = between(cycles.power, at, weight);

@@ -55,6 +55,7 @@ typedef struct {
     const double *whitener;
     const double *torque;
     const double *late;
+    const double *direction;
     const double *depth;
     const double *depth_dx;
     const double *lever;
@@ -72,6 +73,7 @@ typedef struct {
     const int32_t *joined;
     const double *run_torque;
     const double *run_late;
+    const double *run_direction;
     const double *run_lever;
     const double *run_lever_dd;
     const double *run_slope;
@@ -88,7 +90,9 @@ typedef struct {
 } sc_cut_data;
 
 /* Parameters in SI. delay (ticks) is how late a torque is measured: late and run_late say by how much
- * mean torques fall for one tick of it. fracture is one of SC_CUT_*; energy is J_c h (N), rest_phase the mean place of
+ * mean torques fall for one tick of it; load the share of the cut's torque that friction adds,
+ * against the motion: direction and run_direction are the segments' mean directions, -1 closing and
+ * 1 opening, in between where friction has not built up. fracture is one of SC_CUT_*; energy is J_c h (N), rest_phase the mean place of
  * rests in the cycle (0: just arrested, 1: about to run) and rest_spread their standard deviation
  * in cycles; variation, its length (m) and sheet_variation describe unevenness as shares; load is
  * the share of the cut's torque that friction adds; noise_scale multiplies the standard deviation

@@ -1,0 +1,277 @@
+"""What differs between recordings of one rig: each fitted by itself, each predicted by the rest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction_experiment import FrictionExperiment
+from scissorcal.calibration.friction_moments import ReducedLaw
+from scissorcal.calibration.friction_search import ReducedProblem, ascend, search
+from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.trust import HELD_OUT_LIMIT
+from scissorcal.inference import Posterior, infer
+from scissorcal.inference.between import BROAD, between_groups
+from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Status, Verdict
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+SCALE = 0.02
+"""Usual size of a difference between recordings: 2 % of what has a logarithm, else this share of
+the prior's standard deviation."""
+FEWEST_BINS = 100
+"""Moving bins from which a recording is fitted by itself."""
+MISFIT = 1.5
+"""Factor on the error of a recording's own fit from which the fit to all is one to none."""
+FAR_APART = 3.0
+"""Standard deviations from which two recordings are said to differ."""
+
+NOT_KNOWN = (
+    "There is one recording: how much the law's parameters vary from recording to recording is not "
+    "known, and the intervals do not include it. Record the same sweeps again, after setting up "
+    "anew or on another day."
+)
+
+
+@dataclass(frozen=True)
+class RecordingError:
+    """Errors on one recording, rms in the unit of the effort.
+
+    ``rms`` is by the fit to all the others, ``pooled_rms`` by that to all, ``own_rms`` by the law
+    fitted to it alone.
+    """
+
+    recording: str
+    rms: float
+    relative_rms: float
+    pooled_rms: float
+    own_rms: float
+
+
+@dataclass(frozen=True)
+class BetweenRecordings:
+    """What a law's parameters differ by from recording to recording.
+
+    ``points`` (r, p) are those of the recordings by themselves, in unconstrained coordinates,
+    ``precisions`` (r, p, p) those of their likelihoods alone, ``prior`` (p, p) that of the prior.
+    ``sd`` (n, p) are draws of the standard deviation between recordings. ``largest_z`` (p,) is the
+    largest difference of two recordings over its standard deviation. ``errors`` are those by the
+    other recordings.
+    """
+
+    layout: Layout
+    points: Array
+    precisions: Array
+    prior: Array
+    sd: Array
+    largest_z: Array
+    errors: tuple[RecordingError, ...]
+
+    def widened(self, draws: Array, rng: np.random.Generator) -> Array:
+        """Widen draws (n, p) of the pooled parameters to those of the mean over recordings.
+
+        Given the scatter tau, the covariance of that mean exceeds the pooled one. Each draw takes
+        one tau and normal noise of the difference, so that without scatter it stays where it is,
+        whatever shape the posterior has. The centre stays the pooled one: where recordings say
+        little by themselves, their own estimates would move it farther than they know.
+        """
+        covariance = self._given(np.concatenate([np.zeros((1, self.sd.shape[1])), self.sd]))
+        values, vectors = np.linalg.eigh(covariance[1:] - covariance[0])
+        root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+        pick = rng.integers(len(self.sd), size=len(draws))
+        noise = np.einsum("nij,nj->ni", root[pick], rng.standard_normal(draws.shape))
+        return np.asarray(draws + noise)
+
+    def _given(self, tau: Array) -> Array:
+        """Covariance (k, p, p) of the mean over recordings given scatters ``tau`` (k, p)."""
+        spread = tau[:, None, :, None] ** 2 * np.eye(tau.shape[1])
+        own = np.linalg.inv(self.precisions + BROAD * self.prior)
+        return np.linalg.inv(np.linalg.inv(own + spread).sum(axis=1) + self.prior)
+
+    def diagnostics(self) -> dict[str, Any]:
+        """Plain numbers by parameter and by recording, for the fit's file."""
+        names = self.layout.names
+        return {
+            "between_recordings_sd": dict(
+                zip(names, np.median(self.sd, axis=0).tolist(), strict=True)
+            ),
+            "between_recordings_z": dict(zip(names, self.largest_z.tolist(), strict=True)),
+            "left_out_recordings": [vars(error) for error in self.errors],
+        }
+
+    def notes(self, nuisance: tuple[str, ...]) -> tuple[str, ...]:
+        """Which parameters differ by recording and by how much, in one sentence."""
+        told = []
+        for i, parameter in enumerate(self.layout.parameters):
+            if parameter.name in nuisance or self.largest_z[i] < FAR_APART:
+                continue
+            values = parameter.natural(self.points[:, i])
+            told.append(
+                f"{parameter.name} from {values.min():.4g} to {values.max():.4g} {parameter.unit} "
+                f"({self.largest_z[i]:.1f} standard deviations)"
+            )
+        head = f"{len(self.points)} recordings were fitted each by itself. "
+        if not told:
+            return (
+                f"{head}Their parameters agree within {FAR_APART:g} standard deviations; so few "
+                "recordings could agree by chance, and the intervals allow for that.",
+            )
+        return (
+            f"{head}They differ in {', '.join(told)}. The intervals are of the mean over "
+            "recordings and include this; a single new recording may lie as far away as these.",
+        )
+
+    def verdict(self) -> Verdict:
+        """Judge the error on recordings that the fit had not seen."""
+        worst = max(self.errors, key=lambda error: error.relative_rms)
+        size = worst.rms / max(worst.relative_rms, 1e-300)
+        why = (
+            f"Fitted to the other recordings the law is off by {worst.relative_rms:.1%} (rms) on "
+            f"{worst.recording}; fitted to all by {worst.pooled_rms / size:.1%}, to that one by "
+            f"itself by {worst.own_rms / size:.1%}."
+        )
+        status: Status = "pass"
+        if worst.relative_rms >= HELD_OUT_LIMIT:
+            changed = worst.pooled_rms > MISFIT * worst.own_rms
+            status = "fail" if changed else "not_evaluated"
+            why += (
+                " The rig changed between recordings: find out what did, or fit them apart."
+                if changed
+                else " One law fits them all, but the others do not determine it there: record "
+                "each load and speed twice to know how recordings differ."
+            )
+        return Verdict(
+            "fit.friction", "recordings", status, worst.relative_rms, HELD_OUT_LIMIT, why
+        )
+
+
+def compare_recordings(
+    design: FrictionExperiment,
+    point: Array,
+    recordings: tuple[Recording, ...],
+    rng: np.random.Generator,
+) -> BetweenRecordings | None:
+    """Fit every recording by itself and by the others; None where fewer than two can be.
+
+    ``design`` is the chosen law over all recordings, with normal noise, and ``point`` (p,) its
+    optimum. The prior, which all share, is taken out of the recordings' estimates before they are
+    compared (see :func:`scissorcal.inference.between.between_groups`).
+    """
+    index, every = design.bins.recording, design.rung(design.observed)
+    labels = [
+        int(label) for label in np.unique(index) if np.count_nonzero(index == label) >= FEWEST_BINS
+    ]
+    law = every.reduced
+    if len(labels) < 2 or law is None:
+        return None
+    prior, problem = every.prior_precision, every.problem(design.series)
+    points, covariances, precisions, estimates, errors = [], [], [], [], []
+    for label in labels:
+        here = index == label
+        own = _inferred(design, law, here, point, rng)
+        likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), dtype=np.float64), prior)
+        points.append(own.optimum.point)
+        covariances.append(own.covariance)
+        precisions.append(likelihood)
+        estimates.append(_without_prior(own, likelihood, prior, every.prior_mean))
+        others = law.without(np.unique(design.strokes[here]))
+        reached = ascend(replace(problem, reduced=others), point).point
+        fits = (reached, point, own.optimum.point)
+        errors.append(_error(design, recordings[label].source, here, fits))
+    scatter = between_groups(
+        np.stack(estimates), np.stack(precisions), _scales(design.layout), prior, rng
+    )
+    return BetweenRecordings(
+        layout=design.layout,
+        points=np.stack(points),
+        precisions=np.stack(precisions),
+        prior=prior,
+        sd=scatter.sd,
+        largest_z=_largest_z(np.stack(points), np.stack(covariances)),
+        errors=tuple(errors),
+    )
+
+
+def jackknife(
+    design: FrictionExperiment, point: Array, nuisance: tuple[str, ...]
+) -> Mapping[str, float]:
+    """Standard deviation of each parameter by leaving out one stroke at a time, in its unit.
+
+    It estimates how far the estimate would move over repeats of such strokes: a lack of fit that
+    every stroke repeats cancels and is not in it. Strokes of unequal length count by their bins
+    (Busing, Meijer and van der Leeden 1999, doi:10.1023/A:1008800423698). Empty for fewer than
+    three strokes.
+    """
+    rung = design.rung(design.observed)
+    law, problem = rung.reduced, rung.problem(design.series)
+    if law is None or len(law.moments.labels) < 3:
+        return {}
+    full = design.layout.columns(point)
+    left = []
+    for label in law.moments.labels:
+        seen = replace(problem, reduced=law.without(np.array([label])))
+        left.append(design.layout.columns(ascend(seen, point).point))
+    size = (law.counted / law.moments.counts)[:, None]
+    pseudo = size * full - (size - 1.0) * np.stack(left)
+    centre = np.sum(pseudo / size, axis=0)
+    variance = np.mean((pseudo - centre) ** 2 / (size - 1.0), axis=0)
+    return {
+        name: float(np.sqrt(value))
+        for name, value in zip(design.layout.names, variance, strict=True)
+        if name not in nuisance
+    }
+
+
+def _inferred(
+    design: FrictionExperiment,
+    law: ReducedLaw,
+    here: NDArray[np.bool_],
+    point: Array,
+    rng: np.random.Generator,
+) -> Posterior:
+    """Normal approximation of the posterior by the bins (n,) of one recording."""
+    outside = np.setdiff1d(law.moments.labels, np.unique(design.strokes[here]))
+    rung = replace(design.rung(design.observed), starts=point[None, :])
+    over: ReducedProblem = replace(rung.problem(design.series, here), reduced=law.without(outside))
+    return infer(over, "draft", rng, optimum=search(over))
+
+
+def _less_prior(precision: Array, prior: Array) -> Array:
+    """Precision of the likelihood alone, never negative in any direction."""
+    size = np.sqrt(np.diag(prior))
+    values, vectors = np.linalg.eigh(precision / np.outer(size, size))
+    values = np.maximum(values - 1.0, 0.0)
+    return np.asarray((vectors * values) @ vectors.T * np.outer(size, size))
+
+
+def _without_prior(own: Posterior, likelihood: Array, prior: Array, prior_mean: Array) -> Array:
+    """Estimate (p,) by the likelihood alone, held where it is silent at the posterior's."""
+    pulled = likelihood @ own.optimum.point + prior @ (own.optimum.point - prior_mean)
+    held = likelihood + BROAD * prior
+    return np.asarray(np.linalg.solve(held, pulled + BROAD * prior @ own.optimum.point))
+
+
+def _scales(layout: Layout) -> Array:
+    return np.array([SCALE * (1.0 if p.transform == "log" else p.sd) for p in layout.parameters])
+
+
+def _largest_z(points: Array, covariances: Array) -> Array:
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    apart = np.abs(points[:, None] - points[None]) / np.sqrt(variances[:, None] + variances[None])
+    return np.asarray(apart.max(axis=(0, 1)))
+
+
+def _error(
+    design: FrictionExperiment, source: str, here: NDArray[np.bool_], fits: tuple[Array, ...]
+) -> RecordingError:
+    """Errors on the bins (n,) of one recording by others, by all and by itself."""
+    size = float(np.sqrt(np.mean(design.observed**2)))
+    others, pooled, own = (
+        float(np.sqrt(np.mean((design.observed - design.mean(u))[here] ** 2))) for u in fits
+    )
+    return RecordingError(Path(source).name, others, others / size, pooled, own)

@@ -1,0 +1,124 @@
+"""``scissorcal predict``"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import workspace_option
+from scissorcal.cli.output import Answer, command
+from scissorcal.cli.progress import progress
+
+if TYPE_CHECKING:
+    from scissorcal.workday.predictions import PredictionOutcome
+
+
+@click.command("predict")
+@click.argument("what", type=click.Choice(["friction", "load"]))
+@click.argument("motion", type=click.Path(path_type=Path, dir_okay=False))
+@click.option(
+    "--level",
+    type=click.FloatRange(min=0.5, max=0.99),
+    default=0.9,
+    show_default=True,
+    help="Probability with which a measured sample lies in the band.",
+)
+@click.option(
+    "--table", type=click.Path(path_type=Path, dir_okay=False), help="Write a table here (.csv)."
+)
+@click.option(
+    "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw it here (.svg or .png)."
+)
+@workspace_option
+@command
+def predict(
+    what: Literal["friction", "load"],
+    motion: Path,
+    level: float,
+    table: Path | None,
+    plot: Path | None,
+    folder: Path | None,
+) -> Answer:
+    """Predict what the friction fit says of MOTION, with a band that measurements lie in.
+
+    friction: the effort that drives the empty joint through MOTION. load: the load at the far end
+    of a two-ended tool, from torque and motion at the driven end; the law must know load. MOTION is
+    a recording, or a table with the columns time_s and opening_rad (opening_m for a linear joint)
+    as export writes it; efforts in it are compared and not used, but for the driven end's torque.
+
+    The band is calibrated on strokes (or whole recordings, where there are two or more) that were
+    left out of the fit, and says so. Friction at rest is not predicted.
+
+    \b
+    Example:
+      $ scissorcal predict friction captures/friction-20261122T091500Z.mcap --plot torque.svg
+      friction: coulomb + viscous, symmetric, over 21.6 s of motion
+      90% band: +- 0.00184 N m
+      A measured sample of a new stroke, made as those of the fit were, lies in the band with ...
+      measured: 93.1% of 4316 samples in the band, rms error 0.00121 N m
+      torque.svg
+    """
+    from scissorcal.workday.predictions import predict_workspace
+
+    with progress() as tell:
+        outcome = predict_workspace(
+            open_workspace(folder),
+            what,
+            motion,
+            level=level,
+            table=table,
+            plot=plot,
+            progress=tell,
+        )
+    return Answer(_facts(what, outcome), _text(what, outcome), files=outcome.files)
+
+
+def _facts(what: str, outcome: "PredictionOutcome") -> dict[str, object]:
+    found, band = outcome.prediction, outcome.band
+    return {
+        "what": what,
+        "rung": outcome.rung,
+        "effort_unit": outcome.effort_unit,
+        "position_unit": outcome.position_unit,
+        "band": band,
+        "promise": band.sentence,
+        "share_inside": _number(found.share_inside),
+        "rms_error": _number(found.rms_error),
+        "moving_s": _moving_s(outcome),
+        "samples": len(found.time_s),
+    }
+
+
+def _text(what: str, outcome: "PredictionOutcome") -> str:
+    found, band, unit = outcome.prediction, outcome.band, outcome.effort_unit
+    width = f"{band.level:.0%} band: +- {band.moving:.3g} {unit}"
+    if band.resting is not None and band.resting != band.moving:
+        width += f", {band.resting:.3g} {unit} near rest"
+    head = f"{what}: {outcome.rung}, over {_moving_s(outcome):.1f} s of motion"
+    lines = [head, width, band.sentence]
+    inside = _number(found.share_inside)
+    if inside is None:
+        lines.append("measured: nothing to compare with in this file")
+    else:
+        import numpy as np
+
+        count = int(np.count_nonzero(np.isfinite(found.low) & np.isfinite(found.measured)))
+        lines.append(
+            f"measured: {inside:.1%} of {count} samples in the band, rms error "
+            f"{found.rms_error:.3g} {unit}"
+        )
+    return "\n".join([*lines, *(str(path) for path in outcome.files)])
+
+
+def _moving_s(outcome: "PredictionOutcome") -> float:
+    """Time that the joint moves, in seconds."""
+    import numpy as np
+
+    time, moving = outcome.prediction.time_s, outcome.prediction.moving
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    return float(np.count_nonzero(moving) * step)
+
+
+def _number(value: float) -> float | None:
+    return value if value == value else None

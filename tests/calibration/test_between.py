@@ -1,0 +1,115 @@
+"""Recordings of one system that differ: intervals grow, or a verdict fails."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import FitResult, fit_friction, friction_experiment
+from scissorcal.calibration.verify import VerifyResult, assess, make_study, run, tasks_of
+from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.recording import Recording
+from tests.calibration.test_friction import emps
+from tests.calibration.truth import Truth, friction_recording
+
+SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="symmetric", critic=False)
+
+
+def recordings(*truths: Truth) -> tuple[Recording, ...]:
+    rng = np.random.default_rng(11)
+    return tuple(
+        dataclasses.replace(friction_recording(truth, rng), source=f"friction-{k}.mcap")
+        for k, truth in enumerate(truths)
+    )
+
+
+def fitted(given: tuple[Recording, ...], settings: FitFriction = SETTINGS) -> FitResult:
+    return fit_friction(given, settings, effort="draft", rng=np.random.default_rng(12))
+
+
+def halves(given: tuple[Recording, ...], fit: FitResult) -> VerifyResult:
+    study = make_study(friction_experiment(given, SETTINGS, fit), fit, seed=0)
+    records = [run(study, task) for task in tasks_of(study, ("halves",), 0)]
+    return assess(study, fit, ("halves",), records)
+
+
+def without_between(fit: FitResult) -> FitResult:
+    """The fit as it would be without a term between recordings."""
+    kept: dict[str, Any] = {
+        name: value
+        for name, value in fit.diagnostics.items()
+        if not name.startswith("between_recordings")
+    }
+    return dataclasses.replace(fit, diagnostics=kept)
+
+
+def status(found: VerifyResult) -> dict[str, str]:
+    return {verdict.check: verdict.status for verdict in found.verdicts}
+
+
+def test_inertias_five_sds_apart_widen_the_interval_and_fail_the_halves_of_one_that_is_not():
+    """The second inertia is 10 % higher, about 5 combined standard deviations or more."""
+    given = recordings(Truth(), dataclasses.replace(Truth(), inertia=2.2e-4))
+    single = fitted(given[:1])
+    fit = fitted(given)
+    assert fit.diagnostics["between_recordings_z"]["inertia"] > 5
+    inertia = fit.parameter("inertia")
+    assert inertia.sd > 10 * single.parameter("inertia").sd
+    assert inertia.q05 < 2.0e-4
+    assert inertia.q95 > 2.2e-4
+    assert fit.parameter("coulomb").sd < 0.1 * fit.parameter("coulomb").mean
+    assert any("They differ in inertia from 0.000" in note for note in fit.notes)
+    assert status(halves(given, without_between(fit)))["halves"] == "fail"
+    assert status(halves(given, fit)) == {"halves": "pass", "halves-effort": "pass"}
+
+
+def test_a_coulomb_level_that_jumps_is_no_calibration():
+    stiffer = dataclasses.replace(Truth(), coulomb_pos=0.0195, coulomb_neg=0.024)
+    fit = fitted(recordings(Truth(), stiffer))
+    (verdict,) = (verdict for verdict in fit.rejected if verdict.check == "recordings")
+    assert verdict.value is not None
+    assert verdict.value > 0.3
+    assert "friction-1.mcap" in verdict.why or "friction-0.mcap" in verdict.why
+    left_out = fit.diagnostics["left_out_recordings"]
+    assert [row["recording"] for row in left_out] == ["friction-0.mcap", "friction-1.mcap"]
+    assert all(row["rms"] > row["pooled_rms"] > row["own_rms"] for row in left_out)
+
+
+def test_recordings_that_agree_are_said_to_and_pass():
+    given = recordings(Truth(), Truth(), Truth())
+    fit = fitted(given)
+    alone = fitted(given[:1])
+    assert any("agree within 3 standard deviations" in note for note in fit.notes)
+    for name in ("inertia", "coulomb", "viscous"):
+        inner = fit.parameter(name).q95 - fit.parameter(name).q05
+        assert inner < 2.0 * (alone.parameter(name).q95 - alone.parameter(name).q05), name
+    found = halves(given, fit)
+    assert set(status(found).values()) == {"pass"}
+    assert found.halves is not None
+    assert found.halves.split == "whole recordings, 2 of 3 in one half"
+
+
+def test_one_recording_says_that_more_is_not_known():
+    given = recordings(Truth())
+    fit = fitted(given)
+    assert any("how much the law's parameters vary from recording" in n for n in fit.notes)
+    assert "between_recordings_sd" not in fit.diagnostics
+    why = next(v.why for v in halves(given, fit).verdicts if v.check == "halves")
+    assert "How much recordings differ is not known" in why
+
+
+def test_the_jackknife_on_a_true_law_agrees_with_the_fit():
+    """21 strokes of a law that is true: both estimate the same, within a factor of two."""
+    fit = fitted(recordings(Truth()), FitFriction(rung="coulomb+viscous", symmetry="asymmetric"))
+    for name in ("inertia", "coulomb_pos", "coulomb_neg"):
+        ratio = fit.diagnostics["jackknife_sd"][name] / fit.parameter(name).sd
+        assert 0.4 < ratio < 2.0, name
+
+
+def test_on_emps_lack_of_fit_repeats_and_the_jackknife_does_not_see_it():
+    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    fit = fitted((emps(),), settings)
+    for name in ("coulomb_pos", "coulomb_neg"):
+        assert fit.parameter(name).sd == pytest.approx(0.20, abs=0.03)
+        assert fit.diagnostics["jackknife_sd"][name] == pytest.approx(0.048, abs=0.01)
