@@ -67,10 +67,10 @@ def test_draft_fits_the_law_that_was_chosen_last(recording):
 
 
 def test_a_fit_that_runs_out_of_time_is_no_calibration(recording):
+    """The optimum of sums by stroke takes milliseconds and is reached all the same."""
     rng = np.random.default_rng(3)
     found = fit_friction((recording,), SIMPLE, effort="standard", rng=rng, stop=lambda: True)
-    failed = {verdict.check for verdict in found.rejected}
-    assert {"optimum", "k-hat"} <= failed
+    assert "k-hat" in {verdict.check for verdict in found.rejected}
 
 
 def test_draft_says_that_its_intervals_are_unchecked(recording):

@@ -16,7 +16,10 @@ from scissorcal.calibration.ladder import (
 )
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.rung_table import rung_table
+from scissorcal.calibration.selection import selection_sentence
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.recording import Joint
 from tests.calibration.truth import Truth, friction_recording
 
 STROKES, BINS = 12, 40
@@ -165,6 +168,35 @@ def test_a_fit_names_what_cannot_be_told_apart_and_what_would_tell_it():
     named = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
     alone = fit_friction((recording,), named, effort="draft", rng=np.random.default_rng(3))
     assert "named in the recipe" in alone.selection
+
+
+def test_segments_of_a_path_are_counted_and_not_timed():
+    """A cut's segments have no length in seconds: no sentence may say "nan s"."""
+    climbed = climbed_pair(0.02, 1)
+    chosen = choose(climbed)
+    count = STROKES * BINS
+    numbers, zeros = np.zeros(count, dtype=np.int64), np.zeros(count)
+    segments = Bins(
+        time_s=zeros,
+        opening=np.tile(np.linspace(0.8, 0.2, BINS), STROKES),
+        rate=np.repeat(-np.linspace(0.1, 1.0, STROKES), BINS),
+        acceleration=zeros,
+        drive=zeros,
+        advance=zeros,
+        moving=np.ones(count, dtype=bool),
+        series=numbers,
+        recording=numbers,
+        stroke=np.repeat(np.arange(STROKES), BINS),
+        sheet=numbers,
+        bin_s=float("nan"),
+        rate_floor=0.0,
+    )
+    contact = np.full(count, np.nan)
+    said = selection_sentence(climbed, chosen, segments, contact, Joint())
+    assert "more segments of the path there would tell them apart" in said
+    assert "nan" not in said
+    timed = dataclasses.replace(segments, bin_s=0.005)
+    assert "s more of motion" in selection_sentence(climbed, chosen, timed, contact, Joint())
 
 
 def test_bad_strokes_do_not_break_the_comparison():

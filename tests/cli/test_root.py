@@ -183,3 +183,18 @@ def test_an_answer_that_cannot_be_written_is_said_to_be(tmp_path: Path) -> None:
 
 def test_tables_line_up() -> None:
     assert table([["a", "long"], ["longer", "b"]]) == "a       long\nlonger  b"
+
+
+def test_linear_algebra_takes_one_thread_unless_the_environment_says_otherwise() -> None:
+    program = (
+        "import os, sys\n"
+        "from scissorcal.cli.root import THREAD_VARIABLES, run\n"
+        "os.environ.pop('OMP_NUM_THREADS', None)\n"
+        "os.environ.pop('MKL_NUM_THREADS', None)\n"
+        "os.environ['OPENBLAS_NUM_THREADS'] = '3'\n"
+        "assert 'numpy' not in sys.modules\n"
+        "try:\n    run(['--version'])\nexcept SystemExit:\n    pass\n"
+        "print([os.environ[name] for name in THREAD_VARIABLES])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "['3', '1', '1']", done.stderr

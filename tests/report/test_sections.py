@@ -104,6 +104,18 @@ def test_strokes_are_numbered_on_over_recordings() -> None:
     assert found[7].recording == "b.mcap"
 
 
+def test_samples_of_a_stroke_stand_in_order_of_time() -> None:
+    """A cut's series has its elastic segments before the running ones."""
+    fit = cut_fit()
+    rng = np.random.default_rng(1)
+    mixed = rng.permutation(len(fit.series.stroke))
+    series = replace(
+        fit.series, **{name: values[mixed] for name, values in vars(fit.series).items()}
+    )
+    for stroke in strokes_of(replace(fit, series=series), "cut", []):
+        assert np.all(np.diff(series.time_s[stroke.places]) > 0.0)
+
+
 def test_without_recordings_the_direction_names_a_stroke() -> None:
     named = [stroke.name for stroke in strokes_of(replace(friction_fit(), held_out=()), "f", [])]
     assert [name.kind for name in named[:4]] == ["closing", "opening", "closing", "opening"]

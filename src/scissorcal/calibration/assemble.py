@@ -135,10 +135,16 @@ def _diagnostics(
         "r_squared": float(1 - np.sum(residuals**2) / np.sum((measured - measured.mean()) ** 2)),
         "starts_agreeing": f"{chosen.optimum.agreeing} of {chosen.optimum.starts}",
         "search": chosen.optimum.sentence,
-        "rate_floor": bins.rate_floor,
-        "bin_s": bins.bin_s,
+        **_of_time(bins),
         "noise": float(np.std(residuals)),
     }
+
+
+def _of_time(bins: Bins) -> dict[str, float]:
+    """What only bins of time have; segments of a path have no length in seconds."""
+    if not np.isfinite(bins.bin_s):
+        return {}
+    return {"rate_floor": bins.rate_floor, "bin_s": bins.bin_s}
 
 
 def _criticise(

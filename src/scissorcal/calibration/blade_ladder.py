@@ -96,27 +96,8 @@ def climb_edge_ladder(
     their optimum, in the chosen one at the ``effort`` asked for. Evaluations have a limit
     (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
     """
-    import scipy.linalg  # noqa: F401 - its threads can be limited only once it is loaded
-    from threadpoolctl import threadpool_limits
-
-    # matrices of 160 rows gain nothing from threads, which wait for each other on a busy machine
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _climbed(
-            CellData(photographs, length_m),
-            effort,
-            rng,
-            families,
-            progress or (lambda done, sentence: None),
-        )
-
-
-def _climbed(
-    data: CellData,
-    effort: Effort,
-    rng: np.random.Generator,
-    families: tuple[Family, ...],
-    tell: Progress,
-) -> EdgeLadder:
+    tell = progress or (lambda done, sentence: None)
+    data = CellData(photographs, length_m)
     found, evidences = [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")

@@ -40,6 +40,8 @@ class ReducedProblem(Problem):
         """Sum of the likelihood's terms; -inf where it is not finite."""
         if self.reduced is None:
             return super().log_likelihood(point)
+        if self.tally is not None:
+            self.tally()
         total = self.reduced.log_likelihood(point)
         return total if np.isfinite(total) else -np.inf
 

@@ -30,7 +30,8 @@ def selection_sentence(
 
     ``contact`` (n,) is where the material is met, NaN for empty motion. The place named is where,
     within the recorded motion, the predictions of the rung used and of any it cannot be told from
-    lie furthest apart, and the time is what it would take there for 3 nats.
+    lie furthest apart, and the time (the number of segments, where those are of the path and not of
+    time) is what it would take there for 3 nats.
     """
     if len(climbed) == 1:
         return f"{chosen.rung.name} was named in the recipe and compared with no other."
@@ -101,12 +102,15 @@ def _advice(place: _Place, chosen: Climbed, bins: Bins, joint: Joint) -> str:
         return "Over the recorded motion they predict the same."
     unit = "m" if place.by_contact else joint.position_unit
     where = "contact" if place.by_contact else "opening"
-    seconds = POSITIVE_EVIDENCE / place.nats * bins.bin_s
+    count = POSITIVE_EVIDENCE / place.nats
+    more = f"{count * bins.bin_s:.2g} s more of motion"
+    if not np.isfinite(bins.bin_s):
+        more = f"{max(1, round(count))} more segments of the path"
     return (
         f"{chosen.rung.name} and {place.other} differ most at {place.speed[0]:.2g} to "
         f"{place.speed[1]:.2g} {joint.position_unit}/s and {where} {place.place[0]:.2g} to "
         f"{place.place[1]:.2g} {unit}, by {place.difference:.2g} {joint.effort_unit} (rms): about "
-        f"{seconds:.2g} s more of motion there would tell them apart if one of them is true."
+        f"{more} there would tell them apart if one of them is true."
     )
 
 

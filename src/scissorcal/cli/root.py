@@ -1,5 +1,6 @@
 """The ``scissorcal`` command itself: its commands in the order of the day, and how it ends."""
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -8,6 +9,9 @@ import click
 import scissorcal
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.output import Answer, print_envelope
+
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""What libraries of linear algebra read once, when they are loaded: after the command has begun."""
 
 _COMMANDS = {
     "init": ("scissorcal.cli.init:init", "Start a workspace from a recipe."),
@@ -53,7 +57,14 @@ def scissorcal_command() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; leaves by SystemExit with the exit code."""
+    """Run the command line; leaves by SystemExit with the exit code.
+
+    Linear algebra takes one thread here and in all processes that a command starts, unless the
+    environment says how many: the largest matrices have some hundred rows, whose threads only wait
+    for each other, for seconds where the machine is busy.
+    """
+    for variable in THREAD_VARIABLES:
+        os.environ.setdefault(variable, "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = scissorcal_command.main(given, prog_name="scissorcal", standalone_mode=False)

@@ -55,4 +55,5 @@ class Counter:
             log_likelihood_terms=terms,
             standardised=None if normal is None else standardised,
             log_posterior_many=None if many is None else log_posterior_many,
+            tally=one_more,
         )

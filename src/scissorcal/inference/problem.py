@@ -37,6 +37,9 @@ class Problem:
 
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
+
+    ``tally`` is called before each likelihood that a subclass works out without its terms, so that
+    counters see it too.
     """
 
     names: tuple[str, ...]
@@ -54,6 +57,7 @@ class Problem:
     independent: bool = False
     log_posterior_many: Callable[[Array], Array] | None = None
     smooth: bool = False
+    tally: Callable[[], None] | None = None
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""

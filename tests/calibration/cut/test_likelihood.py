@@ -1,5 +1,6 @@
 """The cut's likelihood in C against a twin in NumPy, and what its parameters must do."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from scissorcal.kernel import cut_log_likelihood
+from tests.calibration.cut.golden import PATH, golden
 from tests.calibration.cut.made_segments import made_data, made_parameters, responses
 from tests.calibration.cut.twin import Table, beliefs, log_likelihood
 
@@ -143,3 +145,12 @@ def _by_node(data, by_rest):
 def _belief(data, given, rest):
     centre, spread = beliefs(data, given, Table(given))
     return centre[rest], spread[rest]
+
+
+def test_the_golden_vectors_are_the_twins():
+    """What tests/c compares the core with; ``python -m tests.calibration.cut.golden`` writes it."""
+    stored = json.loads(PATH.read_text(encoding="utf-8"))
+    for held, made in zip(stored["cases"], golden()["cases"], strict=True):
+        assert held["title"] == made["title"]
+        for name in ("terms", "residuals", "standardised", "places"):
+            assert held[name] == pytest.approx(made[name], rel=1e-9, abs=1e-12)

@@ -1,0 +1,68 @@
+"""Recordings from which no cut can be fitted, and the sentences that say so."""
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import fit_cut
+from scissorcal.calibration.cut.laws import allowed_laws
+from scissorcal.errors import InputError
+from tests.calibration.cut.made_cuts import HIGH, LOW, cut, way
+from tests.calibration.cut.recipes import friction_of, paper, pressing
+from tests.calibration.truth import Truth, cut_recording, friction_recording
+
+TRUTH = Truth()
+
+
+@pytest.fixture(scope="module")
+def friction():
+    return friction_of(TRUTH, np.random.default_rng(10))
+
+
+def test_cutting_air_is_refused(friction):
+    rng = np.random.default_rng(13)
+    air = cut_recording(Truth(force=1e-9), rng, sheets=1)
+    with pytest.raises(InputError, match="hardly touched the material") as refused:
+        fit_cut((air,), paper(fracture="smooth"), friction, effort="draft", rng=rng)
+    assert "advance was zero at its near edge" in str(refused.value)
+
+
+def test_a_recording_without_sheets_is_refused(friction):
+    rng = np.random.default_rng(14)
+    empty = friction_recording(TRUTH, rng)
+    with pytest.raises(InputError, match="no stroke through material") as refused:
+        fit_cut((empty,), paper(), friction, effort="draft", rng=rng)
+    assert "scissorcal capture cut" in str(refused.value)
+
+
+def test_blades_that_never_let_go_are_refused(friction):
+    """A cut that ends closed: nothing is unloaded."""
+    rng = np.random.default_rng(15)
+    closed = cut(way(HIGH, LOW)).made.recording
+    with pytest.raises(InputError, match="letting go of the material") as refused:
+        fit_cut((closed,), paper(), friction, effort="draft", rng=rng)
+    assert "let every stroke open the blades wide" in str(refused.value)
+
+
+def test_a_recipe_says_which_laws_are_compared():
+    def names(**cut):
+        return [law.name for law in allowed_laws(paper(**{"response": "power", **cut}))]
+
+    assert names(fracture="smooth") == ["power response, smooth fracture"]
+    assert names(fracture="auto") == [
+        "power response, smooth fracture",
+        "power response, rippled fracture",
+    ]
+    assert names(fracture="smooth", rate_damping="auto") == [
+        "power response, smooth fracture",
+        "power response, damped, smooth fracture",
+    ]
+    assert names(fracture="smooth", load_share="fit") == [
+        "power response, smooth fracture, load-dependent friction"
+    ]
+    families = {
+        named: [law.response for law in allowed_laws(pressing(response=named))]
+        for named in ("auto", "spline", "auto+spline")
+    }
+    assert set(families["auto"]) == {"power", "exponential"}
+    assert set(families["spline"]) == {"spline"}
+    assert set(families["auto+spline"]) == {"power", "exponential", "spline"}
