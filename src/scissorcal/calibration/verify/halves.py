@@ -82,8 +82,9 @@ def split_strokes(strokes: Integers, facts: Sequence[StrokeFacts]) -> Split | No
     Where there are two recordings or more, whole recordings alternate: halves that share recordings
     cannot show a change between them. Else, where strokes belong to two sheets or more, whole
     sheets alternate. Otherwise strokes of a kind are ranked by speed and alternate, opening ones
-    against closing ones, so that both halves see both directions and all speeds. A stroke that is the only one of its kind (an excitation) is cut
-    into four pieces, the outer two for one half. None where there is only one stroke.
+    against closing ones, so that both halves see both directions and all speeds. A stroke that is
+    the only one of its kind (an excitation) is cut into four pieces, the outer two for one half.
+    None where there is only one stroke.
     """
     present = [fact for fact in facts if np.any(strokes == fact.label)]
     if len(present) < 2:
