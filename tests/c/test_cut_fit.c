@@ -65,6 +65,8 @@ static void load_arrays(sc_cut_data *data, const json *one)
     data->whitener = doubles(one, "whitener");
     data->torque = doubles(one, "torque");
     data->late = doubles(one, "late");
+    data->direction = doubles(one, "direction");
+    data->run_direction = doubles(one, "run_direction");
     data->depth = doubles(one, "depth");
     data->depth_dx = doubles(one, "depth_dx");
     data->lever = doubles(one, "lever");
