@@ -48,7 +48,7 @@ SHEET = 1
 RUNS = 4
 """Two strokes: each closes and opens."""
 STEP_RAD = 1.5e-3
-FREQUENCIES = np.exp(np.arange(np.log(0.25), np.log(2.5), 0.004))
+FREQUENCIES = np.exp(np.arange(np.log(0.25), np.log(2.5), 0.01))
 
 
 @dataclass(frozen=True)
