@@ -65,27 +65,36 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
         shifts[kind] = covariance @ score
     load = float(design.layout.natural(point).get("load_share", 0.0))
     elastic = float(np.hypot(share, LOAD_ERROR * load))
-    shares = {kind: elastic if kind.endswith("loading") else share for kind in shifts}
+    shares = {kind: elastic if "loading" in kind else share for kind in shifts}
     return Budget(shares, shifts)
 
 
 def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
-    """Designs in which one kind of segment was measured larger by ``PERTURBATION``."""
+    """Designs in which one kind of segment was measured larger by ``PERTURBATION``.
+
+    Elastic segments may also be wrong in proportion to their torque, from less to more within a
+    piece: that is what the exponent is told by.
+    """
     segments = design.likelihood.segments
-    kinds = [np.full(len(p.torque), p.kind == "unloading") for p in segments.pieces]
-    unloading = np.concatenate([*kinds, np.zeros(0, dtype=bool)])
+    none = np.zeros(0)
+    opening = [np.full(len(p.torque), float(p.kind == "unloading")) for p in segments.pieces]
+    slopes = [2.0 * p.torque / float(np.abs(p.torque).max()) - 1.0 for p in segments.pieces]
+    unloading, slope = np.concatenate([*opening, none]), np.concatenate([*slopes, none])
     elastic, count = len(unloading), len(design.observed)
-    masks = {
-        "loading": np.concatenate([~unloading, np.zeros(count - elastic, dtype=bool)]),
-        "unloading": np.concatenate([unloading, np.zeros(count - elastic, dtype=bool)]),
-        "running": np.arange(count) >= elastic,
+    rest = np.zeros(count - elastic)
+    weights = {
+        "loading": np.concatenate([1.0 - unloading, rest]),
+        "unloading": np.concatenate([unloading, rest]),
+        "loading, by its torque": np.concatenate([(1.0 - unloading) * slope, rest]),
+        "unloading, by its torque": np.concatenate([unloading * slope, rest]),
+        "running": (np.arange(count) >= elastic).astype(np.float64),
     }
     found: dict[str, CutExperiment | None] = {}
-    for kind, mask in masks.items():
-        measured = np.where(mask, 1.0 + PERTURBATION, 1.0) * design.likelihood.torque
+    for kind, weight in weights.items():
+        measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
         found[kind] = (
             replace(design, likelihood=replace(design.likelihood, measured=measured), _last={})
-            if np.any(mask)
+            if np.any(weight)
             else None
         )
     line = design.likelihood.line
