@@ -185,7 +185,8 @@ def half_width(errors: Array, units: Integers, level: float, freedom: float) -> 
     Barber and Willett, arXiv:2306.06342; for fits without the unit, Barber et al. 2021,
     doi:10.1214/20-AOS1965, if the fit hardly depends on one unit). Where K is too small for
     ``level`` the quantile of the K units is multiplied by that of Student's t with ``freedom``
-    degrees over the normal one. The second result says which: True for the former.
+    degrees over the normal one, and is at least that t times the units' rms error. The second
+    result says which: True for the former.
     """
     from scipy.stats import norm, t
 
@@ -200,7 +201,9 @@ def half_width(errors: Array, units: Integers, level: float, freedom: float) -> 
     if conformal:
         return found, True
     tail = 0.5 + 0.5 * level
-    return found * float(t.ppf(tail, max(freedom, 1.0)) / norm.ppf(tail)), False
+    student = float(t.ppf(tail, max(freedom, 1.0)))
+    rms = float(np.sqrt(np.mean(np.bincount(place, size**2) / counts)))
+    return max(found * student / float(norm.ppf(tail)), rms * student), False
 
 
 @dataclass(frozen=True)

@@ -191,6 +191,11 @@ def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) ->
         f"{count:.0f} independent ones; intervals were widened by up to "
         f"{diagnostics['largest_inflation']:.1f} for it."
     )
+    if scope == "fit.cut":
+        why = (
+            f"{diagnostics['observations']} segments of the path leave residuals that are worth "
+            f"{count:.0f} independent ones; the likelihood takes them as its noise has them."
+        )
     if per < FEWEST_INDEPENDENT:
         why += " That is too few for this many parameters: record longer or more varied motion."
         return Verdict(scope, "whiteness", "fail", per, FEWEST_INDEPENDENT, why)
@@ -200,7 +205,7 @@ def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) ->
 def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
     r2 = diagnostics["r_squared"]
     if r2 > 0:
-        why = f"The law explains {r2:.1%} of the variance of the band-limited data."
+        why = f"The law explains {r2:.1%} of the variance of what was measured."
         return Verdict(scope, "r-squared", "pass", r2, 0.0, why)
     why = "The law is worse than a constant; check signs and units, and what was recorded."
     return Verdict(scope, "r-squared", "fail", r2, 0.0, why)

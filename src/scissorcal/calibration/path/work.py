@@ -76,7 +76,7 @@ def material_of(
 
 
 def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:
-    """Mean torque (k,) between samples ``ends`` (k + 1,), and its fall for one tick of delay."""
+    """Mean torque (k,) between samples ``ends`` (k + 1,), and what one tick of delay adds to it."""
     path = np.diff(motion.opening[ends])
     late = np.concatenate([[0.0], np.cumsum(motion.drive_step[:-1] * np.diff(motion.opening))])
     return np.diff(work[ends]) / path, np.diff(late[ends]) / path
