@@ -123,8 +123,8 @@ def find_line(
     """Look for the teeth; None where no stroke shows them.
 
     The phase's true advance is searched over ``SCAN`` of the expected one, by the power that keeps
-    its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1977,
-    doi:10.1109/TAES.1977.308469); the error is a jackknife over strokes, and ``PERIOD_SD``.
+    its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1979,
+    IEEE Trans. Geosci. Electron. GE-17, 113); the error is a jackknife over strokes, and ``PERIOD_SD``.
     ``paths`` (k,) of the segments weigh the mean period; ``near`` says that the expected period is
     right to some percent, and needs no search.
     """
