@@ -124,7 +124,8 @@ def find_line(
 
     The phase's true advance is searched over ``SCAN`` of the expected one, by the power that keeps
     its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1979,
-    IEEE Trans. Geosci. Electron. GE-17, 113); the error is a jackknife over strokes, and ``PERIOD_SD``.
+    IEEE Trans. Geosci. Electron. GE-17, 113); the error is a jackknife over strokes, and
+    ``PERIOD_SD``.
     ``paths`` (k,) of the segments weigh the mean period; ``near`` says that the expected period is
     right to some percent, and needs no search.
     """
