@@ -15,16 +15,12 @@ Array = NDArray[np.float64]
 
 SUBHARMONIC = 0.3
 """Power at a half or a third of the line's frequency over its own; a harmonic has more than 1."""
-BIASED = 5.0
-"""Median residual of a kind of segment in standard errors, beyond which the law misses it."""
 
 
 def cut_verdicts(
     friction: FitResult,
     edge_verdicts: tuple[Verdict, ...],
     scouted: Scouted,
-    design: CutExperiment,
-    point: Array,
     sensors: Sensors,
 ) -> tuple[Verdict, ...]:
     """Judge what the fit builds on, its sensors, and its line."""
@@ -42,9 +38,7 @@ def cut_verdicts(
     )
 
 
-def line_notes(
-    scouted: Scouted, design: CutExperiment, point: Array, budget: Budget
-) -> tuple[str, ...]:
+def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:
     """What the teeth say, what each sheet's toughness was, and what lack of fit was allowed for."""
     notes = []
     if scouted.believed and scouted.line is not None:
@@ -80,7 +74,7 @@ def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Ver
         why = "The fits that this one builds on passed their verdicts."
         return Verdict("fit.cut", "foundations", "pass", 0.0, 0.0, why)
     said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
-    why = f"A fit that this one builds on failed a verdict ({said}): mend that first."
+    why = f"A fit that this one builds on failed a verdict ({said}): correct and fit that one first."
     return Verdict("fit.cut", "foundations", "fail", float(len(wrong)), 0.0, why)
 
 

@@ -126,10 +126,10 @@ def fit_cut(
         nuisance=NUISANCE,
         rng=rng,
         critic=recipe.fit.cut.critic,
-        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, design, u, sensors),
+        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, sensors),
         extra_notes=(
             *sensors.notes,
-            *line_notes(scouted, design, u, budget),
+            *line_notes(scouted, design, budget),
             *draft_note(effort, ladder, laws),
         ),
     )
