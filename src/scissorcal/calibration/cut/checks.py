@@ -74,7 +74,9 @@ def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Ver
         why = "The fits that this one builds on passed their verdicts."
         return Verdict("fit.cut", "foundations", "pass", 0.0, 0.0, why)
     said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
-    why = f"A fit that this one builds on failed a verdict ({said}): correct and fit that one first."
+    why = (
+        f"A fit that this one builds on failed a verdict ({said}): correct and fit that one first."
+    )
     return Verdict("fit.cut", "foundations", "fail", float(len(wrong)), 0.0, why)
 
 
