@@ -33,7 +33,7 @@ class Problem:
 
     ``log_posterior_many`` gives, where the model can work out many points at once, the sum of
     prior and likelihood at points (k, p), shape (k,); what is not finite counts as -inf. Bounds
-    need not be looked at. Importance sampling, ensembles and Hessians use it where it is there.
+    need not be looked at. It is then used for single points too.
 
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
@@ -61,6 +61,8 @@ class Problem:
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""
+        if self.log_posterior_many is not None:
+            return float(self.log_likelihoods(point[None])[0])
         total = float(np.sum(self.log_likelihood_terms(point)))
         return total if np.isfinite(total) else -np.inf
 
@@ -68,6 +70,8 @@ class Problem:
         """Log-posterior up to a constant; -inf outside the bounds or where it is not finite."""
         if np.any(point < self.lower) or np.any(point > self.upper):
             return -np.inf
+        if self.log_posterior_many is not None:
+            return float(self.log_posteriors(point[None])[0])
         prior = float(self.log_prior(point))
         return prior + self.log_likelihood(point) if np.isfinite(prior) else -np.inf
 
@@ -88,6 +92,6 @@ class Problem:
             return np.array([self.log_likelihood(point) for point in points])
         prior = np.array([float(self.log_prior(point)) for point in points])
         if not np.all(np.isfinite(prior)):
-            return np.array([self.log_likelihood(point) for point in points])
+            return np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
         heights = np.asarray(self.log_posterior_many(points)) - prior
         return np.where(np.isfinite(heights), heights, -np.inf)

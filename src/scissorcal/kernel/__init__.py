@@ -1,6 +1,11 @@
 """The C core and its thin binding: wire frames, tables, the model's step, the servo loop."""
 
-from scissorcal.kernel.cut_fit import CutFitData, CutFitParameters, cut_log_likelihood
+from scissorcal.kernel.cut_fit import (
+    CutFitData,
+    CutFitParameters,
+    cut_log_likelihood,
+    cut_log_likelihoods,
+)
 from scissorcal.kernel.frames import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -74,6 +79,7 @@ __all__ = [
     "c_sources",
     "crc16",
     "cut_log_likelihood",
+    "cut_log_likelihoods",
     "decode",
     "encode",
     "encode_frame",

@@ -38,5 +38,5 @@ builder.set_source(
     depends=[str(header) for header in sorted(C.glob("*.h"))],
     include_dirs=[str(C)],
     libraries=["m"],
-    extra_compile_args=["-std=c99", "-O2", "-Wall", "-Wextra"],
+    extra_compile_args=["-std=c99", "-O3", "-fno-math-errno", "-Wall", "-Wextra"],
 )

@@ -96,7 +96,8 @@ class CutFitData:
 class CutFitParameters:
     """Parameters as ``sc_cut_parameters`` of sc_cut_fit.h describes them; the table's arrays first.
 
-    ``fracture`` is "none", "smooth" or "rippled".
+    For one point numbers and arrays (size,), or for k points arrays (k,) and (k, size); what all
+    have in common may be given once. ``fracture`` is "none", "smooth" or "rippled".
     """
 
     first: float
@@ -105,19 +106,19 @@ class CutFitParameters:
     force_slope: Array
     log_energy: Array
     fracture: str
-    energy: float
-    kappa: float
-    rest_phase: float
-    rest_spread: float
-    variation: float
-    variation_length: float
-    sheet_variation: float
-    offset_closing: float
-    offset_opening: float
-    load: float
-    noise_scale: float
-    damping: float
-    delay: float
+    energy: float | Array
+    kappa: float | Array
+    rest_phase: float | Array
+    rest_spread: float | Array
+    variation: float | Array
+    variation_length: float | Array
+    sheet_variation: float | Array
+    offset_closing: float | Array
+    offset_opening: float | Array
+    load: float | Array
+    noise_scale: float | Array
+    damping: float | Array
+    delay: float | Array
     edge: Array
 
 
@@ -129,14 +130,14 @@ def cut_log_likelihood(
     Segments stand in the data's order, elastic ones first. The total is -inf where any number is
     not finite.
     """
-    struct, keep = _parameters(parameters)
+    structs, keep = _structs(parameters, 1)
     count, rests = data.segments, len(data.rest_place)
     terms, residuals, scaled = (np.zeros(count) for _ in range(3))
-    places, work = np.zeros(max(rests, 1)), np.zeros(4 * len(data.torque) + 4 * rests + 1)
+    places, work = np.zeros(max(rests, 1)), np.zeros(2 * len(data.torque) + 5 * rests + 1)
     period = ffi.new("double *")
     total = lib.sc_cut_log_likelihood(
         data._c[0],
-        struct,
+        structs,
         *(ffi.from_buffer("double[]", a) for a in (terms, residuals, scaled, places)),
         period,
         ffi.from_buffer("double[]", work),
@@ -145,20 +146,48 @@ def cut_log_likelihood(
     return float(total), terms, residuals, scaled, places[:rests], float(period[0])
 
 
-def _parameters(given: CutFitParameters) -> tuple[Any, list[Any]]:
-    struct = ffi.new("sc_cut_parameters *")
+def cut_log_likelihoods(
+    data: CutFitData, parameters: CutFitParameters, count: int
+) -> tuple[Array, Array]:
+    """Totals and log periods of ``count`` points, both (count,)."""
+    structs, keep = _structs(parameters, count)
+    totals, periods = np.zeros(count), np.zeros(count)
+    work = np.zeros(2 * data.segments + 2 * len(data.torque) + 6 * len(data.rest_place) + 1)
+    lib.sc_cut_log_likelihoods(
+        data._c[0],
+        structs,
+        count,
+        *(ffi.from_buffer("double[]", a) for a in (totals, periods, work)),
+    )
+    del keep
+    return totals, periods
+
+
+_TABLES = ("log_force", "force_slope", "log_energy")
+
+
+def _structs(given: CutFitParameters, count: int) -> tuple[Any, list[Any]]:
+    """An array of ``count`` structs, and the buffers that they point into."""
+    structs = ffi.new("sc_cut_parameters[]", count)
     arrays = {
-        name: ffi.from_buffer("double[]", np.ascontiguousarray(getattr(given, name)))
-        for name in ("log_force", "force_slope", "log_energy", "edge")
+        name: np.ascontiguousarray(np.atleast_2d(getattr(given, name)), dtype=np.float64)
+        for name in (*_TABLES, "edge")
     }
-    table = struct.response
-    table.size, table.first, table.step = len(given.log_force), given.first, given.step
-    table.log_force, table.force_slope = arrays["log_force"], arrays["force_slope"]
-    table.log_energy = arrays["log_energy"]
-    for entry in fields(given):
-        if entry.name in ("first", "step", "log_force", "force_slope", "log_energy", "edge"):
-            continue
-        value = getattr(given, entry.name)
-        setattr(struct, entry.name, _FRACTURE[value] if entry.name == "fracture" else value)
-    struct.edge = arrays["edge"]
-    return struct, list(arrays.values())
+    buffers = {name: ffi.from_buffer("double[]", array) for name, array in arrays.items()}
+    strides = {name: a.shape[1] if len(a) > 1 else 0 for name, a in arrays.items()}
+    numbers = {
+        entry.name: np.broadcast_to(getattr(given, entry.name), count).tolist()
+        for entry in fields(given)
+        if entry.name not in ("first", "step", "fracture", *arrays)
+    }
+    fracture, size = _FRACTURE[given.fracture], arrays["log_force"].shape[1]
+    for index in range(count):
+        struct = structs[index]
+        table = struct.response
+        table.size, table.first, table.step = size, given.first, given.step
+        for name in _TABLES:
+            setattr(table, name, buffers[name] + index * strides[name])
+        struct.fracture, struct.edge = fracture, buffers["edge"] + index * strides["edge"]
+        for name, values in numbers.items():
+            setattr(struct, name, values[index])
+    return structs, [arrays, buffers]

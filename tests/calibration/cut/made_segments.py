@@ -115,7 +115,8 @@ def made_parameters(
     response: Response, fracture: str, *, edge_count: int = 2, plain: bool = False
 ) -> CutFitParameters:
     """Parameters; ``plain`` leaves out damping, load, delay, offsets and the sheets' variation."""
-    log_depth, log_force, slope, log_energy = response_table(response, REFERENCE_M)
+    log_depth, *rows = response_table(response, REFERENCE_M)
+    log_force, slope, log_energy = (row[0] for row in rows)
     full = CutFitParameters(
         first=float(log_depth[0]),
         step=float(log_depth[1] - log_depth[0]),

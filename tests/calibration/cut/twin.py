@@ -16,8 +16,8 @@ from scissorcal.kernel import CutFitData, CutFitParameters
 
 Array = NDArray[np.float64]
 
-REST_STEPS, REST_REACH_M, ARRIVED_M = 8, 3e-5, 1e-10
-KNOTS = 13
+REST_STEPS, REST_REACH_M, ARRIVED_M = 8, 3e-5, 1e-7
+KNOTS = 21
 FLOOR_M = 2e-6
 
 
@@ -179,16 +179,17 @@ def _elastic(data: CutFitData, given: CutFitParameters, table: Table):
             curvature = belongs.T @ zx**2 + np.where(held, 0.0, spread**-2.0)
             pull = belongs.T @ (z * zx) + np.where(held, 0.0, (places - centre) * spread**-2.0)
         move = np.where(held, 0.0, np.clip(-pull / curvature, -REST_REACH_M, REST_REACH_M))
-        if step < REST_STEPS:
-            places = places + move
-        if np.abs(move).max(initial=0.0) < ARRIVED_M:
+        if step == REST_STEPS or np.abs(move).max(initial=0.0) < ARRIVED_M:
             break
+        places = places + move
+    gained = np.where(np.abs(move) < ARRIVED_M, -0.5 * move * pull, 0.0)
     terms = -0.5 * z**2 + np.log(np.diag(white)) - np.log(given.noise_scale)
     for r in np.flatnonzero(~held):
         if r in data.piece_rest:
             first = data.piece_first[np.flatnonzero(data.piece_rest == r)[0]]
             away = (places[r] - centre[r]) / spread[r]
             terms[first] += -0.5 * away**2 - np.log(spread[r]) - 0.5 * np.log(curvature[r])
+            terms[first] += gained[r]
     return terms, residuals, z, places
 
 
@@ -197,15 +198,15 @@ def _cycles(data: CutFitData, given: CutFitParameters, table: Table, slope: Arra
 
     def at(t: float) -> list[float]:
         start, stop, share = cycle(given, table, data.moving_blades, t)
-        return [np.log(start), np.log(stop), share, table.log_force(float(np.log(start)))[1]]
+        return [start, stop, share, table.log_force(float(np.log(start)))[1]]
 
     if exact:
         return np.array([at(t) for t in slope]).T
     low, high = 0.97 * data.run_slope.min(), 1.03 * data.run_slope.max()
-    knots = np.linspace(np.log(low), np.log(high), KNOTS)
-    known = np.array([at(t) for t in np.exp(knots)])
+    knots = np.linspace(low, high, KNOTS)
+    known = np.array([at(t) for t in knots])
     found = []
-    for t in np.log(slope):
+    for t in slope:
         first = int(np.clip((t - knots[0]) // (knots[1] - knots[0]) - 1, 0, KNOTS - 4))
         here = slice(first, first + 4)
         found.append(barycentric_interpolate(knots[here], known[here], t))
@@ -215,9 +216,7 @@ def _cycles(data: CutFitData, given: CutFitParameters, table: Table, slope: Arra
 def _running(data: CutFitData, given: CutFitParameters, table: Table, exact: bool):
     q, m = data.edge_count, data.moving_blades
     slope = data.run_slope + data.run_slope_de.reshape(len(data.run_slope), q) @ given.edge
-    log_start, log_stop, share, power = _cycles(data, given, table, slope, exact)
-    start = np.exp(log_start)
-    stop = np.exp(log_stop) if given.fracture == "rippled" else start
+    start, stop, share, power = _cycles(data, given, table, slope, exact)
     middle = 0.5 * (start + stop)
     slope = slope + data.run_slope_dd * (middle - data.reference_depth)
     lever = (

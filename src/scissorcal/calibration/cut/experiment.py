@@ -1,6 +1,6 @@
 """The design of a cut's fit: segments, law and priors, to be compared with torques."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -22,12 +22,28 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class CutRung(Rung):
-    """A law of a cut over its segments: whitened, so that its terms are taken as independent."""
+    """A law of a cut over its segments: whitened, so that its terms are taken as independent.
+
+    ``log_likelihoods`` gives the likelihood over all segments at points (k, p), shape (k,).
+    """
+
+    log_likelihoods: Callable[[Array], Array] | None = None
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> ReducedProblem:
         """The posterior of this rung, over the segments that ``keep`` selects."""
+        many = self.log_likelihoods
+
+        def log_posteriors(points: Array) -> Array:
+            assert many is not None
+            away = points - self.prior_mean
+            return many(points) - 0.5 * np.einsum("ki,ij,kj->k", away, self.prior_precision, away)
+
         return replace(
-            super().problem(series, keep), standardised=None, independent=True, smooth=True
+            super().problem(series, keep),
+            standardised=None,
+            independent=True,
+            smooth=True,
+            log_posterior_many=log_posteriors if keep is None and many else None,
         )
 
 
@@ -107,7 +123,12 @@ class CutExperiment:
             found = design.evaluate(u)
             return found.standardised, -found.terms - 0.5 * found.standardised**2
 
+        def log_likelihoods(points: Array) -> Array:
+            values = design.layout.natural(points)
+            return design.likelihood.log_likelihoods(values, response_from(design.key, values))
+
         return CutRung(
+            log_likelihoods=log_likelihoods,
             name=self.name,
             key=self.key,
             layout=self.layout,

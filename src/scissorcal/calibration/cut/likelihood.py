@@ -1,7 +1,7 @@
 """The likelihood of a cut's segments, evaluated in C."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.kernel import CutFitData, CutFitParameters, cut_log_likelihood
+from scissorcal.kernel import (
+    CutFitData,
+    CutFitParameters,
+    cut_log_likelihood,
+    cut_log_likelihoods,
+)
 from scissorcal.model import Response
 
 Array = NDArray[np.float64]
@@ -19,7 +24,7 @@ GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
 """Knots of the response's table, evenly in the logarithm of the indentation from and to so many
-times the reference. A power law is exact, an exponential within 1e-8 of its value."""
+times the reference: an exponential is within 1e-8 of its value. A power law needs two."""
 
 
 class Evaluation(NamedTuple):
@@ -74,6 +79,14 @@ class CutLikelihood:
         terms = found.terms.copy()
         terms[self.elastic_count :] += share
         return found._replace(total=found.total - 0.5 * away**2, terms=terms)
+
+    def log_likelihoods(self, values: Mapping[str, Array], response: Response) -> Array:
+        """Log-likelihoods (k,) at parameters by name (k,), those of the response among them."""
+        given = self._parameters(values, response)
+        totals, periods = cut_log_likelihoods(self.data, given, len(given.log_force))
+        if self.line is not None:
+            totals -= 0.5 * ((periods - self.line.log_period) / self.line.sd) ** 2
+        return totals
 
     @cached_property
     def elastic_count(self) -> int:
@@ -223,17 +236,11 @@ class CutLikelihood:
         )
 
     def _parameters(self, values: Mapping[str, Array], response: Response) -> CutFitParameters:
-        def of(name: str, default: float) -> float:
-            return float(values.get(name, default))
-
-        belief = self.geometry.belief
-        away = [
-            of(f"edge_{name}", float(mean)) - float(mean)
-            for name, mean in zip(belief.names, belief.mean, strict=True)
-        ]
-        log_depth, log_force, slope, log_energy = response_table(
-            response, self.geometry.reference_m
-        )
+        belief, reference = self.geometry.belief, self.geometry.reference_m
+        log_depth, log_force, slope, log_energy = response_table(response, reference)
+        edge = np.zeros((len(log_force), len(belief.names)))
+        for column, (name, mean) in enumerate(zip(belief.names, belief.mean, strict=True)):
+            edge[:, column] = values.get(f"edge_{name}", mean) - mean
         return CutFitParameters(
             first=float(log_depth[0]),
             step=float(log_depth[1] - log_depth[0]),
@@ -241,37 +248,44 @@ class CutLikelihood:
             force_slope=slope,
             log_energy=log_energy,
             fracture=self.fracture,
-            energy=of("fracture_energy", 1.0),
-            kappa=of("kappa", 1.0) if self.fracture == "rippled" else 1.0,
-            rest_phase=of("rest_phase", 0.5),
-            rest_spread=of("rest_spread", 0.0),
-            variation=of("variation", 0.0),
-            variation_length=of("variation_length", 1.0),
-            sheet_variation=of("sheet_variation", 0.0),
-            offset_closing=of("offset_closing", 0.0),
-            offset_opening=of("offset_opening", 0.0),
-            load=of("load_share", 0.0),
-            noise_scale=of("noise_scale", 1.0),
-            damping=of("rate_damping", 0.0),
-            delay=of("torque_delay", 0.0),
-            edge=np.array(away),
+            energy=values.get("fracture_energy", 1.0),
+            kappa=values.get("kappa", 1.0) if self.fracture == "rippled" else 1.0,
+            rest_phase=values.get("rest_phase", 0.5),
+            rest_spread=values.get("rest_spread", 0.0),
+            variation=values.get("variation", 0.0),
+            variation_length=values.get("variation_length", 1.0),
+            sheet_variation=values.get("sheet_variation", 0.0),
+            offset_closing=values.get("offset_closing", 0.0),
+            offset_opening=values.get("offset_opening", 0.0),
+            load=values.get("load_share", 0.0),
+            noise_scale=values.get("noise_scale", 1.0),
+            damping=values.get("rate_damping", 0.0),
+            delay=values.get("torque_delay", 0.0),
+            edge=edge,
         )
 
 
 def response_table(response: Response, reference_m: float) -> tuple[Array, Array, Array, Array]:
-    """Logarithms of depth, force, d(log force)/d(log depth) and log energy at the table's knots."""
-    log_depth = np.log(reference_m) + np.linspace(
-        np.log(TABLE_SPAN[0]), np.log(TABLE_SPAN[1]), TABLE_SIZE
-    )
-    depth = np.exp(log_depth)
+    """Logarithm of depth (size,) at the table's knots, and what a response with parameters (k,) has.
+
+    Those are log force, d(log force)/d(log depth) and log energy, all (k, size); k is 1 where the
+    parameters are scalars.
+    """
+    size = 2 if response.family == "power" else TABLE_SIZE
+    log_depth = np.log(reference_m) + np.linspace(*np.log(TABLE_SPAN), size)
+    force, exponent = np.atleast_1d(response.force), np.atleast_1d(response.exponent)
     if response.family == "power":
-        exponent = float(np.asarray(response.exponent))
-        log_force = np.log(response.force) + exponent * (log_depth - np.log(reference_m))
-        slope = np.full(TABLE_SIZE, exponent)
-        return log_depth, log_force, slope, log_force + log_depth - np.log(exponent + 1.0)
-    force, energy = response.force_at(depth), response.energy_at(depth)
-    slope = response.stiffness_at(depth) * depth / force
-    return log_depth, np.log(force), np.asarray(slope), np.log(energy)
+        slope = np.repeat(exponent[:, None], size, axis=1)
+        log_force = np.log(force)[:, None] + slope * (log_depth - np.log(reference_m))
+        return log_depth, log_force, slope, log_force + log_depth - np.log(slope + 1.0)
+    depth, shapes = np.exp(log_depth), np.reshape(response.shape, (len(force), -1))
+    rows = []
+    for one_force, one_exponent, shape in zip(force, exponent, shapes, strict=True):
+        one = replace(response, force=one_force, exponent=one_exponent, shape=shape)
+        held = one.force_at(depth)
+        rows.append((np.log(held), one.stiffness_at(depth) * depth / held, one.energy_at(depth)))
+    log_force, slope, energy = (np.stack(row) for row in zip(*rows, strict=True))
+    return log_depth, log_force, slope, np.log(energy)
 
 
 def _whitener(covariance: Array) -> Array:

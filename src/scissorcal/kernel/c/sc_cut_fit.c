@@ -8,6 +8,8 @@ static const double LEAST_DEPTH = 1e-12;
 static const double LEAST_SLOPE = 1e-6;
 /* Steps of the crack's place towards its highest density are held to this share of a cycle. */
 static const double REST_REACH_M = 3e-5;
+/* A step below this is not taken: what it would gain is added, by the parabola that it comes from. */
+static const double REST_ARRIVED_M = 1e-7;
 
 void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, double slope,
                   double *start_depth, double *stop_depth, double *mean_share)
@@ -111,7 +113,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
     int32_t count = data->piece_first[data->pieces];
     double *z = work, *zx = work + count, *curvature = work + 2 * (ptrdiff_t)count;
     double *pull = curvature + data->rests, *centre = pull + data->rests;
-    double *spread = centre + data->rests;
+    double *spread = centre + data->rests, *moves = spread + data->rests;
     for (int32_t r = 0; r < data->rests; r++) {
         places[r] = data->rest_place[r];
         if (data->rest_known[r]) {
@@ -136,6 +138,7 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
         elastic_pass(data, p, places, residuals, z, zx, curvature, pull);
         double largest = 0.0;
         for (int32_t r = 0; r < data->rests; r++) {
+            moves[r] = 0.0;
             if (data->rest_known[r] && data->known_sd <= 0.0) continue;
             double weight = 1.0 / (spread[r] * spread[r]);
             curvature[r] += weight;
@@ -143,10 +146,11 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             double move = -pull[r] / curvature[r];
             if (move > REST_REACH_M) move = REST_REACH_M;
             if (move < -REST_REACH_M) move = -REST_REACH_M;
+            moves[r] = move;
             if (fabs(move) > largest) largest = fabs(move);
-            if (step < SC_CUT_REST_STEPS) places[r] += move;
         }
-        if (step >= SC_CUT_REST_STEPS || largest < 1e-10) break;
+        if (step >= SC_CUT_REST_STEPS || largest < REST_ARRIVED_M) break;
+        for (int32_t r = 0; r < data->rests; r++) places[r] += moves[r];
     }
     double sum = 0.0, log_scale = log(p->noise_scale);
     for (int32_t i = 0; i < data->pieces; i++) {
@@ -168,106 +172,109 @@ static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, doubl
         if (!first || (data->rest_known[rest] && data->known_sd <= 0.0)) continue;
         double away = (places[rest] - centre[rest]) / spread[rest];
         double added = -0.5 * away * away - log(spread[rest]) - 0.5 * log(curvature[rest]);
+        if (fabs(moves[rest]) < REST_ARRIVED_M) added -= 0.5 * moves[rest] * pull[rest];
         terms[data->piece_first[i]] += added;
         sum += added;
     }
     return sum;
 }
 
-/* Means and covariance of (unevenness, sheet, work at the segment's start, at its end). */
+/* Means and covariances of unevenness (0), the sheet's share (1) and the work's error at the place
+ * where the next segment starts (2). */
 typedef struct {
-    double mean[4];
-    double cov[4][4];
+    double mean[3];
+    double var[3];
+    double cov01, cov02, cov12;
 } filter;
-
-static void forget(filter *f, int32_t index, double variance)
-{
-    for (int32_t j = 0; j < 4; j++) f->cov[index][j] = f->cov[j][index] = 0.0;
-    f->mean[index] = 0.0;
-    f->cov[index][index] = variance;
-}
 
 static void decay(filter *f, double keep)
 {
     f->mean[0] *= keep;
-    for (int32_t j = 1; j < 4; j++) f->cov[0][j] = f->cov[j][0] = keep * f->cov[0][j];
-    f->cov[0][0] = keep * keep * f->cov[0][0] + (1.0 - keep * keep);
+    f->cov01 *= keep;
+    f->cov02 *= keep;
+    f->var[0] = keep * keep * f->var[0] + (1.0 - keep * keep);
 }
 
-/* Move the work at the end to the place of the work at the start. */
-static void step_on(filter *f)
+static void forget_work(filter *f, double variance)
 {
-    f->mean[2] = f->mean[3];
-    for (int32_t j = 0; j < 2; j++) f->cov[2][j] = f->cov[j][2] = f->cov[3][j];
-    f->cov[2][2] = f->cov[3][3];
+    f->mean[2] = f->cov02 = f->cov12 = 0.0;
+    f->var[2] = variance;
 }
 
-static double observe(filter *f, const double *row, double residual, double noise,
-                      double *standard)
+/* Update by a residual = torque * (variation * unevenness + sheet) + (end - start) / step + noise.
+ * The work's error at the end has variance `end` and is independent of all before; afterwards it is
+ * that of the next segment's start. */
+static double observe(filter *f, double variation, double torque, double step, double end,
+                      double noise, double residual, double *standard)
 {
-    double gain[4], variance = noise, innovation = residual;
-    for (int32_t i = 0; i < 4; i++) {
-        gain[i] = 0.0;
-        for (int32_t j = 0; j < 4; j++) gain[i] += f->cov[i][j] * row[j];
-        innovation -= row[i] * f->mean[i];
-    }
-    for (int32_t i = 0; i < 4; i++) variance += row[i] * gain[i];
+    double each = 1.0 / step, by_uneven = variation * torque;
+    double gain0 = f->var[0] * by_uneven + f->cov01 * torque - f->cov02 * each;
+    double gain1 = f->cov01 * by_uneven + f->var[1] * torque - f->cov12 * each;
+    double gain2 = f->cov02 * by_uneven + f->cov12 * torque - f->var[2] * each;
+    double gain3 = end * each;
+    double variance = noise + by_uneven * gain0 + torque * gain1 - each * gain2 + each * gain3;
+    double innovation =
+        residual - by_uneven * f->mean[0] - torque * f->mean[1] + each * f->mean[2];
     double inverse = 1.0 / variance, weight = innovation * inverse;
-    for (int32_t i = 0; i < 4; i++) {
-        double share = gain[i] * inverse;
-        f->mean[i] += gain[i] * weight;
-        for (int32_t j = i; j < 4; j++) f->cov[j][i] = f->cov[i][j] -= share * gain[j];
-    }
+    f->mean[0] += gain0 * weight;
+    f->mean[1] += gain1 * weight;
+    f->mean[2] = gain3 * weight;
+    f->var[0] -= gain0 * gain0 * inverse;
+    f->var[1] -= gain1 * gain1 * inverse;
+    f->cov01 -= gain0 * gain1 * inverse;
+    f->var[2] = end - gain3 * gain3 * inverse;
+    f->cov02 = -gain0 * gain3 * inverse;
+    f->cov12 = -gain1 * gain3 * inverse;
     *standard = innovation * sqrt(inverse);
-    return -0.5 * *standard * *standard - 0.5 * log(variance);
+    return -0.5 * innovation * weight - 0.5 * log(variance);
 }
 
-/* What a cycle is at slopes between two, by cubic interpolation in the slope's logarithm. */
-enum { CYCLE_KNOTS = 13 };
+/* What a cycle is at slopes between two, by cubic interpolation in the slope. */
+enum { CYCLE_KNOTS = 21 };
 
 typedef struct {
-    double first, step;
-    double log_start[CYCLE_KNOTS], log_stop[CYCLE_KNOTS], share[CYCLE_KNOTS], power[CYCLE_KNOTS];
+    double start, stop, share, power;
+} cycle;
+
+typedef struct {
+    double first, per_step;
+    cycle at[CYCLE_KNOTS];
 } cycle_table;
 
 static void fill_cycles(cycle_table *table, const sc_cut_parameters *p, double blades, double low,
                         double high)
 {
-    table->first = log(low);
-    table->step = (log(high) - table->first) / (double)(CYCLE_KNOTS - 1);
+    double step = (high - low) / (double)(CYCLE_KNOTS - 1);
+    table->first = low;
+    table->per_step = 1.0 / step;
     for (int32_t i = 0; i < CYCLE_KNOTS; i++) {
-        double start, stop, slope = exp(table->first + table->step * (double)i);
-        sc_cut_cycle(p, blades, slope, &start, &stop, &table->share[i]);
-        table->log_start[i] = log(start);
-        table->log_stop[i] = log(stop);
-        sc_response_log_force(&p->response, table->log_start[i], &table->power[i]);
+        cycle *c = &table->at[i];
+        sc_cut_cycle(p, blades, low + step * (double)i, &c->start, &c->stop, &c->share);
+        sc_response_log_force(&p->response, log(c->start), &c->power);
     }
 }
 
-static double between(const double *knots, int32_t low, const double *weight)
+static cycle cycle_at(const cycle_table *table, double slope)
 {
-    return weight[0] * knots[low] + weight[1] * knots[low + 1] + weight[2] * knots[low + 2] +
-           weight[3] * knots[low + 3];
-}
-
-static int32_t cycle_at(const cycle_table *table, double slope, double *weight)
-{
-    double place = (log(slope > LEAST_SLOPE ? slope : LEAST_SLOPE) - table->first) / table->step;
-    int32_t low = (int32_t)floor(place) - 1;
-    if (low < 0) low = 0;
+    double place = (slope - table->first) * table->per_step;
+    int32_t low = place > 1.0 ? (int32_t)place - 1 : 0;
     if (low > CYCLE_KNOTS - 4) low = CYCLE_KNOTS - 4;
     double t = place - (double)low;
-    weight[0] = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0;
-    weight[1] = t * (t - 2.0) * (t - 3.0) / 2.0;
-    weight[2] = -t * (t - 1.0) * (t - 3.0) / 2.0;
-    weight[3] = t * (t - 1.0) * (t - 2.0) / 6.0;
-    return low;
+    double a = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0, b = t * (t - 2.0) * (t - 3.0) / 2.0;
+    double c = -t * (t - 1.0) * (t - 3.0) / 2.0, d = t * (t - 1.0) * (t - 2.0) / 6.0;
+    const cycle *at = &table->at[low];
+    cycle found = {a * at[0].start + b * at[1].start + c * at[2].start + d * at[3].start,
+                   a * at[0].stop + b * at[1].stop + c * at[2].stop + d * at[3].stop,
+                   a * at[0].share + b * at[1].share + c * at[2].share + d * at[3].share,
+                   a * at[0].power + b * at[1].power + c * at[2].power + d * at[3].power};
+    return found;
 }
 
 static double running(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
                       double *residuals, double *scaled, double *line_log_period)
 {
     double sum = 0.0, line = 0.0, blades = data->moving_blades;
+    double per_length = 1.0 / p->variation_length;
     int32_t count = data->run_first[data->sheets];
     double lowest = HUGE_VAL, highest = 0.0;
     for (int32_t k = 0; k < count; k++) {
@@ -278,48 +285,39 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
     lowest = 0.97 * (lowest > LEAST_SLOPE ? lowest : LEAST_SLOPE);
     fill_cycles(&cycles, p, blades, lowest, 1.03 * (highest > lowest ? highest : 2.0 * lowest));
     for (int32_t sheet = 0; sheet < data->sheets; sheet++) {
-        filter f;
-        for (int32_t i = 0; i < 4; i++) forget(&f, i, 0.0);
-        f.cov[0][0] = 1.0;
-        f.cov[1][1] = p->sheet_variation * p->sheet_variation;
+        filter f = {{0.0, 0.0, 0.0},
+                    {1.0, p->sheet_variation * p->sheet_variation, 0.0},
+                    0.0,
+                    0.0,
+                    0.0};
         for (int32_t k = data->run_first[sheet]; k < data->run_first[sheet + 1]; k++) {
             const double *le = data->run_lever_de + (ptrdiff_t)k * data->edge_count;
             const double *se = data->run_slope_de + (ptrdiff_t)k * data->edge_count;
-            double by_edge = departure(se, p->edge, data->edge_count);
-            double weight[4], slope = data->run_slope[k] + by_edge;
-            int32_t at = cycle_at(&cycles, slope, weight);
-            double start = exp(between(cycles.log_start, at, weight)), stop = start;
-            if (p->fracture == SC_CUT_RIPPLED) stop = exp(between(cycles.log_stop, at, weight));
-            double away = 0.5 * (start + stop) - data->reference_depth;
+            double slope = data->run_slope[k] + departure(se, p->edge, data->edge_count);
+            cycle c = cycle_at(&cycles, slope > LEAST_SLOPE ? slope : LEAST_SLOPE);
+            double middle = 0.5 * (c.start + c.stop), away = middle - data->reference_depth;
             slope += data->run_slope_dd[k] * away;
-            double share = between(cycles.share, at, weight);
             double lever = data->run_lever[k] + data->run_lever_dd[k] * away +
                            departure(le, p->edge, data->edge_count);
             double peak = p->energy * lever / (blades * slope) *
                           damped(p->damping, data->run_sinking[k]);
-            double torque = (1.0 - p->load * data->run_direction[k]) * share * peak;
-            double period = 0.0;
-            if (p->fracture == SC_CUT_RIPPLED) {
-                double power = between(cycles.power, at, weight);
-                double turn = 0.5 * (start + stop) * (1.0 + slope * slope) / (power * slope);
-                period = blades * (start - stop) / (lever - turn);
-                if (data->line_weight[k] > 0.0)
-                    line += data->line_weight[k] * log(period > TINY ? period : TINY);
+            double torque = (1.0 - p->load * data->run_direction[k]) * c.share * peak;
+            if (data->line_weight[k] > 0.0 && p->fracture == SC_CUT_RIPPLED) {
+                double turn = middle * (1.0 + slope * slope) / (c.power * slope);
+                double period = blades * (c.start - c.stop) / (lever - turn);
+                line += data->line_weight[k] * log(period > TINY ? period : TINY);
             }
-            int fresh = k == data->run_first[sheet] || !data->joined[k];
             if (k > data->run_first[sheet]) {
                 double gone = fabs(data->run_place[k] - data->run_place[k - 1]);
-                decay(&f, exp(-gone / p->variation_length));
+                decay(&f, exp(-gone * per_length));
             }
-            if (fresh) forget(&f, 2, data->start_noise[k]);
-            else step_on(&f);
-            forget(&f, 3, data->end_noise[k]);
-            double each = 1.0 / data->run_step[k];
-            double row[4] = {p->variation * torque, torque, -each, each};
+            if (k == data->run_first[sheet] || !data->joined[k])
+                forget_work(&f, data->start_noise[k]);
             residuals[k] = data->run_torque[k] - p->delay * data->run_late[k] - torque -
                            p->offset_closing;
             double standard;
-            terms[k] = observe(&f, row, residuals[k], data->run_noise[k], &standard);
+            terms[k] = observe(&f, p->variation, torque, data->run_step[k], data->end_noise[k],
+                               data->run_noise[k], residuals[k], &standard);
             if (scaled) scaled[k] = standard;
             sum += terms[k];
         }
@@ -339,4 +337,15 @@ double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *p
         sum += running(data, parameters, terms + count, residuals + count,
                        scaled ? scaled + count : NULL, line_log_period);
     return isfinite(sum) && isfinite(*line_log_period) ? sum : -HUGE_VAL;
+}
+
+void sc_cut_log_likelihoods(const sc_cut_data *data, const sc_cut_parameters *points,
+                            int32_t count, double *totals, double *line_log_periods, double *work)
+{
+    ptrdiff_t elastic_count = data->piece_first[data->pieces];
+    ptrdiff_t every = elastic_count + data->run_first[data->sheets];
+    double *terms = work, *residuals = terms + every, *places = residuals + every;
+    for (int32_t i = 0; i < count; i++)
+        totals[i] = sc_cut_log_likelihood(data, &points[i], terms, residuals, NULL, places,
+                                          &line_log_periods[i], places + data->rests);
 }
