@@ -28,7 +28,7 @@ def ljung_box(residuals: Array, series: Labels, lags: int = 20) -> Whiteness:
 
     Ljung and Box 1978, doi:10.1093/biomet/65.2.297.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     r = residuals - residuals.mean()
     total = float(r @ r)
@@ -46,7 +46,7 @@ def ljung_box(residuals: Array, series: Labels, lags: int = 20) -> Whiteness:
         summed += pair
         lag += 2
     share = float(np.clip(1.0 / (1.0 + 2.0 * summed), 1.0 / n, 1.0))
-    return Whiteness(float(chi2.sf(statistic, lags)), share, float(correlations[0]))
+    return Whiteness(float(chdtrc(lags, statistic)), share, float(correlations[0]))
 
 
 def robust_covariance_of_scores(scores: Array, series: Labels) -> Array:

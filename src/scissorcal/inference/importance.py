@@ -1,7 +1,7 @@
 """Importance sampling around optima, Pareto-smoothed, with its own check."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,8 @@ WIDER = 1.5
 class Sampled:
     """Draws (n, p) with smoothed normalised weights (n,), tail index and effective sample size.
 
-    ``limit`` is the k-hat below which the weights can be trusted.
+    ``limit`` is the k-hat below which the weights can be trusted, ``log_ratio`` (n,) the logarithm
+    of the weights as they were drawn.
     """
 
     draws: Array
@@ -45,6 +46,7 @@ class Sampled:
     effective: float
     evaluations: int
     limit: float = K_HAT_LIMIT
+    log_ratio: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
     @property
     def trusted(self) -> bool:
@@ -70,15 +72,25 @@ def sample_by_importance(
 
     ``many`` gives the log-posterior of draws (n, p) at once, shape (n,), where that is cheaper.
     Draws come from a mixture of multivariate Student-t (7 degrees of freedom), one for each known
-    optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat exceeds 0.5
-    the proposal is moved to the mean and covariance of the weighted draws, ``rounds`` times at
-    most, and kept where that served. Many parameters take more rounds, since a covariance is
-    learnt from few effective draws at first: four and one for every four of them if not given.
+    optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat lies between
+    0.5 and 0.7 as many draws are added first: of 2,000 draws k-hat has an error of 0.1. Where it
+    still exceeds 0.5 the proposal is moved to the mean and covariance of the weighted draws,
+    ``rounds`` times at most, and kept where that served. Many parameters take more rounds, since a
+    covariance is learnt from few effective draws at first: four and one for every four of them if
+    not given.
     """
     rounds = 4 + proposal.centres.shape[1] // 4 if rounds is None else rounds
     log_posteriors = many or _one_by_one(log_posterior)
     first = _once(log_posteriors, proposal, count, rng)
-    if first.k_hat <= GOOD_K or rounds < 2:
+    if rounds < 2:
+        return first
+    if GOOD_K < first.k_hat <= K_HAT_LIMIT:
+        more = _once(log_posteriors, proposal, count, rng)
+        first = _weigh(
+            np.concatenate([first.draws, more.draws]),
+            np.concatenate([first.log_ratio, more.log_ratio]),
+        )
+    if first.k_hat <= GOOD_K:
         return first
     components = len(proposal.weights)
 
@@ -158,9 +170,11 @@ def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Ge
 def _weigh(draws: Array, log_ratio: Array) -> Sampled:
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:
-        return Sampled(draws, np.full(len(draws), 1 / len(draws)), np.inf, 0.0, len(draws))
+        even = np.full(len(draws), 1 / len(draws))
+        return Sampled(draws, even, np.inf, 0.0, len(draws), log_ratio=log_ratio)
     smoothed, k_hat = smooth_weights(log_ratio[usable])
     weights = np.zeros(len(draws))
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()
-    return Sampled(draws, weights, float(k_hat), float(1.0 / np.sum(weights**2)), len(draws))
+    effective = float(1.0 / np.sum(weights**2))
+    return Sampled(draws, weights, float(k_hat), effective, len(draws), log_ratio=log_ratio)

@@ -164,6 +164,18 @@ def cut_log_likelihoods(
 
 
 _TABLES = ("log_force", "force_slope", "log_energy")
+_NUMBERS = tuple(
+    entry.name
+    for entry in fields(CutFitParameters)
+    if entry.name not in ("first", "step", "fracture", "edge", *_TABLES)
+)
+
+
+def _each(value: float | Array, count: int) -> list[float]:
+    """One number for each point, of one for all or of (count,)."""
+    if isinstance(value, float) or value.ndim == 0:
+        return [float(value)] * count
+    return value.tolist()  # type: ignore[no-any-return]
 
 
 def _structs(given: CutFitParameters, count: int) -> tuple[Any, list[Any]]:
@@ -175,11 +187,7 @@ def _structs(given: CutFitParameters, count: int) -> tuple[Any, list[Any]]:
     }
     buffers = {name: ffi.from_buffer("double[]", array) for name, array in arrays.items()}
     strides = {name: a.shape[1] if len(a) > 1 else 0 for name, a in arrays.items()}
-    numbers = {
-        entry.name: np.broadcast_to(getattr(given, entry.name), count).tolist()
-        for entry in fields(given)
-        if entry.name not in ("first", "step", "fracture", *arrays)
-    }
+    numbers = {name: _each(getattr(given, name), count) for name in _NUMBERS}
     fracture, size = _FRACTURE[given.fracture], arrays["log_force"].shape[1]
     for index in range(count):
         struct = structs[index]

@@ -7,6 +7,7 @@ read off the signal: it is the ratio of the true period to the one that the para
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SUBDIVISIONS = 32
+HALF_CYCLE = SUBDIVISIONS // 2
 WINDOW_CYCLES = 5
 """Hann windows of so many cycles; their phases are compared one whole window apart, so that they
 share no sample and what is not periodic adds nothing on average."""
@@ -53,6 +55,11 @@ class PhaseSignal:
     stroke_speed: float
     phase: Array
     torque: Array
+
+    @cached_property
+    def weight(self) -> Array:
+        """What each sample adds to an integral of torque over the phase (n,)."""
+        return np.asarray((self.torque - np.mean(self.torque)) * np.gradient(self.phase))
 
 
 @dataclass(frozen=True)
@@ -187,22 +194,32 @@ def _windows(signal: PhaseSignal, frequency: float) -> Complex | None:
     if _ticks_per_cycle(signal) / frequency < LEAST_TICKS:
         return None
     phase = signal.phase * frequency
-    count = int(phase[-1] * SUBDIVISIONS)
-    size = WINDOW_CYCLES * SUBDIVISIONS
-    if count < 2 * size + SUBDIVISIONS:
+    blocks = int(phase[-1] * SUBDIVISIONS) // HALF_CYCLE
+    count, across = blocks * HALF_CYCLE, 2 * WINDOW_CYCLES
+    if blocks < 2 * across + 2:
         return None
     index = np.floor(phase * SUBDIVISIONS).astype(np.int64)
     inside = (index >= 0) & (index < count)
-    weight = (signal.torque - np.mean(signal.torque)) * np.gradient(phase)
-    even = np.bincount(index[inside], weight[inside], count)
-    turning = np.exp(-2j * np.pi * (np.arange(count) + 0.5) / SUBDIVISIONS)
-    hann = np.hanning(size + 1)[:-1]
+    even = np.bincount(index[inside], signal.weight[inside], count) * frequency
+    products = even.reshape(blocks, HALF_CYCLE) @ _WINDOW
+    last = blocks - across + 1
+    rows = sum(products[block : block + last, block] for block in range(across))
+    return np.asarray(rows * (-1.0) ** np.arange(last))
+
+
+def _window() -> Complex:
+    """One cycle's Fourier weights under a Hann window, blind to a mean and a slope.
+
+    Shape (half a cycle, half cycles), so that windows half a cycle apart share products.
+    """
+    size = WINDOW_CYCLES * SUBDIVISIONS
     ramp = (np.arange(size) - 0.5 * (size - 1)) / size
-    rows = np.lib.stride_tricks.sliding_window_view(even, size)[:: SUBDIVISIONS // 2]
-    slope = rows @ ramp / float(ramp @ ramp)
-    flat = rows - rows.mean(axis=1, keepdims=True) - slope[:, None] * ramp
-    first = np.arange(len(rows)) * (SUBDIVISIONS // 2)
-    return np.asarray((flat * hann) @ turning[:size] * turning[first] / turning[0])
+    weights = np.hanning(size + 1)[:-1] * np.exp(-2j * np.pi * np.arange(size) / SUBDIVISIONS)
+    weights = weights - weights.mean() - ramp * (ramp @ weights) / (ramp @ ramp)
+    return np.asarray(weights.reshape(-1, HALF_CYCLE).T)
+
+
+_WINDOW = _window()
 
 
 def _pairs(signal: PhaseSignal, frequency: float) -> Complex | None:
