@@ -14,6 +14,7 @@ from scissorcal.calibration.cut.structure import response_from
 from scissorcal.calibration.friction_search import ReducedProblem
 from scissorcal.calibration.ladder import SEARCH_REACH, Likelihood, Rung
 from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.path import mean_advance
 from scissorcal.calibration.signals.filtering import Bins
 
 Array = NDArray[np.float64]
@@ -36,7 +37,8 @@ class CutRung(Rung):
         def log_posteriors(points: Array) -> Array:
             assert many is not None
             away = points - self.prior_mean
-            return many(points) - 0.5 * np.einsum("ki,ij,kj->k", away, self.prior_precision, away)
+            prior = -0.5 * np.einsum("ki,ij,kj->k", away, self.prior_precision, away)
+            return np.asarray(many(points) + prior)
 
         return replace(
             super().problem(series, keep),
@@ -149,14 +151,13 @@ class CutExperiment:
         for number, (index, ends, sheet) in enumerate(parts):
             motion = segments.motions[index]
             low, high = ends[:-1], ends[1:]
-            total = np.concatenate([[0.0], np.cumsum(motion.advance)])
             stroke = _most(motion.stroke[low[0] : high[-1]])
             rows.append(
                 {
                     "time_s": 0.5 * (motion.time_s[low] + motion.time_s[high]),
                     "opening": 0.5 * (motion.opening[low] + motion.opening[high]),
                     "rate": np.diff(motion.opening[ends]) / ((high - low) * motion.tick_s),
-                    "advance": (total[high] - total[low]) / (high - low),
+                    "advance": mean_advance(motion, ends),
                     "series": np.full(len(low), number),
                     "recording": np.full(len(low), motion.recording),
                     "stroke": np.full(len(low), stroke),

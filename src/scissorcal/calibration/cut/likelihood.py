@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.segments import Segments
+from scissorcal.calibration.path import mean_advance
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,
@@ -127,8 +128,7 @@ class CutLikelihood:
             motion = segments.motions[piece.motion]
             middle = 0.5 * (motion.opening[high] + motion.opening[low])
             half = 0.5 * (motion.opening[high] - motion.opening[low])
-            total = np.concatenate([[0.0], np.cumsum(motion.advance)])
-            advance = (total[high] - total[low]) / (high - low)
+            advance = mean_advance(motion, piece.ends)
             opening.append(middle[:, None] + half[:, None] * GAUSS)
             place = segments.rests[piece.rest].place
             contact.append(np.repeat((place - advance)[:, None], 2, axis=1))
@@ -181,12 +181,10 @@ class CutLikelihood:
             motion = segments.motions[run.motion]
             low, high = run.ends[:-1], run.ends[1:]
             middle = 0.5 * (motion.opening[high] + motion.opening[low])
-            total = np.concatenate([[0.0], np.cumsum(motion.advance)])
             opening.append(middle)
             rate.append(np.diff(motion.opening[run.ends]) / ((high - low) * motion.tick_s))
             place.append(
-                geometry.place(middle, geometry.reference_m)
-                + (total[high] - total[low]) / (high - low)
+                geometry.place(middle, geometry.reference_m) + mean_advance(motion, run.ends)
             )
             energy = (motion.inertia * motion.rate[run.ends] * motion.rate_sd) ** 2
             energy = energy + run.tooth_sd**2
@@ -266,13 +264,15 @@ class CutLikelihood:
 
 
 def response_table(response: Response, reference_m: float) -> tuple[Array, Array, Array, Array]:
-    """Logarithm of depth (size,) at the table's knots, and what a response with parameters (k,) has.
+    """Log depth (size,) at the table's knots, and what a response with parameters (k,) has there.
 
     Those are log force, d(log force)/d(log depth) and log energy, all (k, size); k is 1 where the
     parameters are scalars.
     """
     size = 2 if response.family == "power" else TABLE_SIZE
-    log_depth = np.log(reference_m) + np.linspace(*np.log(TABLE_SPAN), size)
+    log_depth = np.log(reference_m) + np.linspace(
+        np.log(TABLE_SPAN[0]), np.log(TABLE_SPAN[1]), size
+    )
     force, exponent = np.atleast_1d(response.force), np.atleast_1d(response.exponent)
     if response.family == "power":
         slope = np.repeat(exponent[:, None], size, axis=1)

@@ -17,6 +17,7 @@ from scissorcal.calibration.path import (
     Material,
     PathMotion,
     mean_torque,
+    sums_between,
     torque_covariance,
     turning_points,
 )
@@ -361,12 +362,13 @@ def mean_direction(
 
     With ``by_torque`` also by the material's torque: blades that swing back do so while it is high.
     """
-    step = np.diff(motion.opening)
+    low, high = int(ends[0]), int(ends[-1])
+    step = np.diff(motion.opening[low : high + 1])
     if by_torque:
-        step = step * 0.5 * (material.torque[1:] + material.torque[:-1])
-    total = np.concatenate([[0.0], np.cumsum(step)])
-    signed = np.concatenate([[0.0], np.cumsum(step * material.direction)])
-    return np.clip(np.diff(signed[ends]) / np.diff(total[ends]), -1.0, 1.0)
+        torque = material.torque[low : high + 1]
+        step = step * 0.5 * (torque[1:] + torque[:-1])
+    signed = sums_between(step * material.direction[low:high], ends - low)
+    return np.clip(signed / sums_between(step, ends - low), -1.0, 1.0)
 
 
 def sledge_share(motion: PathMotion, geometry: Geometry, low: int, high: int) -> Array:

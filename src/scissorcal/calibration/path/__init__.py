@@ -4,7 +4,9 @@ from scissorcal.calibration.path.motion import PathMotion, path_motion, turning_
 from scissorcal.calibration.path.work import (
     Material,
     material_of,
+    mean_advance,
     mean_torque,
+    sums_between,
     torque_covariance,
     torque_noise_of,
 )
@@ -13,8 +15,10 @@ __all__ = [
     "Material",
     "PathMotion",
     "material_of",
+    "mean_advance",
     "mean_torque",
     "path_motion",
+    "sums_between",
     "torque_covariance",
     "torque_noise_of",
     "turning_points",

@@ -78,8 +78,20 @@ def material_of(
 def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:
     """Mean torque (k,) between samples ``ends`` (k + 1,), and what one tick of delay adds to it."""
     path = np.diff(motion.opening[ends])
-    late = np.concatenate([[0.0], np.cumsum(motion.drive_step[:-1] * np.diff(motion.opening))])
-    return np.diff(work[ends]) / path, np.diff(late[ends]) / path
+    span = slice(int(ends[0]), int(ends[-1]))
+    late = motion.drive_step[span] * np.diff(motion.opening[span.start : span.stop + 1])
+    return np.diff(work[ends]) / path, sums_between(late, ends - ends[0]) / path
+
+
+def mean_advance(motion: PathMotion, ends: Integers) -> Array:
+    """Mean advance (k,) in m between samples ``ends`` (k + 1,)."""
+    span = slice(int(ends[0]), int(ends[-1]))
+    return sums_between(motion.advance[span], ends - ends[0]) / np.diff(ends)
+
+
+def sums_between(values: Array, ends: Integers) -> Array:
+    """Sums (k,) of values from each of the samples ``ends`` (k + 1,) up to the next."""
+    return np.asarray(np.add.reduceat(values[: ends[-1]], ends[:-1]))
 
 
 def torque_covariance(
