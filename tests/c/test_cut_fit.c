@@ -144,7 +144,7 @@ static void check_case(const json *one, double tolerance)
     const size_t rests = (size_t)data.rests;
     double *terms = room(count * sizeof *terms), *residuals = room(count * sizeof *residuals);
     double *scaled = room(count * sizeof *scaled), *places = room(rests * sizeof *places);
-    double *work = room((2 * elastic + 5 * rests) * sizeof *work), period;
+    double *work = room(2 * elastic * sizeof *work), period;
     for (size_t i = 0; i < count; i++) terms[i] = residuals[i] = scaled[i] = 0.0;
     double total = sc_cut_log_likelihood(&data, &given, terms, residuals, scaled, places, &period,
                                          work);

@@ -133,7 +133,7 @@ def cut_log_likelihood(
     structs, keep = _structs(parameters, 1)
     count, rests = data.segments, len(data.rest_place)
     terms, residuals, scaled = (np.zeros(count) for _ in range(3))
-    places, work = np.zeros(max(rests, 1)), np.zeros(2 * len(data.torque) + 5 * rests + 1)
+    places, work = np.zeros(max(rests, 1)), np.zeros(2 * len(data.torque) + 1)
     period = ffi.new("double *")
     total = lib.sc_cut_log_likelihood(
         data._c[0],
@@ -152,7 +152,7 @@ def cut_log_likelihoods(
     """Totals and log periods of ``count`` points, both (count,)."""
     structs, keep = _structs(parameters, count)
     totals, periods = np.zeros(count), np.zeros(count)
-    work = np.zeros(2 * data.segments + 2 * len(data.torque) + 6 * len(data.rest_place) + 1)
+    work = np.zeros(2 * data.segments + 2 * len(data.torque) + len(data.rest_place) + 1)
     lib.sc_cut_log_likelihoods(
         data._c[0],
         structs,

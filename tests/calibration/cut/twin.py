@@ -16,7 +16,7 @@ from scissorcal.kernel import CutFitData, CutFitParameters
 
 Array = NDArray[np.float64]
 
-REST_STEPS, REST_REACH_M, ARRIVED_M = 8, 3e-5, 1e-7
+REST_STEPS, REST_REACH_M, ARRIVED_M = 30, 3e-5, 1e-7
 KNOTS = 21
 FLOOR_M = 2e-6
 
@@ -169,28 +169,51 @@ def _elastic(data: CutFitData, given: CutFitParameters, table: Table):
     centre, spread = beliefs(data, given, table)
     held = (data.rest_known == 1) & (data.known_sd <= 0.0)
     places = np.where(data.rest_known == 1, 0.0, data.rest_place)
-    belongs = rest[:, None] == np.arange(len(places))
-    for step in range(REST_STEPS + 1):
-        torque, slope = _held_torque(data, given, table, (places - data.rest_place)[rest])
-        residuals = data.torque - given.delay * data.late - gain * torque - offset
-        z = white @ residuals / given.noise_scale
-        zx = white @ (-gain * slope) / given.noise_scale
-        with np.errstate(divide="ignore", invalid="ignore"):
-            curvature = belongs.T @ zx**2 + np.where(held, 0.0, spread**-2.0)
-            pull = belongs.T @ (z * zx) + np.where(held, 0.0, (places - centre) * spread**-2.0)
-        move = np.where(held, 0.0, np.clip(-pull / curvature, -REST_REACH_M, REST_REACH_M))
-        if step == REST_STEPS or np.abs(move).max(initial=0.0) < ARRIVED_M:
-            break
-        places = places + move
-    gained = np.where(np.abs(move) < ARRIVED_M, -0.5 * move * pull, 0.0)
-    terms = -0.5 * z**2 + np.log(np.diag(white)) - np.log(given.noise_scale)
-    for r in np.flatnonzero(~held):
-        if r in data.piece_rest:
-            first = data.piece_first[np.flatnonzero(data.piece_rest == r)[0]]
-            away = (places[r] - centre[r]) / spread[r]
-            terms[first] += -0.5 * away**2 - np.log(spread[r]) - 0.5 * np.log(curvature[r])
-            terms[first] += gained[r]
-    return terms, residuals, z, places
+    terms = np.log(np.diag(white)) - np.log(given.noise_scale)
+    residuals, z = np.zeros(count), np.zeros(count)
+
+    def seen(r: int, place: float):
+        """Half the squares, pull and curvature at a place, with residuals and their whitened."""
+        moved = np.where(rest == r, place - data.rest_place[rest], 0.0)
+        torque, slope = _held_torque(data, given, table, moved)
+        left = np.where(
+            rest == r, data.torque - given.delay * data.late - gain * torque - offset, 0
+        )
+        scaled = white @ left / given.noise_scale
+        by_place = white @ np.where(rest == r, -gain * slope, 0.0) / given.noise_scale
+        weight = 0.0 if held[r] else spread[r] ** -2.0
+        away = place - centre[r]
+        return (
+            0.5 * scaled @ scaled + 0.5 * weight * away**2,
+            by_place @ scaled + weight * away,
+            by_place @ by_place + weight,
+            left,
+            scaled,
+        )
+
+    for r in range(len(places)):
+        now = seen(r, places[r])
+        extra = 0.0
+        for _ in range(0 if held[r] else REST_STEPS):
+            move = -now[1] / now[2]
+            if abs(move) < ARRIVED_M:
+                extra = -0.5 * move * now[1]
+                break
+            move = float(np.clip(move, -REST_REACH_M, REST_REACH_M))
+            after = seen(r, places[r] + move)
+            while not after[0] <= now[0] and abs(move) >= ARRIVED_M:
+                move *= 0.25
+                after = seen(r, places[r] + move)
+            places[r] += move
+            now = after
+        residuals += now[3]
+        z += now[4]
+        if held[r] or r not in data.piece_rest:
+            continue
+        first = data.piece_first[np.flatnonzero(data.piece_rest == r)[0]]
+        away = (places[r] - centre[r]) / spread[r]
+        terms[first] += -0.5 * away**2 - np.log(spread[r]) - 0.5 * np.log(now[2]) + extra
+    return terms - 0.5 * z**2, residuals, z, places
 
 
 def _cycles(data: CutFitData, given: CutFitParameters, table: Table, slope: Array, exact: bool):

@@ -8,6 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.cut.averaging import (
+    Candidate,
+    Inferred,
+    average,
+    by_load,
+    load_note,
+)
 from scissorcal.calibration.cut.checks import cut_verdicts, line_notes
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.geometry import Geometry
@@ -85,28 +92,20 @@ def fit_cut(
     tell(0.05, "cut: finding where cracks wait and run")
     scouted = _scouted(motions, known, recipe, geometry, laws, recordings)
     climbed = _climb(scouted, geometry, recipe, laws, known, tell, stop)
-    chosen = choose([one for one, _ in climbed])
-    design = next(d for c, d in climbed if c.rung.name == chosen.rung.name)
-    tell(0.5, f"cut: inferring {chosen.rung.name}")
-    posterior = infer(
-        chosen.rung.problem(design.series),
-        effort,
-        rng,
-        count=DRAWS,
-        optimum=chosen.optimum,
-        budget=STANDARD_BUDGET if effort == "standard" else None,
-        checkpoint=checkpoint,
-        stop=stop,
-        progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
-    )
+    candidates = by_load(choose([one for one, _ in climbed]), climbed)
+
+    def infer_one(candidate: Candidate) -> Inferred:
+        tell(0.5, f"cut: inferring {candidate.climbed.rung.name}")
+        first = candidate is candidates[0]
+        return _infer(candidate, recipe, effort, rng, tell, checkpoint if first else None, stop)
+
+    inferred = average(candidates, infer_one)
+    chosen, design = inferred.candidate.climbed, inferred.candidate.design
     u = chosen.optimum.point
-    share = 0.01 * recipe.fit.cut.lack_of_fit_percent
-    budget = budget_of(design, u, posterior.covariance, share)
-    posterior = replace(posterior, draws=budget.widen(posterior.draws, rng))
     fit = assemble(
         what="cut",
         effort=effort,
-        posterior=posterior,
+        posterior=inferred.posterior,
         climbed=[one for one, _ in climbed],
         chosen=chosen,
         structure=design.key,
@@ -129,11 +128,38 @@ def fit_cut(
         extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, sensors),
         extra_notes=(
             *sensors.notes,
-            *line_notes(scouted, design, budget),
+            *line_notes(scouted, design, inferred.budget),
+            *load_note(candidates),
             *draft_note(effort, ladder, laws),
         ),
     )
     return with_toughness(fit, recipe, rng)
+
+
+def _infer(
+    candidate: Candidate,
+    recipe: Recipe,
+    effort: Effort,
+    rng: np.random.Generator,
+    tell: Progress,
+    checkpoint: Path | None,
+    stop: Stop | None,
+) -> Inferred:
+    climbed, design = candidate.climbed, candidate.design
+    posterior = infer(
+        climbed.rung.problem(design.series),
+        effort,
+        rng,
+        count=DRAWS,
+        optimum=climbed.optimum,
+        budget=STANDARD_BUDGET if effort == "standard" else None,
+        checkpoint=checkpoint,
+        stop=stop,
+        progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
+    )
+    share = 0.01 * recipe.fit.cut.lack_of_fit_percent
+    budget = budget_of(design, climbed.optimum.point, posterior.covariance, share)
+    return Inferred(candidate, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
 
 
 def cut_experiment(

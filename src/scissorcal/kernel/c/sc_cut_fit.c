@@ -73,17 +73,28 @@ static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p
     return torque / SC_CUT_NODES;
 }
 
-/* Whitened residuals and their derivatives by the place for all elastic segments, and by rest the
- * sums that a Gauss-Newton step needs. */
-static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, const double *places,
-                         double *residuals, double *z, double *zx, double *curvature, double *pull)
+/* A crack at rest: where it is expected, and what its pieces say of a place. */
+typedef struct {
+    int32_t index;
+    int held;
+    double centre, spread;
+} rest_belief;
+
+typedef struct {
+    double cost, pull, curvature;
+} rest_sums;
+
+/* Whitened residuals z of the pieces at one rest if its crack stands at `place`, with the sums that
+ * a Gauss-Newton step needs: half their squares, and the first two derivatives by the place. */
+static rest_sums rest_pass(const sc_cut_data *data, const sc_cut_parameters *p,
+                           const rest_belief *rest, double place, double *residuals, double *z,
+                           double *zx)
 {
-    double scale = 1.0 / p->noise_scale;
-    for (int32_t r = 0; r < data->rests; r++) curvature[r] = pull[r] = 0.0;
+    double scale = 1.0 / p->noise_scale, moved = place - data->rest_place[rest->index];
+    rest_sums sums = {0.0, 0.0, 0.0};
     for (int32_t i = 0; i < data->pieces; i++) {
+        if (data->piece_rest[i] != rest->index) continue;
         int32_t low = data->piece_first[i], high = data->piece_first[i + 1];
-        int32_t rest = data->piece_rest[i];
-        double moved = places[rest] - data->rest_place[rest];
         double offset = data->piece_closing[i] ? p->offset_closing : p->offset_opening;
         const double *row = data->whitener + data->white_first[i];
         for (int32_t k = low; k < high; k++) {
@@ -92,88 +103,98 @@ static void elastic_pass(const sc_cut_data *data, const sc_cut_parameters *p, co
             residuals[k] = data->torque[k] - p->delay * data->late[k] - gain * torque - offset;
             zx[k] = -gain * slope;
         }
-        for (int32_t k = high - 1; k >= low; k--) {
-            const double *line = row + (ptrdiff_t)(k - low) * (k - low + 1) / 2;
+        for (int32_t k = low; k < high; k++, row += k - low) {
             double value = 0.0, by_place = 0.0;
             for (int32_t j = low; j <= k; j++) {
-                value += line[j - low] * residuals[j];
-                by_place += line[j - low] * zx[j];
+                value += row[j - low] * residuals[j];
+                by_place += row[j - low] * zx[j];
             }
             z[k] = scale * value;
-            zx[k] = scale * by_place;
-            curvature[rest] += zx[k] * zx[k];
-            pull[rest] += zx[k] * z[k];
+            by_place *= scale;
+            sums.cost += 0.5 * z[k] * z[k];
+            sums.curvature += by_place * by_place;
+            sums.pull += by_place * z[k];
         }
     }
+    if (rest->held) return sums;
+    double weight = 1.0 / (rest->spread * rest->spread), away = place - rest->centre;
+    sums.cost += 0.5 * weight * away * away;
+    sums.curvature += weight;
+    sums.pull += weight * away;
+    return sums;
+}
+
+/* The place of highest density by Gauss-Newton steps, shortened until they climb; `sums` are those
+ * there, and a last step below REST_ARRIVED_M is counted by the parabola that it comes from. */
+static double settle(const sc_cut_data *data, const sc_cut_parameters *p, const rest_belief *rest,
+                     double place, double *residuals, double *z, double *zx, rest_sums *sums)
+{
+    *sums = rest_pass(data, p, rest, place, residuals, z, zx);
+    for (int32_t step = 0; step < SC_CUT_REST_STEPS && !rest->held; step++) {
+        double move = -sums->pull / sums->curvature;
+        if (fabs(move) < REST_ARRIVED_M) {
+            sums->cost += 0.5 * move * sums->pull;
+            break;
+        }
+        if (move > REST_REACH_M) move = REST_REACH_M;
+        if (move < -REST_REACH_M) move = -REST_REACH_M;
+        rest_sums next = rest_pass(data, p, rest, place + move, residuals, z, zx);
+        while (!(next.cost <= sums->cost) && fabs(move) >= REST_ARRIVED_M) {
+            move *= 0.25;
+            next = rest_pass(data, p, rest, place + move, residuals, z, zx);
+        }
+        place += move;
+        *sums = next;
+    }
+    return place;
+}
+
+static rest_belief belief_of(const sc_cut_data *data, const sc_cut_parameters *p, int32_t r)
+{
+    rest_belief rest = {r, 0, 0.0, data->known_sd};
+    if (data->rest_known[r]) {
+        rest.held = data->known_sd <= 0.0;
+        return rest;
+    }
+    double start, stop, share, power, tangent = data->rest_slope[r];
+    sc_cut_cycle(p, data->moving_blades, tangent, &start, &stop, &share);
+    double cycle = (start - stop) / tangent, depth = stop + p->rest_phase * (start - stop);
+    sc_response_log_force(&p->response, log(start), &power);
+    double uneven = p->variation * start / (power * tangent);
+    const double *de = data->rest_de + (ptrdiff_t)r * data->edge_count;
+    rest.centre = data->rest_at_reference[r] - (depth - data->reference_depth) / tangent +
+                  departure(de, p->edge, data->edge_count);
+    rest.spread = sqrt(p->rest_spread * p->rest_spread * cycle * cycle + uneven * uneven + 4e-12);
+    return rest;
 }
 
 static double elastic(const sc_cut_data *data, const sc_cut_parameters *p, double *terms,
                       double *residuals, double *scaled, double *places, double *work)
 {
     int32_t count = data->piece_first[data->pieces];
-    double *z = work, *zx = work + count, *curvature = work + 2 * (ptrdiff_t)count;
-    double *pull = curvature + data->rests, *centre = pull + data->rests;
-    double *spread = centre + data->rests, *moves = spread + data->rests;
+    double *z = work, *zx = work + count, log_scale = log(p->noise_scale), sum = 0.0;
     for (int32_t r = 0; r < data->rests; r++) {
-        places[r] = data->rest_place[r];
-        if (data->rest_known[r]) {
-            centre[r] = 0.0;
-            spread[r] = data->known_sd;
-            places[r] = 0.0;
-            continue;
+        rest_belief rest = belief_of(data, p, r);
+        rest_sums sums;
+        places[r] = settle(data, p, &rest, data->rest_known[r] ? 0.0 : data->rest_place[r],
+                           residuals, z, zx, &sums);
+        /* What a rest's place adds goes to the first segment of its first piece. */
+        double squares = 0.0, *first = NULL;
+        for (int32_t i = 0; i < data->pieces; i++) {
+            if (data->piece_rest[i] != r) continue;
+            int32_t low = data->piece_first[i];
+            const double *row = data->whitener + data->white_first[i];
+            if (!first) first = &terms[low];
+            for (int32_t k = low; k < data->piece_first[i + 1]; k++, row += k - low) {
+                terms[k] = -0.5 * z[k] * z[k] + log(row[k - low]) - log_scale;
+                squares += 0.5 * z[k] * z[k];
+                if (scaled) scaled[k] = z[k];
+                sum += terms[k];
+            }
         }
-        double start, stop, share;
-        double tangent = data->rest_slope[r];
-        sc_cut_cycle(p, data->moving_blades, tangent, &start, &stop, &share);
-        double cycle = (start - stop) / tangent;
-        double power, depth = stop + p->rest_phase * (start - stop);
-        sc_response_log_force(&p->response, log(start), &power);
-        double uneven = p->variation * start / (power * tangent);
-        const double *de = data->rest_de + (ptrdiff_t)r * data->edge_count;
-        centre[r] = data->rest_at_reference[r] - (depth - data->reference_depth) / tangent +
-                    departure(de, p->edge, data->edge_count);
-        spread[r] = sqrt(p->rest_spread * p->rest_spread * cycle * cycle + uneven * uneven + 4e-12);
-    }
-    for (int32_t step = 0;; step++) {
-        elastic_pass(data, p, places, residuals, z, zx, curvature, pull);
-        double largest = 0.0;
-        for (int32_t r = 0; r < data->rests; r++) {
-            moves[r] = 0.0;
-            if (data->rest_known[r] && data->known_sd <= 0.0) continue;
-            double weight = 1.0 / (spread[r] * spread[r]);
-            curvature[r] += weight;
-            pull[r] += weight * (places[r] - centre[r]);
-            double move = -pull[r] / curvature[r];
-            if (move > REST_REACH_M) move = REST_REACH_M;
-            if (move < -REST_REACH_M) move = -REST_REACH_M;
-            moves[r] = move;
-            if (fabs(move) > largest) largest = fabs(move);
-        }
-        if (step >= SC_CUT_REST_STEPS || largest < REST_ARRIVED_M) break;
-        for (int32_t r = 0; r < data->rests; r++) places[r] += moves[r];
-    }
-    double sum = 0.0, log_scale = log(p->noise_scale);
-    for (int32_t i = 0; i < data->pieces; i++) {
-        int32_t low = data->piece_first[i];
-        const double *row = data->whitener + data->white_first[i];
-        for (int32_t k = low; k < data->piece_first[i + 1]; k++) {
-            double diagonal = row[(ptrdiff_t)(k - low) * (k - low + 1) / 2 + (k - low)];
-            terms[k] = -0.5 * z[k] * z[k] + log(diagonal) - log_scale;
-            if (scaled) scaled[k] = z[k];
-            sum += terms[k];
-        }
-    }
-    /* What a rest's place adds goes to the first segment of its first piece. */
-    for (int32_t i = data->pieces - 1; i >= 0; i--) {
-        int32_t rest = data->piece_rest[i];
-        int first = 1;
-        for (int32_t j = 0; j < i; j++)
-            if (data->piece_rest[j] == rest) first = 0;
-        if (!first || (data->rest_known[rest] && data->known_sd <= 0.0)) continue;
-        double away = (places[rest] - centre[rest]) / spread[rest];
-        double added = -0.5 * away * away - log(spread[rest]) - 0.5 * log(curvature[rest]);
-        if (fabs(moves[rest]) < REST_ARRIVED_M) added -= 0.5 * moves[rest] * pull[rest];
-        terms[data->piece_first[i]] += added;
+        if (!first || rest.held) continue;
+        double added = squares - sums.cost - log(rest.spread) - 0.5 * log(sums.curvature);
+        *first += added;
         sum += added;
     }
     return sum;

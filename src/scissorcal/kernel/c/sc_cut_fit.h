@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-enum { SC_CUT_NODES = 2, SC_CUT_REST_STEPS = 8 };
+enum { SC_CUT_NODES = 2, SC_CUT_REST_STEPS = 30 };
 
 enum { SC_CUT_PRESSED = 0, SC_CUT_SMOOTH = 1, SC_CUT_RIPPLED = 2 };
 
@@ -129,13 +129,13 @@ void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, dou
  * residuals (measured less expected, N m) and, unless scaled is null, residuals that are standard
  * normal if the model is true, in the same order. places (rests) gets where each crack rests, at the highest density. line_log_period gets
  * the weighted mean of the logarithm of the teeth's period in opening. Returns the sum; -HUGE_VAL
- * where a number is not finite. work has 2 * elastic segments + 5 * rests values. */
+ * where a number is not finite. work has 2 * elastic segments values. */
 double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *parameters,
                              double *terms, double *residuals, double *scaled, double *places,
                              double *line_log_period, double *work);
 
-/* The sums and line_log_periods of `count` points. work has 2 * segments + 2 * elastic segments + 6 *
- * rests values. */
+/* The sums and line_log_periods of `count` points. work has 2 * segments + 2 * elastic segments + rests
+ * values. */
 void sc_cut_log_likelihoods(const sc_cut_data *data, const sc_cut_parameters *points,
                             int32_t count, double *totals, double *line_log_periods, double *work);
 

@@ -1,0 +1,111 @@
+"""The posterior over two laws at once: with and without friction that grows with the load."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.cut.lack_of_fit import Budget
+from scissorcal.calibration.ladder import Climbed
+from scissorcal.inference import Posterior
+
+Array = NDArray[np.float64]
+
+LEAST_PROBABILITY = 0.01
+"""A law that is less probable is left out of the average."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A law after its fit, with its design and its probability among those averaged over."""
+
+    climbed: Climbed
+    design: CutExperiment
+    probability: float = 1.0
+
+
+@dataclass(frozen=True)
+class Inferred:
+    """A candidate's posterior, its draws widened by the budget of lack of fit."""
+
+    candidate: Candidate
+    posterior: Posterior
+    budget: Budget
+
+
+def by_load(chosen: Climbed, climbed: Sequence[tuple[Climbed, CutExperiment]]) -> list[Candidate]:
+    """The chosen law and its twin with or without load-dependent friction, the richest first.
+
+    Which of the two holds moves force and fracture energy by as much as the share itself, so where
+    the data leave both possible an interval has to cover both. Probabilities come from the evidence
+    by Laplace's method, equal before data (Kass and Raftery 1995,
+    doi:10.1080/01621459.1995.10476572).
+    """
+    design = next(d for c, d in climbed if c.rung.name == chosen.rung.name)
+    twins = [
+        (one, d)
+        for one, d in climbed
+        if replace(d.law, loaded=False, knots_m=()) == replace(design.law, loaded=False, knots_m=())
+    ]
+    if len(twins) == 1:
+        return [Candidate(chosen, design)]
+    twins.sort(key=lambda twin: not twin[1].law.loaded)
+    logs = np.array([log_evidence(one) for one, _ in twins])
+    odds = np.exp(logs - logs.max())
+    kept = [i for i in range(len(twins)) if odds[i] / odds.sum() > LEAST_PROBABILITY]
+    total = sum(odds[i] for i in kept)
+    return [
+        Candidate(replace(twins[i][0], alike=chosen.alike), twins[i][1], float(odds[i] / total))
+        for i in kept
+    ]
+
+
+def log_evidence(climbed: Climbed) -> float:
+    """Laplace's approximation of the evidence's logarithm, up to what the data alone decide."""
+    prior = climbed.rung.prior_precision
+    ratio = np.linalg.slogdet(climbed.information + prior)[1] - np.linalg.slogdet(prior)[1]
+    return float(climbed.optimum.value - 0.5 * ratio)
+
+
+def average(
+    candidates: Sequence[Candidate], infer_one: Callable[[Candidate], Inferred]
+) -> Inferred:
+    """Infer each law and draw from each as often as it is probable, in the richest one's terms.
+
+    Where the poorer law lacks a parameter its draws have zero: no friction by the load.
+    """
+    richest, *others = [infer_one(candidate) for candidate in candidates]
+    if not others:
+        return richest
+    (poorer,) = others
+    names = richest.posterior.names
+    count = len(richest.posterior.draws)
+    own = round(count * richest.candidate.probability)
+    filled = np.zeros((count, len(names)))
+    filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
+    draws = np.concatenate([richest.posterior.draws[:own], filled[own:]])
+    worst = max(richest, poorer, key=lambda one: np.nan_to_num(one.posterior.k_hat))
+    averaged = replace(
+        richest.posterior,
+        draws=draws,
+        k_hat=worst.posterior.k_hat,
+        effective=min(richest.posterior.effective, poorer.posterior.effective),
+        status=worst.posterior.status,
+        sentence=worst.posterior.sentence,
+        evaluations=richest.posterior.evaluations + poorer.posterior.evaluations,
+    )
+    return replace(richest, posterior=averaged)
+
+
+def load_note(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """How probable friction that grows with the load is, where the data leave it open."""
+    if len(candidates) == 1:
+        return ()
+    probability = candidates[0].probability
+    return (
+        f"Friction that grows with the load of the cut is {probability:.0%} probable by these data; "
+        "intervals are averaged over the laws with and without it. Strokes that bear a load and cut "
+        "nothing would decide it.",
+    )
