@@ -67,12 +67,7 @@ def test_a_near_period_needs_no_search():
     assert near.ratio == pytest.approx(searched.ratio, rel=3e-3)
 
 
-ROUGH = pytest.mark.xfail(
-    strict=False, reason="a gain of whole cycles is chosen by raw power, which rough strokes lead"
-)
-
-
-@pytest.mark.parametrize("noise", [0.3, pytest.param(0.5, marks=ROUGH)])
+@pytest.mark.parametrize("noise", [0.3, 0.5])
 def test_noise_that_grows_with_the_frequency_does_not_pull_the_line(noise):
     """Differences of white noise, with more than the teeth's height as standard deviation."""
     lines = [found(day(seed, ratio=0.9, noise=noise)) for seed in range(60, 66)]

@@ -13,7 +13,7 @@ from scissorcal.inference import Posterior
 
 Array = NDArray[np.float64]
 
-LEAST_PROBABILITY = 0.01
+LEAST_PROBABILITY = 0.05
 """A law that is less probable is left out of the average."""
 
 
@@ -105,7 +105,7 @@ def load_note(candidates: Sequence[Candidate]) -> tuple[str, ...]:
         return ()
     probability = candidates[0].probability
     return (
-        f"Friction that grows with the load of the cut is {probability:.0%} probable by these data; "
-        "intervals are averaged over the laws with and without it. Strokes that bear a load and cut "
-        "nothing would decide it.",
+        f"Friction that grows with the load of the cut is {probability:.0%} probable by these "
+        "data; intervals are averaged over the laws with and without it. Strokes that bear a load "
+        "and cut nothing would decide it.",
     )

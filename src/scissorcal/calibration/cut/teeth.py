@@ -33,6 +33,10 @@ SCAN_STEP = 0.04
 COHERENT = 16.0
 """Power that keeps its phase over what noise leaves. Without a line it is exponential with mean
 1, so that one stroke speed in ten million passes by chance."""
+ONE_WINDOW, ONE_AND_A_HALF = 2 * WINDOW_CYCLES, 3 * WINDOW_CYCLES
+"""Distances of windows in half cycles. A frequency that gains one cycle too many over a window
+gains one and a half over the longer distance: there its phases oppose."""
+FURTHEST_ALIAS = 4
 OVERLAP = 4.0
 """Windows half a cycle apart that count as one: the sum of the Hann window's squared
 autocorrelation."""
@@ -222,10 +226,9 @@ def _window() -> Complex:
 _WINDOW = _window()
 
 
-def _pairs(signal: PhaseSignal, frequency: float) -> Complex | None:
-    """Products of amplitudes one window apart: their angle is the phase that was gained."""
+def _pairs(signal: PhaseSignal, frequency: float, apart: int = ONE_WINDOW) -> Complex | None:
+    """Products of amplitudes ``apart`` half cycles: their angle is the phase that was gained."""
     amplitude = _windows(signal, frequency)
-    apart = 2 * WINDOW_CYCLES
     if amplitude is None or len(amplitude) <= apart:
         return None
     return np.asarray(amplitude[apart:] * np.conj(amplitude[:-apart]))
@@ -247,14 +250,15 @@ def _shown(signals: Sequence[PhaseSignal], frequency: float) -> float:
     return _gain(found) if ahead > 0 else 0.0
 
 
-def _coherent(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """Power that keeps its phase, each stroke's over the variance of its torque."""
-    total = 0.0
-    for signal in signals:
-        pair = _pairs(signal, frequency)
-        if pair is not None:
-            total += float(np.real(pair.sum())) / float(np.var(signal.torque))
-    return total
+def _coherence(signals: Sequence[PhaseSignal], frequency: float) -> float:
+    """Pairs that keep their phase over one window and over one and a half, in units of a pair."""
+    found = [
+        pair
+        for signal in signals
+        for apart in (ONE_WINDOW, ONE_AND_A_HALF)
+        if (pair := _pairs(signal, frequency, apart)) is not None
+    ]
+    return sum(float(np.real(pair.sum())) / float(np.abs(pair).mean()) for pair in found)
 
 
 def _power(signals: Sequence[PhaseSignal], frequency: float) -> float:
@@ -274,13 +278,22 @@ def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
 
 
 def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """The frequency or one that gains a whole cycle more or less between two windows.
+    """The frequency, or one that gains whole cycles more or less between two windows.
 
-    Power tells them apart where jitter limits the coherence, the gain where noise limits the power.
+    The coherence tells them apart where noise has more power at the wrong one, the power where a
+    harmonic keeps its phase as well.
     """
-    apart = 1.0 / WINDOW_CYCLES
-    tried = [_refined(signals, frequency * (1.0 + k * apart)) for k in (-1, 0, 1)]
-    return max(tried, key=lambda f: max(_coherent(signals, f), 0.0) * _shown(signals, f))
+    best, highest = frequency, -np.inf
+    for _ in range(FURTHEST_ALIAS):
+        for aside in (1.0 - 1.0 / WINDOW_CYCLES, 1.0, 1.0 + 1.0 / WINDOW_CYCLES):
+            tried = _refined(signals, frequency * aside)
+            score = max(_coherence(signals, tried), 0.0) * _power(signals, tried)
+            if score > highest:
+                best, highest = tried, score
+        if best == frequency:
+            break
+        frequency = best
+    return best
 
 
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
