@@ -47,7 +47,7 @@ Progress = Callable[[float, str], None]
 
 DRAWS = 2000
 STANDARD_BUDGET = 12_000
-"""Evaluations of the likelihood, a third of a millisecond each, that standard effort may take."""
+"""Evaluations of the likelihood, a fifth of a millisecond each, that standard effort may take."""
 FELT_SDS = 5.0
 FEWEST_FELT_RAD = 0.02
 KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99

@@ -1,0 +1,131 @@
+"""A posterior over two laws: weights by evidence, draws in the richer law's terms."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.cut.averaging import (
+    Candidate,
+    Inferred,
+    average,
+    by_load,
+    load_note,
+    log_evidence,
+)
+from scissorcal.calibration.cut.laws import CutLaw
+from scissorcal.inference import find_optimum, infer
+from scissorcal.inference.problem import Problem
+
+DATA_SD = 0.3
+
+
+@dataclass(frozen=True)
+class Rung:
+    name: str
+    prior_precision: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fitted:
+    rung: Rung
+    optimum: object
+    information: np.ndarray
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Design:
+    law: CutLaw
+
+
+def problem(data, names):
+    """Normal data of a mean that is the sum of the parameters, each of prior sd one."""
+    size = len(names)
+    return Problem(
+        names=names,
+        log_prior=lambda u: -0.5 * float(u @ u),
+        log_likelihood_terms=lambda u: -0.5 * ((data - u.sum()) / DATA_SD) ** 2,
+        series=np.zeros(len(data), dtype=np.int64),
+        prior_sd=np.ones(size),
+        starts=np.zeros((1, size)),
+        lower=np.full(size, -8.0),
+        upper=np.full(size, 8.0),
+        independent=True,
+    )
+
+
+def fitted(name, data, names):
+    size = len(names)
+    optimum = find_optimum(problem(data, names))
+    information = np.full((size, size), len(data) / DATA_SD**2)
+    return Fitted(Rung(name, np.eye(size)), optimum, information)
+
+
+def exact_log_evidence(data, size):
+    """Of normal data whose mean is a sum of ``size`` standard normal parameters."""
+    covariance = DATA_SD**2 * np.eye(len(data)) + size
+    away = np.linalg.solve(covariance, data)
+    return -0.5 * data @ away - 0.5 * np.linalg.slogdet(covariance)[1]
+
+
+def test_the_evidence_of_normal_laws_is_exact():
+    data = np.array([0.4, -0.2, 0.9, 0.5])
+    one, two = fitted("one", data, ("a",)), fitted("two", data, ("a", "b"))
+    found = log_evidence(two) - log_evidence(one)
+    assert found == pytest.approx(
+        exact_log_evidence(data, 2) - exact_log_evidence(data, 1), abs=1e-6
+    )
+
+
+def pair(data):
+    plain = CutLaw("power", "rippled")
+    return [
+        (fitted("plain", data, ("a",)), Design(plain)),
+        (fitted("loaded", data, ("a", "b")), Design(replace(plain, loaded=True))),
+    ]
+
+
+def test_laws_are_weighed_by_their_evidence_the_richest_first():
+    data = np.array([0.4, -0.2, 0.9, 0.5])
+    climbed = pair(data)
+    candidates = by_load(climbed[0][0], climbed)
+    assert [c.design.law.loaded for c in candidates] == [True, False]
+    odds = np.exp(exact_log_evidence(data, 2) - exact_log_evidence(data, 1))
+    assert candidates[0].probability == pytest.approx(odds / (1.0 + odds), abs=1e-6)
+    assert sum(c.probability for c in candidates) == pytest.approx(1.0)
+    (note,) = load_note(candidates)
+    assert f"{candidates[0].probability:.0%} probable" in note
+
+
+def test_an_improbable_law_is_left_out():
+    data = np.full(40, 9.0)
+    climbed = pair(data)
+    (only,) = by_load(climbed[0][0], climbed)
+    assert only.design.law.loaded
+    assert only.probability == 1.0
+    assert load_note([only]) == ()
+
+
+def test_a_law_without_a_twin_stands_alone():
+    climbed = pair(np.array([0.4, -0.2]))[:1]
+    assert [c.climbed.rung.name for c in by_load(climbed[0][0], climbed)] == ["plain"]
+
+
+def test_draws_come_from_each_law_as_often_as_it_is_probable():
+    data = np.array([0.4, -0.2, 0.9, 0.5])
+    climbed = pair(data)
+    rng = np.random.default_rng(5)
+
+    def infer_one(candidate: Candidate) -> Inferred:
+        names = ("a", "b") if candidate.design.law.loaded else ("a",)
+        return Inferred(candidate, infer(problem(data, names), "standard", rng, count=1000), None)
+
+    loaded, plain = by_load(climbed[0][0], climbed)
+    found = average([loaded, plain], infer_one).posterior
+    assert found.names == ("a", "b")
+    without = np.mean(found.draws[:, 1] == 0.0)
+    assert without == pytest.approx(plain.probability, abs=1e-3)
+    mean = len(data) * data.mean() / (len(data) + DATA_SD**2)
+    own = found.draws[found.draws[:, 1] == 0.0, 0]
+    assert own.mean() == pytest.approx(mean, abs=4 * DATA_SD / np.sqrt(len(own) * len(data)))
