@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from scissorcal.kernel import cut_log_likelihood
+from scissorcal.kernel import cut_log_likelihood, cut_log_likelihoods
 from tests.calibration.cut.golden import PATH, golden
 from tests.calibration.cut.made_segments import made_data, made_parameters, responses
 from tests.calibration.cut.twin import Table, beliefs, log_likelihood
@@ -96,6 +96,26 @@ def test_places_of_rests_are_where_the_density_is_highest():
             tol=1e-12,
         )
         assert best.x == pytest.approx(places[rest], abs=0.02 * spread)
+
+
+def test_many_points_at_once_are_each_as_one_alone():
+    data = made_data(8)
+    base = made_parameters(responses()["spline"], "rippled")
+    kappas, forces = np.array([0.6, 0.7, 0.8]), np.array([-0.1, 0.0, 0.1])
+    tables = base.log_force + forces[:, None]
+    many = replace(
+        base, kappa=kappas, log_force=tables, log_energy=base.log_energy + forces[:, None]
+    )
+    totals, periods = cut_log_likelihoods(data, many, 3)
+    for index in range(3):
+        one = replace(
+            base,
+            kappa=float(kappas[index]),
+            log_force=tables[index],
+            log_energy=base.log_energy + forces[index],
+        )
+        alone = cut_log_likelihood(data, one)
+        assert (totals[index], periods[index]) == (alone[0], alone[5])
 
 
 def test_spoilt_numbers_give_no_likelihood():
