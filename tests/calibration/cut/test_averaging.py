@@ -122,10 +122,12 @@ def test_draws_come_from_each_law_as_often_as_it_is_probable():
         return Inferred(candidate, infer(problem(data, names), "standard", rng, count=1000), None)
 
     loaded, plain = by_load(climbed[0][0], climbed)
-    found = average([loaded, plain], infer_one).posterior
+    found = average([loaded, plain], infer_one, rng).posterior
     assert found.names == ("a", "b")
     without = np.mean(found.draws[:, 1] == 0.0)
     assert without == pytest.approx(plain.probability, abs=1e-3)
+    first = np.mean(found.draws[:200, 1] == 0.0)
+    assert first == pytest.approx(plain.probability, abs=4 * np.sqrt(0.25 / 200))
     mean = len(data) * data.mean() / (len(data) + DATA_SD**2)
     own = found.draws[found.draws[:, 1] == 0.0, 0]
     assert own.mean() == pytest.approx(mean, abs=4 * DATA_SD / np.sqrt(len(own) * len(data)))

@@ -70,11 +70,14 @@ def log_evidence(climbed: Climbed) -> float:
 
 
 def average(
-    candidates: Sequence[Candidate], infer_one: Callable[[Candidate], Inferred]
+    candidates: Sequence[Candidate],
+    infer_one: Callable[[Candidate], Inferred],
+    rng: np.random.Generator,
 ) -> Inferred:
     """Infer each law and draw from each as often as it is probable, in the richest one's terms.
 
-    Where the poorer law lacks a parameter its draws have zero: no friction by the load.
+    Where the poorer law lacks a parameter its draws have zero: no friction by the load. The draws
+    of both are shuffled, so that any part of them stands for the whole.
     """
     richest, *others = [infer_one(candidate) for candidate in candidates]
     if not others:
@@ -85,7 +88,7 @@ def average(
     own = round(count * richest.candidate.probability)
     filled = np.zeros((count, len(names)))
     filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
-    draws = np.concatenate([richest.posterior.draws[:own], filled[own:]])
+    draws = rng.permutation(np.concatenate([richest.posterior.draws[:own], filled[own:]]))
     worst = max(richest, poorer, key=lambda one: np.nan_to_num(one.posterior.k_hat))
     averaged = replace(
         richest.posterior,

@@ -99,7 +99,7 @@ def fit_cut(
         first = candidate is candidates[0]
         return _infer(candidate, recipe, effort, rng, tell, checkpoint if first else None, stop)
 
-    inferred = average(candidates, infer_one)
+    inferred = average(candidates, infer_one, rng)
     chosen, design = inferred.candidate.climbed, inferred.candidate.design
     u = chosen.optimum.point
     fit = assemble(
