@@ -69,7 +69,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit.camera projection": ("at most", f"{_CAMERA}: sd of a projected point, px"),
     "fit.camera two halves": ("at least", f"{_CAMERA}: p-value of two halves' difference"),
     "fit.plate ambiguity": ("at least", f"{_POSE}: odds of the better of two poses"),
-    "fit.plate at rest": ("at most", f"{_POSE}: error in the common pose over the photograph's own"),
+    "fit.plate at rest": (
+        "at most",
+        f"{_POSE}: error in the common pose over the photograph's own",
+    ),
     "fit.plate residuals": ("at most", f"{_POSE}: sd of corners, px"),
     "fit.plate halves": ("at most", f"{_POSE}: squared difference of two halves, in covariances"),
     "fit.plate size": ("at least", f"{_POSE}: width of the smallest square or marker, px"),

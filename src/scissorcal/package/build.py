@@ -26,7 +26,7 @@ from scissorcal.package.compile import (
     scene_box,
 )
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
-from scissorcal.package.friction_tables import left_out
+from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
     FORMAT,
     Bound,
@@ -111,6 +111,10 @@ def build_package(
         )
         told = record.friction.model_copy(update={"warnings": said})
         record = record.model_copy(update={"friction": told})
+    unrendered = cut_left_out(cut, bound.scene_torque_Nm)
+    record = record.model_copy(
+        update={"cut": record.cut.model_copy(update={"left_out": unrendered})}
+    )
     manifest = _hashed(
         Manifest(
             format="scissorcal-package/1",

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction import angle_factor
@@ -88,6 +89,26 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
             f"right after one, {2 * sudden * dry / math.e:.2g} N m {length:.2g} rad later."
         )
     return tuple(said)
+
+
+def cut_left_out(cut: FitResult, scene_torque: float) -> tuple[str, ...]:
+    """Sentences on what of a cut's law the tables leave out, and what that costs in torque.
+
+    Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
+    material. ``scene_torque`` (N m) is the largest that the scene renders.
+    """
+    if not cut.structure.get("load_share"):
+        return ()
+    found = {parameter.name: parameter for parameter in cut.nuisance}
+    share = found.get("load_share")
+    size = "an unknown share" if share is None else f"{share.mean:.2g} (sd {share.sd:.1g})"
+    lost = "" if share is None else f": up to {abs(share.mean) * scene_torque:.2g} N m"
+    return (
+        f"fit.cut, load_share: friction of the pivot grows by {size} of the cut's torque, and the "
+        f"package does not render it{lost}, at the scene's {scene_torque:.2g} N m. Closing strokes "
+        "were heavier by that when they were recorded. Compare rendered torque with the material's "
+        "own, not with the motor's.",
+    )
 
 
 def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:
