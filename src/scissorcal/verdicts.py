@@ -1,4 +1,4 @@
-"""Scoped verdicts: what was checked, against which limit, what it guards, and why it came out so."""
+"""Scoped verdicts: what was checked, against which limit, what it guards, and why."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal

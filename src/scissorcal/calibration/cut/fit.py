@@ -29,6 +29,7 @@ from scissorcal.calibration.cut.scout import (
 )
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.cut.toughness import with_toughness
+from scissorcal.calibration.cut.unknowns import SCENE_OF_BOUNDS, with_unknowns
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
@@ -133,7 +134,7 @@ def fit_cut(
             *draft_note(effort, ladder, laws),
         ),
     )
-    return with_toughness(fit, recipe, rng)
+    return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
 
 
 def _infer(
@@ -188,9 +189,9 @@ def settings_of(recipe: Recipe) -> str:
     """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
     return recipe.model_dump_json(
         include={
-            "rig": {"joint", "moving", "handle_radius_mm", "edge"},
+            "rig": {"joint", "moving", "handle_radius_mm", "edge", "opening_zero_sd_deg"},
             "material": {"thickness_mm", "thickness_sd_mm"},
-            "scene": {"cut", "closure"},
+            "scene": {"cut", "closure", *SCENE_OF_BOUNDS},
             "fit": {"cut", "friction"},
         }
     )
