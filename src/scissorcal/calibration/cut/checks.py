@@ -1,5 +1,7 @@
 """Verdicts and notes that only a cut's fit has."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +38,29 @@ def cut_verdicts(
         ),
         *_line(scouted),
     )
+
+
+def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
+    """What is known to matter for a cut's calibration: encoder, line, fresh sheets.
+
+    ``counts_per_sample`` is the median over the running cracks, or over the loadings where nothing
+    runs.
+    """
+    segments = design.likelihood.segments
+    parts = [(run.motion, run.ends) for run in segments.stretches]
+    if not parts:
+        parts = [(p.motion, p.ends) for p in segments.pieces if p.kind != "unloading"]
+    counts = [
+        np.abs(np.diff(segments.motions[index].opening[ends]))
+        / np.diff(ends)
+        / segments.motions[index].resolution
+        for index, ends in parts
+    ]
+    return {
+        "counts_per_sample": float(np.median(np.concatenate(counts))) if counts else None,
+        "teeth_line": design.likelihood.line is not None,
+        "fresh_loadings": sum(piece.kind == "fresh" for piece in segments.pieces),
+    }
 
 
 def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from scissorcal.calibration.cut.averaging import (
     by_load,
     load_note,
 )
-from scissorcal.calibration.cut.checks import cut_verdicts, line_notes
+from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import KnownFriction
@@ -133,6 +133,7 @@ def fit_cut(
             *load_note(candidates),
             *draft_note(effort, ladder, laws),
         ),
+        extra_diagnostics=cut_diagnostics(scouted, design),
     )
     return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
 
