@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.scout import Scouted
+from scissorcal.calibration.cut.stale import count_empty, stale_verdict
 from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, failed
 
 Array = NDArray[np.float64]
@@ -24,8 +26,9 @@ def cut_verdicts(
     edge_verdicts: tuple[Verdict, ...],
     scouted: Scouted,
     sensors: Sensors,
+    recordings: tuple[Recording, ...],
 ) -> tuple[Verdict, ...]:
-    """Judge what the fit builds on, its sensors, and its line."""
+    """Judge what the fit builds on, its sensors, its sheets and its line."""
     return (
         _foundations(friction, edge_verdicts),
         Verdict(
@@ -36,6 +39,7 @@ def cut_verdicts(
             sensors.verdict.threshold,
             sensors.verdict.why,
         ),
+        stale_verdict(count_empty(scouted.segments.motions, scouted.materials, recordings)),
         *_line(scouted),
     )
 

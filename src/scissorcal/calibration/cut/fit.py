@@ -126,7 +126,7 @@ def fit_cut(
         nuisance=NUISANCE,
         rng=rng,
         critic=recipe.fit.cut.critic,
-        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, sensors),
+        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, sensors, recordings),
         extra_notes=(
             *sensors.notes,
             *line_notes(scouted, design, inferred.budget),
