@@ -24,6 +24,15 @@ def fitted(structure=None, **diagnostics):
     )
 
 
+def loaded(q05):
+    share = FittedParameter("load_share", "1", 0.09, 0.02, q05, 0.09, 0.12, 0.2)
+    return replace(fitted({"load_share": True}), nuisance=(share,))
+
+
+def test_a_load_share_that_the_data_do_not_show_is_no_caveat():
+    assert caveats_of(loaded(0.0)) == ()
+
+
 def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
     assert caveats_of(fitted()) == ()
     assert caveats_of(friction_fit()) == ()
@@ -38,9 +47,9 @@ def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
             "0.5 encoder counts per sample",
         ),
         (
-            fitted({"load_share": True}),
+            loaded(0.05),
             ("response_force", "response_exponent"),
-            "0.1 of the cut's torque as friction",
+            "0.09 of the cut's torque is friction",
         ),
         (fitted(teeth_line=False), ("fracture_energy", "kappa"), "0 lines of the teeth"),
         (

@@ -87,3 +87,10 @@ def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
     assert not [v for v in summary.verdicts if v.check == "fits" and v.status == "fail"]
     _, plain = built(tmp_path, friction_fit())
     assert plain.manifest.provenance.cut.left_out == ()
+
+
+def test_a_load_share_of_next_to_nothing_is_not_told(tmp_path):
+    share = FittedParameter("load_share", "1", 0.001, 0.002, 0.0, 0.001, 0.004, 0.1)
+    cut = dataclasses.replace(with_structure(cut_fit(recipe()), load_share=True), nuisance=(share,))
+    _, package = built(tmp_path, friction_fit(), cut)
+    assert package.manifest.provenance.cut.left_out == ()

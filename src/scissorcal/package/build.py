@@ -111,7 +111,7 @@ def build_package(
         )
         told = record.friction.model_copy(update={"warnings": said})
         record = record.model_copy(update={"friction": told})
-    unrendered = cut_left_out(cut, bound.scene_torque_Nm)
+    unrendered = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
     record = record.model_copy(
         update={"cut": record.cut.model_copy(update={"left_out": unrendered})}
     )

@@ -91,16 +91,19 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     return tuple(said)
 
 
-def cut_left_out(cut: FitResult, scene_torque: float) -> tuple[str, ...]:
+def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[str, ...]:
     """Sentences on what of a cut's law the tables leave out, and what that costs in torque.
 
     Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
-    material. ``scene_torque`` (N m) is the largest that the scene renders.
+    material. ``scene_torque`` (N m) is the largest that the scene renders; a share that is
+    certainly below ``allowed``, what the tables may be off by, is not told.
     """
     if not cut.structure.get("load_share"):
         return ()
     found = {parameter.name: parameter for parameter in cut.nuisance}
     share = found.get("load_share")
+    if share is not None and abs(share.mean) + 2.0 * share.sd < allowed:
+        return ()
     size = "an unknown share" if share is None else f"{share.mean:.2g} (sd {share.sd:.1g})"
     lost = "" if share is None else f": up to {abs(share.mean) * scene_torque:.2g} N m"
     return (
