@@ -137,8 +137,10 @@ def find_unknowns(
 
 def _verdict(one: Unknown, limit: float) -> Verdict:
     status: Status = "pass" if one.share <= limit else "not_evaluated"
-    why = f"Up to {one.torque_Nm:.2g} N m ({one.share:.1%}) of the scene's mean torque: "
-    why += f"{one.spread} {one.removed_by}".rstrip()
+    size = f"Up to {one.torque_Nm:.2g} N m ({one.share:.1%}) of the scene's mean torque"
+    if one.torque_Nm == 0.0:
+        size = "Nothing of the scene's torque is open"
+    why = f"{size}: {one.spread} {one.removed_by}".rstrip()
     return Verdict("fit.cut", one.name, status, one.share, limit, why)
 
 
