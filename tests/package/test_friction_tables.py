@@ -79,8 +79,8 @@ def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
     )
     summary, package = built(tmp_path, friction_fit(), cut)
     (told,) = package.manifest.provenance.cut.left_out
-    lost = 0.09 * package.manifest.bound.scene_torque_Nm
-    assert "grows by 0.09 (sd 0.01) of the cut's torque" in told
+    lost = 0.11 * package.manifest.bound.scene_torque_Nm
+    assert "grows with the cut's torque, by 0.09 (sd 0.01) of it" in told
     assert f"up to {lost:.2g} N m" in told
     assert told in summary.warnings
     assert told in package.warnings

@@ -98,19 +98,17 @@ def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[s
     material. ``scene_torque`` (N m) is the largest that the scene renders; a share that is
     certainly below ``allowed``, what the tables may be off by, is not told.
     """
-    if not cut.structure.get("load_share"):
+    share = next((p for p in cut.nuisance if p.name == "load_share"), None)
+    if share is None:
         return ()
-    found = {parameter.name: parameter for parameter in cut.nuisance}
-    share = found.get("load_share")
-    if share is not None and abs(share.mean) + 2.0 * share.sd < allowed:
+    most = abs(share.mean) + 2.0 * share.sd
+    if most < allowed:
         return ()
-    size = "an unknown share" if share is None else f"{share.mean:.2g} (sd {share.sd:.1g})"
-    lost = "" if share is None else f": up to {abs(share.mean) * scene_torque:.2g} N m"
     return (
-        f"fit.cut, load_share: friction of the pivot grows by {size} of the cut's torque, and the "
-        f"package does not render it{lost}, at the scene's {scene_torque:.2g} N m. Closing strokes "
-        "were heavier by that when they were recorded. Compare rendered torque with the material's "
-        "own, not with the motor's.",
+        f"fit.cut, load_share: up to {most * scene_torque:.2g} N m at the scene's "
+        f"{scene_torque:.2g} N m are not rendered: friction of the pivot that grows with the cut's "
+        f"torque, by {share.mean:.2g} (sd {share.sd:.1g}) of it. Compare rendered torque with the "
+        "material's own, not with the motor's.",
     )
 
 
