@@ -1,9 +1,115 @@
-"""Scoped verdicts: what was checked, against which threshold, and why it came out so."""
+"""Scoped verdicts: what was checked, against which limit, what it guards, and why."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 Status = Literal["pass", "fail", "not_evaluated"]
+Limit = Literal["at most", "at least", ""]
+
+TORQUE = "torque: "
+"""What a verdict guards begins so where its number is an error of torque, or a share of torque."""
+
+_INTERVALS = "whether intervals hold what they promise"
+_SEARCH = "whether the estimate is an optimum at all"
+_DATA = "whether the recording can tell the parameters"
+_POSE = "where the plate is drawn; no torque depends on it"
+_EDGE = "shape of the edge, which torque follows"
+_CAMERA = "lengths measured in photographs"
+_LOOP = "whether commands reach the motors in time"
+
+MEANINGS: dict[str, tuple[Limit, str]] = {
+    "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
+    "fit optimum": ("at least", f"{_SEARCH}: starts that ended there"),
+    "fit k-hat": ("at most", f"{_INTERVALS}: tail index of the importance weights"),
+    "fit bounds": ("at most", f"{_SEARCH}: largest distance from a prior in its sds"),
+    "fit identifiability": ("at most", f"{_DATA}: largest posterior sd over prior sd"),
+    "fit null-directions": ("at most", f"{_DATA}: directions that are left to the prior"),
+    "fit whiteness": (
+        "at least",
+        "nothing of the torque by itself; it tells how much data an interval rests on: "
+        "independent observations per parameter",
+    ),
+    "fit r-squared": ("at least", TORQUE + "share of its variance that the law explains"),
+    "fit strokes": ("at least", f"{_DATA}: ratio of the fastest to the slowest stroke"),
+    "fit held-out": (
+        "at most",
+        TORQUE + "median rms error on unseen strokes, share of the rms of all strokes",
+    ),
+    "fit recordings": (
+        "at most",
+        TORQUE + "rms error on a recording by the others, share of the rms of all recordings",
+    ),
+    "fit physical": ("at most", "signs of levels: sds by which one is below zero"),
+    "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
+    "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
+    "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
+    "fit foundations": ("at most", "what the fit builds on: failed verdicts there"),
+    "fit teeth": (
+        "at most",
+        "kappa, which a harmonic puts off by tens of percent: power at a half or a third of the "
+        "line's frequency over its own",
+    ),
+    "fit stale sheets": (
+        "at most",
+        "response and fracture energy, which strokes through cut material pull down: largest "
+        "share of a sheet's closing strokes that cut nothing",
+    ),
+    "fit opening zero": ("at most", TORQUE + "error of its mean over the scene, share of it"),
+    "fit torque zero": ("at most", TORQUE + "error of its mean over the scene, share of it"),
+    "fit edge shape": ("at most", TORQUE + "error of its mean over the scene, share of it"),
+    "fit friction by load": ("at most", TORQUE + "error of its mean over the scene, share of it"),
+    "fit clear edge": ("at most", f"{_EDGE}: share of points that are neither edge nor nick"),
+    "fit photographs agree": ("at most", f"{_EDGE}: sds between photographs, or share of length"),
+    "fit sizes of the errors": ("", f"{_INTERVALS} of the edge"),
+    "fit.camera uncertainty": ("", f"{_CAMERA}: whether their error is known"),
+    "fit.camera focal length": ("at most", f"{_CAMERA}: sd of the focal length, share of it"),
+    "fit.camera views": ("at most", f"{_CAMERA}: error of the worst photograph over the median"),
+    "fit.camera corners": ("at least", f"{_CAMERA}: corners seen"),
+    "fit.camera coverage": ("at least", f"{_CAMERA}: share of the picture with corners"),
+    "fit.camera projection": ("at most", f"{_CAMERA}: sd of a projected point, px"),
+    "fit.camera two halves": ("at least", f"{_CAMERA}: p-value of two halves' difference"),
+    "fit.plate ambiguity": ("at least", f"{_POSE}: odds of the better of two poses"),
+    "fit.plate at rest": (
+        "at most",
+        f"{_POSE}: error in the common pose over the photograph's own",
+    ),
+    "fit.plate residuals": ("at most", f"{_POSE}: sd of corners, px"),
+    "fit.plate halves": ("at most", f"{_POSE}: squared difference of two halves, in covariances"),
+    "fit.plate size": ("at least", f"{_POSE}: width of the smallest square or marker, px"),
+    "fit.plate camera": ("", f"{_POSE}: whether the camera's error is known"),
+    "fit.plate rig frame": ("at most", f"{_POSE}: directions left open, or sd of corners, px"),
+    "verify calibration": ("at least", f"{_INTERVALS}: p-value of uniform ranks"),
+    "verify refits": ("at most", f"{_INTERVALS}: share of simulated fits that are unreliable"),
+    "verify halves": ("at least", f"{_INTERVALS}: p-value of two halves' difference"),
+    "verify halves-effort": (
+        "at least",
+        TORQUE + "difference of two halves' predictions against what they claim, p-value",
+    ),
+    "verify prior": ("at most", "what is the prior's: sensitivity to its power"),
+    "package bound": ("at most", TORQUE + "error of the tables over the scene, N m"),
+    "package bound share": ("at most", TORQUE + "error of the tables, share of the largest torque"),
+    "package extremes": ("at most", "the motors: steps that gave no number"),
+    "package centre": ("at least", TORQUE + "share of the scene that lies in the posterior's band"),
+    "package fits": ("at most", "what the package is made from: failed verdicts there"),
+    "package review": ("at least", "who answers for the package: 1 for an accepted report"),
+    "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
+    "render misses": ("at most", f"{_LOOP}: share of frames that never came"),
+    "render faults": ("at most", f"{_LOOP}: faults that the device latched"),
+    "render supervision": ("at most", f"{_LOOP}: frames with damping only"),
+    "render passivity": ("at most", "energy from nothing, which is felt as buzzing: J"),
+    "device round trip": ("at most", f"{_LOOP}: 99 % of the answers, ms"),
+    "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),
+    "device lost frames": ("at most", f"{_LOOP}: frames lost, %"),
+    "device latency timer": ("at most", f"{_LOOP}: ms that the adapter holds data back"),
+    "device drift": ("at most", "rates and accelerations: error of the device's clock, ppm"),
+    "host resolution": ("at most", f"{_LOOP}: steps of this computer's clock, ns"),
+    "host wake-up lateness": ("at most", f"{_LOOP}: 99 % of the delays, ms"),
+    "host real-time rights": ("at least", f"{_LOOP}: priority that is granted"),
+}
+"""By scope and check: on which side of its threshold a value is good, and what the check guards.
+
+A scope counts from its whole name to its first word: "fit.plate halves" goes before "fit halves".
+"""
 
 
 @dataclass(frozen=True)
@@ -11,11 +117,14 @@ class Verdict:
     """One check with its outcome.
 
     ``scope`` names what was judged (``"fit.friction"``), ``check`` the question asked
-    (``"whiteness"``). ``value`` and ``threshold`` are numbers in the unit that ``why`` states;
+    (``"whiteness"``). ``value`` and ``threshold`` are numbers in the unit that ``guards`` states;
     both are None where a check could not be evaluated. ``why`` is a sentence for people.
+    ``limit`` says whether ``value`` may be at most or at least ``threshold``; ``guards`` what the
+    number is, and whether it bounds an error of torque. Both come from :data:`MEANINGS`.
 
-    >>> Verdict("fit.cut", "k-hat", "pass", 0.31, 0.7, "The weights are well behaved.").status
-    'pass'
+    >>> verdict = Verdict("fit.cut", "k-hat", "pass", 0.31, 0.7, "The weights are well behaved.")
+    >>> verdict.status, verdict.limited
+    ('pass', '0.31, at most 0.7')
     """
 
     scope: str
@@ -24,10 +133,46 @@ class Verdict:
     value: float | None
     threshold: float | None
     why: str
+    limit: Limit = ""
+    guards: str = ""
+
+    def __post_init__(self) -> None:
+        """Take direction and meaning from the table, where it knows the check."""
+        limit, guards = meaning_of(self.scope, self.check)
+        object.__setattr__(self, "limit", limit)
+        object.__setattr__(self, "guards", guards)
+
+    @property
+    def limited(self) -> str:
+        """The value and its limit in words; empty where there is no number."""
+        if self.value is None:
+            return ""
+        if self.threshold is None or not self.limit:
+            return f"{self.value:.3g}"
+        return f"{self.value:.3g}, {self.limit} {self.threshold:.3g}"
+
+    @property
+    def bounds_torque(self) -> bool:
+        """Whether the number is an error of torque or a share of torque."""
+        return self.guards.startswith(TORQUE)
 
     def as_dict(self) -> dict[str, Any]:
         """Give the verdict as the plain object that ``--json`` prints."""
         return asdict(self)
+
+
+def meaning_of(scope: str, check: str) -> tuple[Limit, str]:
+    """Direction of a check's limit and what it guards; empty for a check that is not known.
+
+    >>> meaning_of("fit.plate", "halves")[0], meaning_of("verify.cut", "halves")[0]
+    ('at most', 'at least')
+    """
+    parts = scope.split(".")
+    for count in range(len(parts), 0, -1):
+        found = MEANINGS.get(f"{'.'.join(parts[:count])} {check}")
+        if found is not None:
+            return found
+    return "", ""
 
 
 def failed(verdicts: tuple[Verdict, ...]) -> tuple[Verdict, ...]:

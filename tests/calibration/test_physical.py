@@ -87,6 +87,18 @@ def test_an_estimate_that_moves_with_the_cutoff_is_named():
     assert "inertia moves by 9" in moved.why
 
 
+def test_a_nuisance_that_moves_with_the_cutoff_fails_nothing():
+    """The delay of the torque describes the motor's electronics, and is not rendered."""
+    rows = [Parameter(name, "1", "log", 0.0, 1.0, "") for name in ("inertia", "delay")]
+    draws = np.random.default_rng(5).standard_normal((500, 2))
+    here = np.zeros(2)
+    moved = bandwidth_verdict(
+        Layout(tuple(rows)), draws, here, here + np.array([1.0, 9.0]), (75.0, 91.0)
+    )
+    assert moved.status == "pass"
+    assert "inertia moves" in moved.why
+
+
 def test_windows_too_short_for_the_encoder_are_noticed():
     """At 180 Hz the encoder's steps draw the inertia towards zero, and the verdict says so."""
     recording = friction_recording(Truth(), np.random.default_rng(6))

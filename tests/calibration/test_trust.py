@@ -11,7 +11,7 @@ from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.cli.fit import _text
-from scissorcal.inference import Posterior, infer
+from scissorcal.inference import Posterior, SearchStatus, infer
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.workday.fits import FitOutcome
@@ -59,7 +59,7 @@ def fitted(bins: Bins, twin: bool = False) -> tuple[Climbed, Posterior]:
     return found, infer(problem, "draft", rng, optimum=found.optimum)
 
 
-def judged(bins: Bins, what="friction", contact=None, spoil=None, **fit):
+def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), error=0.05, **fit):
     climbed, posterior = fitted(bins, **fit)
     diagnostics = {
         "observations": len(bins.rate),
@@ -72,10 +72,12 @@ def judged(bins: Bins, what="friction", contact=None, spoil=None, **fit):
     if spoil:
         posterior, diagnostics = spoil(posterior, diagnostics)
     errors = tuple(
-        StrokeError(int(k), "a.mcap", "closing", 0.1, 0.1, 0.05) for k in np.unique(bins.stroke)
+        StrokeError(int(k), "a.mcap", "closing", 0.1, 0.1, error) for k in np.unique(bins.stroke)
     )
     met = np.full(len(bins.rate), np.nan) if contact is None else contact
-    verdicts = trust_verdicts(what, "draft", climbed, posterior, diagnostics, errors, (), bins, met)
+    verdicts = trust_verdicts(
+        what, "draft", climbed, posterior, diagnostics, errors, nuisance, bins, met
+    )
     return {verdict.check: verdict for verdict in verdicts}
 
 
@@ -117,6 +119,46 @@ def test_a_search_that_did_not_settle_fails_with_its_own_words():
 
     verdict = judged(motion(), spoil=spoil)["optimum"]
     assert (verdict.status, verdict.why) == ("fail", "At a bound: b0.")
+
+
+@pytest.mark.parametrize(
+    ("status", "concerned", "outcome"),
+    [
+        (SearchStatus.AT_START, "b0", "pass"),
+        (SearchStatus.PLATEAU, "b0", "pass"),
+        (SearchStatus.AT_START, "b0, b1", "fail"),
+        (SearchStatus.ROUNDS_USED_UP, "", "fail"),
+        (SearchStatus.NOT_FINITE, "b0", "fail"),
+        (SearchStatus.AT_BOUNDS, "b0", "fail"),
+    ],
+)
+def test_only_a_silent_nuisance_may_stay_at_its_prior(status, concerned, outcome):
+    """b0 is a nuisance here, b1 the law's own."""
+
+    def spoil(posterior, diagnostics):
+        sentence = status.value + (f" It concerns {concerned}." if concerned else "")
+        sentence += " 2 of 3 starts ended there, the others lower."
+        ended = dataclasses.replace(
+            posterior.optimum, success=False, status=status, sentence=sentence
+        )
+        return dataclasses.replace(posterior, optimum=ended), diagnostics
+
+    verdict = judged(motion(), spoil=spoil, nuisance=("b0",))["optimum"]
+    assert verdict.status == outcome
+    if outcome == "pass":
+        assert "b0 stayed where the prior is" in verdict.why
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome"), [(0.05, "not_evaluated"), (0.5, "fail")], ids=["predicts", "does not"]
+)
+def test_few_independent_bins_reject_only_what_does_not_predict(error, outcome):
+    verdict = judged(
+        motion(), spoil=lambda p, d: (p, {**d, "independent_share": 0.01}), error=error
+    )["whiteness"]
+    assert verdict.status == outcome
+    assert verdict.value < verdict.threshold
+    assert verdict.limit == "at least"
 
 
 def test_one_stroke_only_fails():

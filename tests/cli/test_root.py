@@ -161,7 +161,7 @@ def test_a_failed_verdict_is_three_and_prose_leaves_stdout_to_the_object(
     said = cli("judged")
     assert said.code == 3
     assert "What it found." in said.out
-    assert "FAIL  fit.cut  k-hat   Far off." in said.out
+    assert "FAIL  fit.cut  k-hat   0.9, at most 0.7  Far off." in said.out
     said = cli("judged", "--json")
     assert said.code == 3
     assert "What it found." in said.err

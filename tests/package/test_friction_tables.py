@@ -15,10 +15,11 @@ def with_structure(fit, **changes):
     return dataclasses.replace(fit, structure={**fit.structure, **changes})
 
 
-def built(tmp_path, friction):
+def built(tmp_path, friction, cut=None):
     chosen = recipe()
+    cut = cut or cut_fit(chosen)
     path = tmp_path / "model.scissorcal"
-    summary = build_package(chosen, friction, cut_fit(chosen), path, np.random.default_rng(0))
+    summary = build_package(chosen, friction, cut, path, np.random.default_rng(0))
     return summary, open_package(path)
 
 
@@ -68,3 +69,28 @@ def test_cogging_is_not_rendered_and_is_no_fault(tmp_path):
     for opening in (0.5, 0.5 + np.pi / 252):
         assert package.torque(opening, -0.3, 0.05) == plain.torque(opening, -0.3, 0.05)
     assert "cogging" not in " ".join(summary.warnings)
+
+
+def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
+    share = FittedParameter("load_share", "1", 0.09, 0.01, 0.075, 0.09, 0.105, 0.1)
+    cut = with_structure(cut_fit(recipe()), load_share=True)
+    cut = dataclasses.replace(
+        cut, nuisance=(share,), nuisance_draws=np.full((len(cut.draws), 1), 0.09)
+    )
+    summary, package = built(tmp_path, friction_fit(), cut)
+    (told,) = package.manifest.provenance.cut.left_out
+    lost = 0.11 * package.manifest.bound.scene_torque_Nm
+    assert "grows with the cut's torque, by 0.09 (sd 0.01) of it" in told
+    assert f"up to {lost:.2g} N m" in told
+    assert told in summary.warnings
+    assert told in package.warnings
+    assert not [v for v in summary.verdicts if v.check == "fits" and v.status == "fail"]
+    _, plain = built(tmp_path, friction_fit())
+    assert plain.manifest.provenance.cut.left_out == ()
+
+
+def test_a_load_share_of_next_to_nothing_is_not_told(tmp_path):
+    share = FittedParameter("load_share", "1", 0.001, 0.002, 0.0, 0.001, 0.004, 0.1)
+    cut = dataclasses.replace(with_structure(cut_fit(recipe()), load_share=True), nuisance=(share,))
+    _, package = built(tmp_path, friction_fit(), cut)
+    assert package.manifest.provenance.cut.left_out == ()

@@ -14,6 +14,7 @@ from scissorcal.report.sections.friction_map import map_friction
 from scissorcal.report.sections.response_curve import trace_response
 from scissorcal.report.sections.scene_torque import findings, scene_torque
 from scissorcal.report.strokes import strokes_of
+from scissorcal.verdicts import Verdict
 from tests.calibration.truth import Truth, make_recording, sweep
 from tests.report.conftest import paper
 from tests.report.fits import friction_fit, linear_fit, without_numbers
@@ -129,6 +130,14 @@ def test_torque_over_the_scene_is_the_law_with_its_band() -> None:
     assert np.allclose(half, 1.96 * 0.01, rtol=0.4)
     assert section.within_tolerance == 1.0
     assert "within its tolerance of 7.0 %" in findings(section)
+    assert section.not_in_band == ()
+    assert "nobody measured" not in findings(section)
+    wide = Verdict("fit.cut", "edge shape", "not_evaluated", 0.21, 0.07, "Photograph it.")
+    small = Verdict("fit.cut", "torque zero", "pass", 0.01, 0.07, "Small.")
+    open_fit = replace(fit, verdicts=(*fit.verdicts, wide, small))
+    doubted = scene_torque(recipe, [open_fit])
+    assert doubted.not_in_band == (("edge shape", 0.21),)
+    assert "nobody measured, as shares of the mean torque: edge shape up to 21" in findings(doubted)
 
 
 def swept_like(truth: Truth) -> FitResult:

@@ -11,7 +11,7 @@ from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_re
 from scissorcal.report.document import compose_fit
 from scissorcal.report.reduce import block_means
 from scissorcal.report.sections.friction_curve import trace_friction
-from scissorcal.report.sections.headline import Headline
+from scissorcal.report.sections.headline import Headline, write_headline
 from scissorcal.report.sections.left_out import list_left_out
 from scissorcal.report.sections.provenance import trace
 from scissorcal.report.sections.torque import compare_torque
@@ -39,8 +39,21 @@ def good(fit: FitResult) -> FitResult:
     return replace(fit, verdicts=passed, parameters=sure)
 
 
-def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
+def test_a_fit_without_its_trust_check_is_unverified() -> None:
     headline = headline_of(good(friction_fit()))
+    assert headline.stance == "unverified"
+    assert "is unverified: it passed all 4 checks of its own" in headline.sentence
+    assert "trust" not in headline.sentence
+    assert headline.next_steps[0].startswith("Run `scissorcal verify friction`")
+
+
+def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
+    fit = good(friction_fit())
+    section = compose_fit(fit, fit.what).section
+    checked = (Verdict("verify.friction", "halves", "pass", 0.4, 0.0025, "They agree."),)
+    headline = write_headline(
+        replace(fit, verdicts=fit.verdicts[:-1]), section.held_out, section.parameters, checked
+    )
     assert headline.stance == "trust"
     assert "passed all 4 checks" in headline.sentence
     assert "% (median; worst" in headline.sentence

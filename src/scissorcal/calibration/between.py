@@ -1,6 +1,6 @@
 """What differs between recordings of one rig: each fitted by itself, each predicted by the rest."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.experiment import Experiment
 from scissorcal.calibration.friction_experiment import FrictionExperiment
 from scissorcal.calibration.friction_moments import ReducedLaw
 from scissorcal.calibration.friction_search import ReducedProblem, ascend, search
@@ -20,6 +21,7 @@ from scissorcal.verdicts import Status, Verdict
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 SCALE = 0.02
 """Usual size of a difference between recordings: 2 % of what has a logarithm, else this share of
@@ -56,6 +58,17 @@ class RecordingError:
 
 
 @dataclass(frozen=True)
+class FitsApart:
+    """How a law is fitted to the bins ``here`` (n,) of one recording, and to all the others.
+
+    ``own`` gives the posterior by one recording, ``others`` the optimum (p,) without it.
+    """
+
+    own: Callable[[Mask], Posterior]
+    others: Callable[[Mask], Array]
+
+
+@dataclass(frozen=True)
 class BetweenRecordings:
     """What a law's parameters differ by from recording to recording.
 
@@ -63,7 +76,7 @@ class BetweenRecordings:
     ``precisions`` (r, p, p) those of their likelihoods alone, ``prior`` (p, p) that of the prior.
     ``sd`` (n, p) are draws of the standard deviation between recordings. ``largest_z`` (p,) is the
     largest difference of two recordings over its standard deviation. ``errors`` are those by the
-    other recordings.
+    other recordings, ``what`` names the fit.
     """
 
     layout: Layout
@@ -73,6 +86,7 @@ class BetweenRecordings:
     sd: Array
     largest_z: Array
     errors: tuple[RecordingError, ...]
+    what: str = "friction"
 
     def widened(self, draws: Array, rng: np.random.Generator) -> Array:
         """Widen draws (n, p) of the pooled parameters to those of the mean over recordings.
@@ -112,7 +126,7 @@ class BetweenRecordings:
         for i, parameter in enumerate(self.layout.parameters):
             if parameter.name in nuisance or self.largest_z[i] < FAR_APART:
                 continue
-            values = parameter.natural(self.points[:, i])
+            values = self.layout.columns(self.points)[:, i]
             told.append(
                 f"{parameter.name} from {values.min():.4g} to {values.max():.4g} {parameter.unit} "
                 f"({self.largest_z[i]:.1f} standard deviations)"
@@ -141,15 +155,15 @@ class BetweenRecordings:
         if worst.relative_rms >= HELD_OUT_LIMIT:
             changed = worst.pooled_rms > MISFIT * worst.own_rms
             status = "fail" if changed else "not_evaluated"
+            thing = "rig" if self.what == "friction" else "rig or the material"
             why += (
-                " The rig changed between recordings: find out what did, or fit them apart."
+                f" The {thing} changed between recordings: find out what did, or fit them apart."
                 if changed
                 else " One law fits them all, but the others do not determine it there: record "
                 "each load and speed twice to know how recordings differ."
             )
-        return Verdict(
-            "fit.friction", "recordings", status, worst.relative_rms, HELD_OUT_LIMIT, why
-        )
+        scope = f"fit.{self.what}"
+        return Verdict(scope, "recordings", status, worst.relative_rms, HELD_OUT_LIMIT, why)
 
 
 def compare_recordings(
@@ -164,27 +178,53 @@ def compare_recordings(
     optimum. The prior, which all share, is taken out of the recordings' estimates before they are
     compared (see :func:`scissorcal.inference.between.between_groups`).
     """
-    index, every = design.bins.recording, design.rung(design.observed)
+    every = design.rung(design.observed)
+    law, problem = every.reduced, every.problem(design.series)
+    if law is None:
+        return None
+
+    def own(here: Mask) -> Posterior:
+        return _inferred(design, law, here, point, rng)
+
+    def others(here: Mask) -> Array:
+        left = law.without(np.unique(design.strokes[here]))
+        return np.asarray(ascend(replace(problem, reduced=left), point).point)
+
+    return gather_recordings(
+        design, design.bins.recording, point, recordings, FitsApart(own, others), rng
+    )
+
+
+def gather_recordings(
+    design: Experiment,
+    index: Integers,
+    point: Array,
+    recordings: tuple[Recording, ...],
+    fits: FitsApart,
+    rng: np.random.Generator,
+) -> BetweenRecordings | None:
+    """Compare a law's fits to single recordings; None where fewer than two can be fitted.
+
+    ``index`` (n,) is the recording of each bin, ``point`` (p,) the optimum over all of them.
+    """
     labels = [
         int(label) for label in np.unique(index) if np.count_nonzero(index == label) >= FEWEST_BINS
     ]
-    law = every.reduced
-    if len(labels) < 2 or law is None:
+    if len(labels) < 2:
         return None
-    prior, problem = every.prior_precision, every.problem(design.series)
+    every = design.rung(design.observed)
+    prior = every.prior_precision
     points, covariances, precisions, estimates, errors = [], [], [], [], []
     for label in labels:
         here = index == label
-        own = _inferred(design, law, here, point, rng)
+        own = fits.own(here)
         likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), float), prior)
         points.append(own.optimum.point)
         covariances.append(own.covariance)
         precisions.append(likelihood)
         estimates.append(_without_prior(own, likelihood, prior, every.prior_mean))
-        others = law.without(np.unique(design.strokes[here]))
-        reached = ascend(replace(problem, reduced=others), point).point
-        fits = (reached, point, own.optimum.point)
-        errors.append(_error(design, recordings[label].source, here, fits))
+        reached = (fits.others(here), point, own.optimum.point)
+        errors.append(_error(design, recordings[label].source, here, reached))
     scatter = between_groups(
         np.stack(estimates), np.stack(precisions), _scales(design.layout), prior, rng
     )
@@ -196,7 +236,17 @@ def compare_recordings(
         sd=scatter.sd,
         largest_z=_largest_z(np.stack(points), np.stack(covariances)),
         errors=tuple(errors),
+        what=design.what,
     )
+
+
+def widened(
+    posterior: Posterior, between: BetweenRecordings | None, rng: np.random.Generator
+) -> Posterior:
+    """The posterior with what recordings differ by in its draws."""
+    if between is None:
+        return posterior
+    return replace(posterior, draws=between.widened(posterior.draws, rng))
 
 
 def jackknife(
@@ -272,7 +322,7 @@ def _largest_z(points: Array, covariances: Array) -> Array:
 
 
 def _error(
-    design: FrictionExperiment, source: str, here: NDArray[np.bool_], fits: tuple[Array, ...]
+    design: Experiment, source: str, here: NDArray[np.bool_], fits: tuple[Array, ...]
 ) -> RecordingError:
     """Errors on the bins (n,) of one recording by others, by all and by itself."""
     size = float(np.sqrt(np.mean(design.observed**2)))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
-    BetweenRecordings,
     compare_recordings,
     jackknife,
+    widened,
 )
 from scissorcal.calibration.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.effort import candidates_for, draft_note
@@ -134,7 +134,7 @@ def fit_friction(
     return assemble(
         what="friction",
         effort=effort,
-        posterior=_widened(posterior, between, rng),
+        posterior=widened(posterior, between, rng),
         climbed=climbed,
         chosen=chosen,
         structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
@@ -183,15 +183,6 @@ def friction_experiment(
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
     found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
-
-
-def _widened(
-    posterior: Posterior, between: BetweenRecordings | None, rng: np.random.Generator
-) -> Posterior:
-    """The posterior with what recordings differ by in its draws."""
-    if between is None:
-        return posterior
-    return replace(posterior, draws=between.widened(posterior.draws, rng))
 
 
 def _with_tails(

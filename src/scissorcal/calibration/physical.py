@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction_experiment import FrictionExperiment
-from scissorcal.calibration.friction_layout import LawParts
+from scissorcal.calibration.friction_layout import NUISANCE, LawParts
 from scissorcal.calibration.layout import Layout
 from scissorcal.verdicts import Status, Verdict
 
@@ -82,10 +82,11 @@ def bandwidth_verdict(
 
     ``here`` and ``there`` (p,) are the optima at both cutoffs, ``draws`` (k, p) the posterior at
     the first, all unconstrained. An error that is shared by both cancels; what is left is what the
-    filter does, and it must be small against the width that is claimed.
+    filter does, and it must be small against the width that is claimed. Nuisances (delay, noise,
+    cogging) are not judged: nothing of them is rendered.
     """
     moved = np.abs(there - here) / draws.std(axis=0, ddof=1)
-    judged = [i for i, name in enumerate(layout.names) if name != "noise"]
+    judged = [i for i, name in enumerate(layout.names) if name not in NUISANCE]
     worst = max(judged, key=lambda i: moved[i])
     value, name = float(moved[worst]), layout.names[worst]
     status: Status = "pass" if value <= MOVED_LIMIT else "fail"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.inference import Posterior
+from scissorcal.inference import Optimum, Posterior, SearchStatus
 from scissorcal.verdicts import Status, Verdict
 
 K_HAT_LIMIT = 0.7
@@ -42,12 +42,12 @@ def trust_verdicts(
     nuisance = (*nuisance, *(p.name for p in chosen.rung.layout.parameters if p.believed))
     return (
         _finite(scope, chosen, posterior, diagnostics),
-        _search(scope, posterior),
+        _search(scope, posterior, nuisance),
         _importance(scope, effort, posterior),
         _bounds(scope, chosen),
         _identified(scope, chosen, posterior, nuisance),
         _null(scope, posterior, nuisance),
-        _independent(scope, chosen, diagnostics),
+        _independent(scope, chosen, diagnostics, held_out),
         _explained(scope, diagnostics),
         _varied(scope, what, chosen, bins, contact),
         _unseen(scope, held_out),
@@ -70,10 +70,29 @@ def _finite(
     return Verdict(scope, "finite", "pass", 0.0, 0.0, "Every number of the fit is finite.")
 
 
-def _search(scope: str, posterior: Posterior) -> Verdict:
+def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+    """Judge the search by the law's own parameters.
+
+    A nuisance to which the data do not respond stays at its prior, whose width is then in the
+    draws: that is no lack of an optimum.
+    """
     ended = posterior.optimum
+    silent = ended.status in (SearchStatus.AT_START, SearchStatus.PLATEAU)
+    concerned = _concerned(ended)
+    if silent and concerned and set(concerned) <= set(nuisance):
+        why = (
+            f"The search settled for every parameter that is reported. {', '.join(concerned)} "
+            "stayed where the prior is, and the intervals have the prior's width for it."
+        )
+        return Verdict(scope, "optimum", "pass", float(ended.agreeing), 1.0, why)
     status: Status = "pass" if ended.success else "fail"
     return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
+
+
+def _concerned(ended: Optimum) -> tuple[str, ...]:
+    """Names of the parameters that the sentence on a search concerns."""
+    _, _, named = ended.sentence.partition(" It concerns ")
+    return tuple(named.partition(".")[0].split(", ")) if named else ()
 
 
 def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
@@ -183,7 +202,13 @@ def _spread(speeds: Array) -> tuple[float, float]:
     return float(speeds.max() / speeds.min()), float(speeds.max())
 
 
-def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) -> Verdict:
+def _independent(
+    scope: str,
+    chosen: Climbed,
+    diagnostics: Mapping[str, Any],
+    held_out: tuple[StrokeError, ...],
+) -> Verdict:
+    """Say how many independent observations there are; few of them reject no fit that predicts."""
     count = diagnostics["observations"] * diagnostics["independent_share"]
     per = float(count / len(chosen.optimum.point))
     why = (
@@ -196,10 +221,25 @@ def _independent(scope: str, chosen: Climbed, diagnostics: Mapping[str, Any]) ->
             f"{diagnostics['observations']} segments of the path leave residuals that are worth "
             f"{count:.0f} independent ones; the likelihood takes them as its noise has them."
         )
-    if per < FEWEST_INDEPENDENT:
-        why += " That is too few for this many parameters: record longer or more varied motion."
-        return Verdict(scope, "whiteness", "fail", per, FEWEST_INDEPENDENT, why)
-    return Verdict(scope, "whiteness", "pass", per, FEWEST_INDEPENDENT, why)
+    if per >= FEWEST_INDEPENDENT:
+        return Verdict(scope, "whiteness", "pass", per, FEWEST_INDEPENDENT, why)
+    unseen = _median_error(held_out)
+    if unseen is not None and unseen < HELD_OUT_LIMIT:
+        why += (
+            f" That is few for this many parameters, yet unseen strokes are predicted to "
+            f"{unseen:.1%}, so the fit stands: longer or more varied motion would narrow its "
+            "intervals."
+        )
+        return Verdict(scope, "whiteness", "not_evaluated", per, FEWEST_INDEPENDENT, why)
+    why += " That is too few for this many parameters: record longer or more varied motion."
+    return Verdict(scope, "whiteness", "fail", per, FEWEST_INDEPENDENT, why)
+
+
+def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
+    """Median error on unseen strokes; None where none could be held out."""
+    if len(held_out) < 2:
+        return None
+    return float(np.median([error.relative_rms for error in held_out]))
 
 
 def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
@@ -212,10 +252,10 @@ def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
 
 
 def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
-    if len(held_out) < 2:
+    median = _median_error(held_out)
+    if median is None:
         why = "Only one stroke was recorded, so none can be held out: record several."
         return Verdict(scope, "held-out", "not_evaluated", None, HELD_OUT_LIMIT, why)
-    median = float(np.median([error.relative_rms for error in held_out]))
     worst = max(held_out, key=lambda error: error.relative_rms)
     why = (
         f"On strokes it had not seen the law is off by {median:.1%} (median, rms); "

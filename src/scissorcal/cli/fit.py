@@ -12,6 +12,8 @@ from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from scissorcal.calibration import FittedParameter
     from scissorcal.workday.fits import FitOutcome
 
@@ -152,6 +154,7 @@ def _fits(
             "parameters": [parameter.name for parameter in outcome.result.parameters],
             "effort": outcome.result.effort,
             "calibration": not outcome.result.rejected,
+            "verified": outcome.verified,
             "rungs": outcome.result.rungs,
             "selection": outcome.result.selection,
             "critic": outcome.result.critic,
@@ -165,13 +168,13 @@ def _fits(
     ]
     result = {
         "parameters": [
-            parameter.as_dict()
+            row
             for outcome in outcomes
-            for parameter in _reported(outcome)
+            for row in _parameter_facts(outcome)
             if not outcome.result.rejected
         ],
         "not_a_calibration": {
-            outcome.what: [parameter.as_dict() for parameter in _reported(outcome)]
+            outcome.what: _parameter_facts(outcome)
             for outcome in outcomes
             if outcome.result.rejected
         },
@@ -192,14 +195,18 @@ def _text(outcome: "FitOutcome") -> str:
         head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
     if fitted.rejected:
         reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
-        shown = parameter_table(_reported(outcome)).replace("\n", "\n  ")
+        shown = _shown(outcome).replace("\n", "\n  ")
         return (
             f"{outcome.what}: not a calibration:\n{reasons}\n"
             f"{head}; the search ended with these numbers, which are not to be used:\n  {shown}"
         )
-    said = [head, parameter_table(_reported(outcome)), fitted.selection]
+    said = [head, _shown(outcome), fitted.selection]
     said += [proposal.sentence for proposal in fitted.critic]
     said += [fitted.replay.sentence] if fitted.replay else []
+    if not outcome.verified:
+        said.append(
+            f"unverified: 'scissorcal verify {outcome.what}' checks whether these intervals hold."
+        )
     return "\n".join(line for line in said if line)
 
 
@@ -207,13 +214,37 @@ def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
     return (*outcome.result.parameters, *outcome.result.derived)
 
 
-def parameter_table(parameters: "tuple[FittedParameter, ...]") -> str:
-    """Set out fitted parameters for people."""
+def _parameter_facts(outcome: "FitOutcome") -> list[dict[str, object]]:
+    """Parameters as ``--json`` prints them, each with what is known to be poor about it."""
+    from scissorcal.calibration.caveats import caveats_by_parameter
+
+    known = caveats_by_parameter(outcome.result)
+    return [
+        {**parameter.as_dict(), "caveats": list(known.get(parameter.name, ()))}
+        for parameter in _reported(outcome)
+    ]
+
+
+def _shown(outcome: "FitOutcome") -> str:
+    """The table of parameters, and below it which of their intervals are known to be poor."""
+    from scissorcal.calibration.caveats import caveats_of
+
+    known = caveats_of(outcome.result)
+    marked = {name for caveat in known for name in caveat.parameters}
+    lines = [parameter_table(_reported(outcome), marked)]
+    lines += [f"* {', '.join(caveat.parameters)}: {caveat.sentence}" for caveat in known]
+    return "\n".join(lines)
+
+
+def parameter_table(
+    parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
+) -> str:
+    """Set out fitted parameters for people; those that are ``marked`` get an asterisk."""
     rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", "identifiability"]]
     for parameter in parameters:
         numbers = (parameter.mean, parameter.sd, parameter.q05, parameter.q95)
         rows.append(
-            [parameter.name, parameter.unit]
+            [f"{parameter.name} *" if parameter.name in marked else parameter.name, parameter.unit]
             + [f"{number:.4g}" for number in numbers]
             + [f"{parameter.identifiability:.2f}"]
         )

@@ -123,11 +123,11 @@ def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
 
 
 def verdict_lines(verdicts: Sequence[Verdict]) -> str:
-    """Set out verdicts for people, one line each: outcome, scope, check, why."""
+    """Set out verdicts for people, one line each: outcome, scope, check, value and limit, why."""
     rows = []
     for verdict in verdicts:
         word, _ = _MARKS[verdict.status]
-        rows.append([word, verdict.scope, verdict.check, verdict.why])
+        rows.append([word, verdict.scope, verdict.check, verdict.limited, verdict.why])
     if not rows:
         return ""
     lines = table(rows).splitlines()

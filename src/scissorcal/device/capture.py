@@ -28,6 +28,8 @@ FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
+IDLE_S = 1.5
+"""Time with the motors off at the end of a cut's capture: a second of it tells zeros of sensors."""
 
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they will open, and the sledge "
@@ -131,6 +133,7 @@ def capture_cut(
             drive.go_to_start(segment)
             loader.load(segment.request)
             drive.follow(segment)
+        drive.idle()
         return _finish(recorder, motion)
 
 
@@ -195,6 +198,11 @@ class _Drive:
             self._done = max(self._done, begun + min(passed, len(segment.reference)))
             self._take(samples, self._doing(samples))
         self._done = begun + len(segment.reference)
+
+    def idle(self) -> None:
+        """Record a second with the motors off, which shows the zeros of the sensors."""
+        for samples in self._motion.idle(IDLE_S):
+            self._take(samples, "motors off, to see where the sensors have their zeros")
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)

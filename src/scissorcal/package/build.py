@@ -26,7 +26,7 @@ from scissorcal.package.compile import (
     scene_box,
 )
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
-from scissorcal.package.friction_tables import left_out
+from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
     FORMAT,
     Bound,
@@ -104,13 +104,7 @@ def build_package(
     )
     bound = _bound(model, compiled, ranges, recipe, tolerance)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
-    if record.friction and model.friction:
-        said = (
-            *record.friction.warnings,
-            *left_out(model.friction, bound.scene_torque_Nm),
-        )
-        told = record.friction.model_copy(update={"warnings": said})
-        record = record.model_copy(update={"friction": told})
+    record = _with_left_out(record, cut, model, bound)
     manifest = _hashed(
         Manifest(
             format="scissorcal-package/1",
@@ -267,6 +261,18 @@ def _provenance(
             structure=FrictionStructure(**_known(friction.structure, FrictionStructure)),
         ),
     )
+
+
+def _with_left_out(
+    record: Provenance, cut: FitResult, model: ExactModel, bound: Bound
+) -> Provenance:
+    """The record with what of both laws the tables do not render."""
+    said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
+    update: dict[str, Any] = {"cut": record.cut.model_copy(update={"left_out": said})}
+    if record.friction and model.friction:
+        said = (*record.friction.warnings, *left_out(model.friction, bound.scene_torque_Nm))
+        update["friction"] = record.friction.model_copy(update={"warnings": said})
+    return record.model_copy(update=update)
 
 
 def _known(structure: Mapping[str, Any], kind: type[CutStructure | FrictionStructure]) -> Any:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction import angle_factor
@@ -88,6 +89,27 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
             f"right after one, {2 * sudden * dry / math.e:.2g} N m {length:.2g} rad later."
         )
     return tuple(said)
+
+
+def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[str, ...]:
+    """Sentences on what of a cut's law the tables leave out, and what that costs in torque.
+
+    Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
+    material. ``scene_torque`` (N m) is the largest that the scene renders; a share that is
+    certainly below ``allowed``, what the tables may be off by, is not told.
+    """
+    share = next((p for p in cut.nuisance if p.name == "load_share"), None)
+    if share is None:
+        return ()
+    most = abs(share.mean) + 2.0 * share.sd
+    if most < allowed:
+        return ()
+    return (
+        f"fit.cut, load_share: up to {most * scene_torque:.2g} N m at the scene's "
+        f"{scene_torque:.2g} N m are not rendered: friction of the pivot that grows with the cut's "
+        f"torque, by {share.mean:.2g} (sd {share.sd:.1g}) of it. Compare rendered torque with the "
+        "material's own, not with the motor's.",
+    )
 
 
 def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:

@@ -202,7 +202,7 @@ class FitRecord(Section):
     """A fit that went into the package; its draws stand in ``draws/<what>.npy``.
 
     ``parameters`` are in the order of the draws' columns. ``warnings`` are the fit's failed
-    verdicts, word for word.
+    verdicts, word for word, ``left_out`` what of its law the tables do not render.
     """
 
     rung: Text
@@ -211,6 +211,7 @@ class FitRecord(Section):
     sources: tuple[Text, ...]
     parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=128)]
     warnings: tuple[Text, ...]
+    left_out: tuple[Text, ...] = ()
 
 
 class CutRecord(FitRecord):

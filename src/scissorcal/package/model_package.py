@@ -115,7 +115,7 @@ class ModelPackage:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever renders this package should know beforehand, as sentences."""
-        return self.review_warnings + self.fit_warnings
+        return self.review_warnings + self.fit_warnings + self.manifest.provenance.cut.left_out
 
     @property
     def review_warnings(self) -> tuple[str, ...]:

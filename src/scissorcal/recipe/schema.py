@@ -131,11 +131,16 @@ class Control(Section):
 
 
 class Rig(Section):
-    """The device: which blades move, the handle, and the blade."""
+    """The device: which blades move, the handle, and the blade.
+
+    ``opening_zero_sd_deg`` says how well the zero of the opening (where the centrelines of the
+    blades meet) is known, as by a homing switch; half a millimetre at each tip where not given.
+    """
 
     joint: Literal["rotary", "linear"] = "rotary"
     moving: Literal["both", "upper"] = "both"
     handle_radius_mm: Length_mm = 60.0
+    opening_zero_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] | None = None
     edge: Edge
     control: Control = Control()
 

@@ -24,12 +24,16 @@ FIT_ORDER: tuple[FitKind, ...] = ("friction", "cut")
 
 @dataclass(frozen=True)
 class FitOutcome:
-    """One fit of a workspace: its result, its file, and whether it had to be done at all."""
+    """One fit of a workspace: its result, its file, and whether it had to be done at all.
+
+    ``verified`` says that there is a trust check of this very fit.
+    """
 
     what: FitKind
     result: "FitResult"
     path: Path
     cached: bool
+    verified: bool = False
 
 
 def fit_workspace(
@@ -174,7 +178,8 @@ def _fit(
     upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
     expected = expected_hash(workspace, recipe, what, chosen, upstream)
     if path.is_file() and not force and load_header(path).inputs_hash == expected:
-        return FitOutcome(what, load_fit(path), path, cached=True)
+        stored = load_fit(path)
+        return FitOutcome(what, stored, path, cached=True, verified=is_verified(workspace, stored))
     rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
     checkpoint = workspace.checkpoint_path(what, expected)
     before = last_chosen(workspace, what)
@@ -208,7 +213,7 @@ def _fit(
     save_fit(result, path)
     if not result.rejected:
         checkpoint.unlink(missing_ok=True)
-    return FitOutcome(what, result, path, cached=False)
+    return FitOutcome(what, result, path, cached=False, verified=is_verified(workspace, result))
 
 
 def last_chosen(workspace: Workspace, what: FitKind) -> str | None:
@@ -267,3 +272,14 @@ def progress_share(progress: Progress | None, index: int, count: int) -> Progres
             progress((index + done) / count, sentence)
 
     return tell
+
+
+def is_verified(workspace: Workspace, fit: "FitResult") -> bool:
+    """Whether there is a trust check of this very fit."""
+    from scissorcal.calibration.verify import load_verify
+
+    path = workspace.verify_path(fit.what)
+    try:
+        return path.is_file() and load_verify(path).fit_hash == fit.inputs_hash
+    except InputError:
+        return False

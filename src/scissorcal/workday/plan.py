@@ -13,7 +13,7 @@ from scissorcal.recipe.requirements import (
 )
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
-from scissorcal.workday.fits import is_current
+from scissorcal.workday.fits import is_current, is_verified
 from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.recordings import UnreadableError, usable_recordings
 from scissorcal.workday.reports import why_stale
@@ -82,10 +82,10 @@ def make_plan(workspace: Workspace) -> Plan:
         captured = next(step for step in steps if step.name == f"capture {what}")
         steps.append(_fit_step(workspace, recipe, what, item.why, captured, fits))
     fitted = all(step.status == "done" for step in steps)
-    if fitted and not all(_is_verified(workspace, fit) for fit in fits.values()):
+    if fitted and not all(is_verified(workspace, fit) for fit in fits.values()):
         notes.append(
-            "Not checked yet whether the fits can be trusted; 'scissorcal verify' does so, and the "
-            "report shows it."
+            "Unverified: whether the intervals of the fits hold was not checked. 'scissorcal "
+            "verify' does so, and the report shows it."
         )
     report = _report_step(workspace, recipe, fits, fitted)
     steps += [report, _review_step(workspace, recipe, fits, report, notes)]
@@ -124,17 +124,6 @@ def _geometry(name: str) -> GeometryKind:
 
 
 _PHOTOGRAPHS = {"camera": "board-*.jpg", "blade": "blade-*.jpg", "plate": "plate-*.jpg"}
-
-
-def _is_verified(workspace: Workspace, fit: "FitResult") -> bool:
-    """Whether there is a trust check of this very fit."""
-    from scissorcal.calibration.verify import load_verify
-
-    path = workspace.verify_path(fit.what)
-    try:
-        return path.is_file() and load_verify(path).fit_hash == fit.inputs_hash
-    except InputError:
-        return False
 
 
 def _capture_step(
@@ -198,6 +187,8 @@ def _fit_step(
     wrong = [verdict.check for verdict in failed(fit.verdicts)]
     if wrong:
         state += f"; failed: {', '.join(wrong)}"
+    elif not is_verified(workspace, fit):
+        state += "; unverified"
     return Step(name, "done", state, why, command, (workspace.relative(path),))
 
 

@@ -1,14 +1,18 @@
 """Verdicts and notes that only a cut's fit has."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.scout import Scouted
+from scissorcal.calibration.cut.stale import count_empty, stale_verdict
 from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, failed
 
 Array = NDArray[np.float64]
@@ -22,8 +26,9 @@ def cut_verdicts(
     edge_verdicts: tuple[Verdict, ...],
     scouted: Scouted,
     sensors: Sensors,
+    recordings: tuple[Recording, ...],
 ) -> tuple[Verdict, ...]:
-    """Judge what the fit builds on, its sensors, and its line."""
+    """Judge what the fit builds on, its sensors, its sheets and its line."""
     return (
         _foundations(friction, edge_verdicts),
         Verdict(
@@ -34,8 +39,32 @@ def cut_verdicts(
             sensors.verdict.threshold,
             sensors.verdict.why,
         ),
+        stale_verdict(count_empty(scouted.segments.motions, scouted.materials, recordings)),
         *_line(scouted),
     )
+
+
+def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
+    """What is known to matter for a cut's calibration: encoder, line, fresh sheets.
+
+    ``counts_per_sample`` is the median over the running cracks, or over the loadings where nothing
+    runs.
+    """
+    segments = design.likelihood.segments
+    parts = [(run.motion, run.ends) for run in segments.stretches]
+    if not parts:
+        parts = [(p.motion, p.ends) for p in segments.pieces if p.kind != "unloading"]
+    counts = [
+        np.abs(np.diff(segments.motions[index].opening[ends]))
+        / np.diff(ends)
+        / segments.motions[index].resolution
+        for index, ends in parts
+    ]
+    return {
+        "counts_per_sample": float(np.median(np.concatenate(counts))) if counts else None,
+        "teeth_line": design.likelihood.line is not None,
+        "fresh_loadings": sum(piece.kind == "fresh" for piece in segments.pieces),
+    }
 
 
 def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:

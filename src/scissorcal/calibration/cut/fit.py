@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.between import widened
 from scissorcal.calibration.cut.averaging import (
     Candidate,
     Inferred,
@@ -15,7 +16,8 @@ from scissorcal.calibration.cut.averaging import (
     by_load,
     load_note,
 )
-from scissorcal.calibration.cut.checks import cut_verdicts, line_notes
+from scissorcal.calibration.cut.between import between_notes, compare_cuts
+from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import KnownFriction
@@ -29,6 +31,8 @@ from scissorcal.calibration.cut.scout import (
 )
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.cut.toughness import with_toughness
+from scissorcal.calibration.cut.unknowns import SCENE_OF_BOUNDS, with_unknowns
+from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.ladder import Climbed, choose, climb
@@ -102,10 +106,11 @@ def fit_cut(
     inferred = average(candidates, infer_one, rng)
     chosen, design = inferred.candidate.climbed, inferred.candidate.design
     u = chosen.optimum.point
+    between = compare_cuts(design, u, recordings, rng)
     fit = assemble(
         what="cut",
         effort=effort,
-        posterior=inferred.posterior,
+        posterior=widened(inferred.posterior, between, rng),
         climbed=[one for one, _ in climbed],
         chosen=chosen,
         structure=design.key,
@@ -125,15 +130,24 @@ def fit_cut(
         nuisance=NUISANCE,
         rng=rng,
         critic=recipe.fit.cut.critic,
-        extra_verdicts=cut_verdicts(friction, edge_verdicts, scouted, sensors),
+        extra_verdicts=(
+            *cut_verdicts(friction, edge_verdicts, scouted, sensors, recordings),
+            *((between.verdict(),) if between else ()),
+        ),
         extra_notes=(
             *sensors.notes,
             *line_notes(scouted, design, inferred.budget),
             *load_note(candidates),
             *draft_note(effort, ladder, laws),
+            usage_sentence(recordings, usage_of_segments(recordings, scouted.segments)),
+            *between_notes(between, NUISANCE),
         ),
+        extra_diagnostics={
+            **cut_diagnostics(scouted, design),
+            **(between.diagnostics() if between else {}),
+        },
     )
-    return with_toughness(fit, recipe, rng)
+    return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
 
 
 def _infer(
@@ -188,9 +202,9 @@ def settings_of(recipe: Recipe) -> str:
     """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
     return recipe.model_dump_json(
         include={
-            "rig": {"joint", "moving", "handle_radius_mm", "edge"},
+            "rig": {"joint", "moving", "handle_radius_mm", "edge", "opening_zero_sd_deg"},
             "material": {"thickness_mm", "thickness_sd_mm"},
-            "scene": {"cut", "closure"},
+            "scene": {"cut", "closure", *SCENE_OF_BOUNDS},
             "fit": {"cut", "friction"},
         }
     )

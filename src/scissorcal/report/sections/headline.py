@@ -10,7 +10,7 @@ from scissorcal.report.sections.held_out import HeldOutSection
 from scissorcal.report.sections.parameters import ParameterRow
 from scissorcal.verdicts import Verdict
 
-Stance = Literal["trust", "care", "reject"]
+Stance = Literal["trust", "unverified", "care", "reject"]
 
 DRAFT_SKIPS = "k-hat"
 
@@ -85,7 +85,8 @@ def write_headline(
     ``checked`` are the verdicts of its trust check, if one was made.
 
     Any failed verdict rejects. Missing verdicts, checks that were not evaluated, draft effort, or
-    a parameter that only repeats its prior ask for care.
+    a parameter that only repeats its prior ask for care. Without a trust check nothing is trusted:
+    a fit that passed its own checks is unverified.
     """
     verdicts = (*fit.verdicts, *checked)
     failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
@@ -119,6 +120,13 @@ def write_headline(
         return Headline(fit.what, "care", sentence, tuple(steps))
     count = len(verdicts)
     made = "its one check" if count == 1 else f"all {count} checks"
+    if not checked:
+        sentence = (
+            f"The {fit.what} fit is unverified: it passed {made} of its own, and whether its "
+            f"intervals hold was not tested.{error}"
+        )
+        step = f"Run `scissorcal verify {fit.what}`, then `scissorcal report`."
+        return Headline(fit.what, "unverified", sentence, (step,))
     sentence = f"The {fit.what} fit can be trusted: it passed {made}.{error}"
     return Headline(
         fit.what, "trust", sentence, ("Read on, and sign with `scissorcal report sign`.",)

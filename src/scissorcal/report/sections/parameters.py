@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from scissorcal.calibration.caveats import caveats_by_parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite
@@ -12,7 +13,10 @@ Word = Literal["identified", "prior only", "measured before", "not available"]
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter; ``identifiability`` is posterior sd / prior sd, ``word`` its meaning."""
+    """One parameter; ``identifiability`` is posterior sd / prior sd, ``word`` its meaning.
+
+    ``caveats`` say why its interval is known to be poor for this kind of data.
+    """
 
     name: str
     meaning: str
@@ -24,10 +28,12 @@ class ParameterRow:
     q95: Number
     identifiability: Number
     word: Word
+    caveats: tuple[str, ...] = ()
 
 
 def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
     """One row per parameter, in the fit's order, then what follows from them."""
+    known = caveats_by_parameter(fit)
     return tuple(
         ParameterRow(
             parameter.name,
@@ -42,6 +48,7 @@ def tabulate_parameters(fit: FitResult) -> tuple[ParameterRow, ...]:
             "measured before"
             if parameter.believed
             else identifiability_word(finite(parameter.identifiability)),
+            known.get(parameter.name, ()),
         )
         for parameter in (*fit.parameters, *fit.derived)
     )

@@ -16,6 +16,7 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.report.numbers import Number, finite, finite_each, percent, short, with_unit
 from scissorcal.report.reduce import Array
 from scissorcal.report.sections.law import Law, law_of, named
+from scissorcal.verdicts import Verdict
 
 OPENINGS, SPEEDS, CONTACTS = 9, 4, 7
 SLICE_POINTS = 61
@@ -84,8 +85,9 @@ class SceneTorque:
     """The band of rendered torque with probability ``confidence``, over the scene's ranges.
 
     ``within_tolerance`` and ``supported`` are shares of the grid's places that can be felt.
-    ``worst`` is where the band is widest for its torque. Where there is no model, ``missing`` says
-    how to have one, and all else is empty.
+    ``worst`` is where the band is widest for its torque. ``not_in_band`` has what was not measured
+    and may move the mean torque by more than the tolerance: check and share. Where there is no
+    model, ``missing`` says how to have one, and all else is empty.
     """
 
     missing: str
@@ -98,6 +100,7 @@ class SceneTorque:
     worst: TorquePlace | None
     slices: tuple[TorqueSlice, ...]
     grid: TorqueGrid | None
+    not_in_band: tuple[tuple[str, Number], ...] = ()
 
 
 def scene_torque(recipe: Recipe, fits: Sequence[FitResult]) -> SceneTorque:
@@ -140,6 +143,7 @@ def scene_torque(recipe: Recipe, fits: Sequence[FitResult]) -> SceneTorque:
             tuple(bool(value) for value in supported & reached),
             tuple(bool(value) for value in reached & probe.touches(places[0], places[2])),
         ),
+        tuple((v.check, finite(v.value)) for v in cut.verdicts if _open_bound(v)),
     )
 
 
@@ -160,7 +164,18 @@ def findings(section: SceneTorque) -> str:
             f"and a contact of {_millimetres(worst.contact)}: {with_unit(worst.torque, 'N m')} "
             f"± {percent(worst.share)}."
         )
+    if section.not_in_band:
+        named = ", ".join(f"{name} up to {percent(share)}" for name, share in section.not_in_band)
+        words.append(
+            f"The band does not hold what nobody measured, as shares of the mean torque: {named}. "
+            "The verdicts say what to measure."
+        )
     return " ".join(words)
+
+
+def _open_bound(verdict: Verdict) -> bool:
+    """Whether a verdict bounds torque by more than its limit, without rejecting the fit."""
+    return verdict.status == "not_evaluated" and verdict.bounds_torque and verdict.value is not None
 
 
 class Support:

@@ -4,14 +4,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from scissorcal.report.numbers import Number, finite
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Limit, Status, Verdict
 
 ORDER: tuple[Status, ...] = ("fail", "not_evaluated", "pass")
 
 
 @dataclass(frozen=True)
 class VerdictRow:
-    """One verdict, its numbers finite or None."""
+    """One verdict, its numbers finite or None.
+
+    ``limit`` is "at most" or "at least", ``guards`` says what ``value`` is and what it guards.
+    """
 
     scope: str
     check: str
@@ -19,6 +22,8 @@ class VerdictRow:
     value: Number
     threshold: Number
     why: str
+    limit: Limit = ""
+    guards: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,4 +53,6 @@ def row_of(verdict: Verdict) -> VerdictRow:
         finite(verdict.value),
         finite(verdict.threshold),
         verdict.why,
+        verdict.limit,
+        verdict.guards,
     )

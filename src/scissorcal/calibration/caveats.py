@@ -1,0 +1,138 @@
+"""Parameters whose calibration is known to be poor for a kind of data: one table, row by row.
+
+A row stands for something that was measured on rigs with known truth (docs/uncertainty.md) or that
+no data of the kind could tell. A measured improvement removes its row.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from scissorcal.calibration.result import FitResult
+
+FEW_COUNTS = 1.0
+"""Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
+
+RESPONSE = ("response_force", "response_exponent")
+
+
+@dataclass(frozen=True)
+class Caveat:
+    """Why the intervals of ``parameters`` are known to be poor, and what would mend it."""
+
+    parameters: tuple[str, ...]
+    sentence: str
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One kind of data: when it is there, which parameters it concerns, what to say."""
+
+    holds: Callable[[FitResult], bool]
+    parameters: tuple[str, ...]
+    sentence: Callable[[FitResult], str]
+
+
+def caveats_of(fit: FitResult) -> tuple[Caveat, ...]:
+    """The rows of the table that hold for a fit, with those of its parameters they concern."""
+    if fit.what != "cut":
+        return ()
+    names = [parameter.name for parameter in (*fit.parameters, *fit.derived)]
+    found = []
+    for row in _ROWS:
+        concerned = tuple(name for name in names if _concerns(row, name))
+        if concerned and row.holds(fit):
+            found.append(Caveat(concerned, row.sentence(fit)))
+    return tuple(found)
+
+
+def caveats_by_parameter(fit: FitResult) -> Mapping[str, tuple[str, ...]]:
+    """The sentences on each parameter that has one, by its name."""
+    found: dict[str, tuple[str, ...]] = {}
+    for caveat in caveats_of(fit):
+        for name in caveat.parameters:
+            found[name] = (*found.get(name, ()), caveat.sentence)
+    return found
+
+
+def _concerns(row: _Row, name: str) -> bool:
+    return any(
+        name == one or (one.endswith("*") and name.startswith(one[:-1])) for one in row.parameters
+    )
+
+
+def _number(fit: FitResult, name: str) -> float | None:
+    value: Any = fit.diagnostics.get(name)
+    return float(value) if isinstance(value, (int, float)) else None
+
+
+def _coarse(fit: FitResult) -> bool:
+    counts = _number(fit, "counts_per_sample")
+    return counts is not None and counts < FEW_COUNTS
+
+
+def _coarse_words(fit: FitResult) -> str:
+    counts = fit.diagnostics["counts_per_sample"]
+    return (
+        f"{counts:.2g} encoder counts per sample: with so few, errors of 1 to 3 % were seen and "
+        "intervals were too narrow by about 2. Use a finer encoder."
+    )
+
+
+def _loaded(fit: FitResult) -> bool:
+    """Whether the data show load-dependent friction: at 95 %, averaged over laws without it."""
+    return any(p.name == "load_share" and p.q05 > 0.0 for p in fit.nuisance)
+
+
+def _loaded_words(fit: FitResult) -> str:
+    share = next(p.mean for p in fit.nuisance if p.name == "load_share")
+    return (
+        f"{share:.2g} of the cut's torque is friction of the pivot: with 0.1 errors of 1 to 3 % "
+        "were seen and intervals were too narrow by about 2. Oil the pivot, or record loaded "
+        "sweeps to know it apart."
+    )
+
+
+def _no_line(fit: FitResult) -> bool:
+    return fit.structure.get("fracture") == "rippled" and fit.diagnostics.get("teeth_line") is False
+
+
+def _no_line_words(_: FitResult) -> str:
+    return (
+        "0 lines of the teeth are believed, so kappa is near its prior and fracture energy trades "
+        "against it. Capture slower strokes, at two speeds at least."
+    )
+
+
+def _spline_words(fit: FitResult) -> str:
+    deepest = 1e3 * float(max(fit.structure["response_knots_m"]))
+    return (
+        f"{deepest:.2g} mm is the deepest indentation in the data: beyond it a spline's band is "
+        "its continuation's, and too narrow. Press as deep as the scene does."
+    )
+
+
+def _fresh(fit: FitResult) -> bool:
+    return (_number(fit, "fresh_loadings") or 0.0) > 0.0
+
+
+def _fresh_words(fit: FitResult) -> str:
+    count = int(fit.diagnostics["fresh_loadings"])
+    return (
+        f"{count} loadings of fresh sheets count their near edge as exactly where advance is 0: on "
+        "six virtual days 90 % intervals held the force in 4 to 6 and the exponent in 3 to 4. Put "
+        "each sheet's edge against a stop."
+    )
+
+
+_ROWS = (
+    _Row(_coarse, RESPONSE, _coarse_words),
+    _Row(_loaded, RESPONSE, _loaded_words),
+    _Row(_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
+    _Row(
+        lambda fit: fit.structure.get("response") == "spline",
+        ("response_*",),
+        _spline_words,
+    ),
+    _Row(_fresh, RESPONSE, _fresh_words),
+)

@@ -1,0 +1,230 @@
+"""What nobody measured, as a bound on the torque of the scene: zeros, edge, friction by load."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.laws import LOAD_SHARE_SD
+from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.idle import idle_zero
+from scissorcal.model import Cutting, edge_height, settled_contact
+from scissorcal.model.cutting import torque_at
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Status, Verdict
+
+Array = NDArray[np.float64]
+
+BY_EYE_M = 0.5e-3
+"""A blade's tip is rounded and worn: by eye or ruler its line is known to half a millimetre
+(docs/decisions/062-the-centreline-halves-the-blade.md)."""
+OPENINGS, CONTACTS = 9, 7
+SCENE_OF_BOUNDS = (
+    "opening_deg",
+    "opening_rate_rad_per_s",
+    "contact_mm",
+    "tolerance_percent",
+    "render_friction",
+)
+"""What of a recipe's scene the bounds depend on."""
+SURE = 2.0
+"""Standard deviations up to which a measured zero or a fitted share counts."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One thing that was not measured: the torque it may cost, and what removes it.
+
+    ``torque_Nm`` bounds the error of the mean torque over the scene, ``share`` is that over the
+    mean itself. ``spread`` says how far the unknown may be off and where that is from;
+    ``removed_by`` is empty where nothing is unknown.
+    """
+
+    name: str
+    torque_Nm: float
+    share: float
+    spread: str
+    removed_by: str = ""
+
+
+@dataclass(frozen=True)
+class SceneMean:
+    """Mean torque of the material over a grid (k,) of the scene's openings and contacts.
+
+    ``rate`` (rad/s) is the middle of the scene's, with the blades closing.
+    """
+
+    cutting: Cutting
+    opening: Array
+    contact: Array
+    rate: float
+
+    @classmethod
+    def of(cls, fit: FitResult, recipe: Recipe) -> "SceneMean":
+        """The scene of a recipe, and the model at a cut's best point."""
+        scene = recipe.scene
+        opening, contact = np.meshgrid(
+            np.linspace(*scene.opening_rad, OPENINGS), np.linspace(*scene.contact_m, CONTACTS)
+        )
+        low, high = scene.opening_rate_rad_per_s
+        values = {
+            parameter.name: np.asarray(value)
+            for parameter, value in zip(fit.parameters, fit.map_point, strict=True)
+        }
+        rate = -float(np.sqrt(max(low, 1e-3) * high))
+        return cls(cutting_from(fit.structure, values), opening.ravel(), contact.ravel(), rate)
+
+    def torque(self, away_rad: float = 0.0, **edge: float) -> float:
+        """Mean torque (N m), with openings or fields of the edge larger by so much."""
+        moved = {field: getattr(self.cutting.edge, field) + by for field, by in edge.items()}
+        cutting = replace(self.cutting, edge=replace(self.cutting.edge, **moved))
+        opening = self.opening + away_rad
+        place = self.contact
+        if cutting.fracture_energy is not None:
+            place = np.maximum(place, settled_contact(cutting, opening))
+        view = edge_height(cutting.edge, place, opening / cutting.moving_blades)
+        reached = view.station < cutting.edge.length_m
+        felt = np.where(reached, torque_at(cutting, opening, place, self.rate), 0.0)
+        return float(np.mean(felt))
+
+    def change(self, away_rad: float = 0.0, **edge: float) -> float:
+        """The larger change (N m) of the mean torque, either way, for such an error."""
+        here = self.torque()
+        there = self.torque(away_rad, **edge)
+        back = self.torque(-away_rad, **{field: -by for field, by in edge.items()})
+        return max(abs(there - here), abs(back - here))
+
+
+def with_unknowns(
+    fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
+) -> FitResult:
+    """Give a cut's fit its verdicts on what was not measured, and the bounds as diagnostics.
+
+    Each bound is the change of the scene's mean torque at the fitted parameters. A fit to another
+    edge would follow by parameters of its own and end nearer, so it is never too small where the
+    scene lies within the data. Bounds are no errors that were seen: a large one rejects nothing,
+    the check counts as not evaluated and says what to measure.
+    """
+    found = find_unknowns(fit, recipe, friction, recordings)
+    limit = recipe.scene.tolerance_percent / 100.0
+    facts = {"not_measured": [dict(vars(one)) for one in found]}
+    return replace(
+        fit,
+        verdicts=(*fit.verdicts, *(_verdict(one, limit) for one in found)),
+        diagnostics={**fit.diagnostics, **facts},
+    )
+
+
+def find_unknowns(
+    fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
+) -> tuple[Unknown, ...]:
+    """Bound the scene's mean torque by zeros, edge shape and friction by load."""
+    scene = SceneMean.of(fit, recipe)
+    mean = scene.torque()
+    rows = (
+        ("opening zero", *_opening_zero(scene, recipe, recordings)),
+        ("torque zero", *_torque_zero(recipe, friction, recordings)),
+        ("edge shape", *_edge_shape(scene, fit, recipe)),
+        ("friction by load", *_load(mean, fit, recipe, friction)),
+    )
+    return tuple(
+        Unknown(name, torque, torque / mean if mean > 0.0 else 0.0, spread, cure)
+        for name, torque, spread, cure in rows
+    )
+
+
+def _verdict(one: Unknown, limit: float) -> Verdict:
+    status: Status = "pass" if one.share <= limit else "not_evaluated"
+    size = f"Up to {one.torque_Nm:.2g} N m ({one.share:.1%}) of the scene's mean torque"
+    if one.torque_Nm == 0.0:
+        size = "Nothing of the scene's torque is open"
+    why = f"{size}: {one.spread} {one.removed_by}".rstrip()
+    return Verdict("fit.cut", one.name, status, one.share, limit, why)
+
+
+def _opening_zero(
+    scene: SceneMean, recipe: Recipe, recordings: tuple[Recording, ...]
+) -> tuple[float, str, str]:
+    cure = (
+        "Record an idle second, motors off, with the centrelines of the blades together, or state "
+        "rig.opening_zero_sd_deg."
+    )
+    spread = recipe.rig.moving_blades * BY_EYE_M / (recipe.rig.edge.length_mm * 1e-3)
+    known = idle_zero(recordings, "opening")
+    stated = recipe.rig.opening_zero_sd_deg
+    if stated is not None:
+        spread, cure = SURE * float(np.radians(stated)), ""
+        said = f"the recipe has the zero of the opening known to {stated:.2g} deg (sd)."
+    elif known is not None and abs(known.mean) < spread:
+        spread, cure = abs(known.mean) + SURE * known.sd, ""
+        said = f"an idle second shows {known.mean:.2g} rad where the blades' centrelines meet."
+    else:
+        said = f"the zero of the opening may be off by {spread:.2g} rad, half a millimetre a tip."
+    return scene.change(spread), said, cure
+
+
+def _torque_zero(
+    recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
+) -> tuple[float, str, str]:
+    """A zero is alike in friction and cut; it is felt where unequal levels are rendered."""
+    if not recipe.scene.render_friction:
+        return 0.0, "friction, into which a zero goes, is not rendered.", ""
+    levels = [p.mean for p in friction.parameters if p.name in ("coulomb_pos", "coulomb_neg")]
+    if len(levels) < 2:
+        return 0.0, "friction's fit has an offset of its own, which is not rendered.", ""
+    known = idle_zero(recordings, "drive")
+    if known is not None:
+        said = f"an idle second shows {known.mean:.2g} N m (sd {known.sd:.1g}) of drive."
+        return abs(known.mean) + SURE * known.sd, said, ""
+    half = 0.5 * abs(levels[0] - levels[1])
+    said = (
+        f"friction differs by {2 * half:.2g} N m between the directions, and a zero of the torque "
+        "or force sensor would look the same."
+    )
+    cure = "Record an idle second, motors off and hands off, to tell them apart."
+    return half, said, cure
+
+
+def _edge_shape(scene: SceneMean, fit: FitResult, recipe: Recipe) -> tuple[float, str, str]:
+    if recipe.rig.edge.source == "photographs" or any(
+        parameter.name.startswith("edge_") for parameter in fit.parameters
+    ):
+        said = "photographs or the recipe say how well the edge is known; the intervals hold it."
+        return 0.0, said, ""
+    length = scene.cutting.edge.length_m
+    bend = 8.0 * BY_EYE_M / length**2
+    changes = (
+        scene.change(offset_m=BY_EYE_M),
+        scene.change(taper_rad=BY_EYE_M / length),
+        scene.change(curvature_per_m=bend, taper_rad=-0.5 * bend * length),
+    )
+    said = (
+        "the recipe has the edge as exact, without a standard deviation: its offset, its tip and "
+        "its middle may each be off by half a millimetre."
+    )
+    cure = (
+        'Photograph the blade (rig.edge.source = "photographs"), or state offset_sd_mm and '
+        "taper_sd_deg."
+    )
+    return float(np.linalg.norm(changes)), said, cure
+
+
+def _load(
+    mean: float, fit: FitResult, recipe: Recipe, friction: FitResult
+) -> tuple[float, str, str]:
+    cure = "Record loaded sweeps, motor and handle against each other, to know it."
+    share = next((p for p in fit.nuisance if p.name == "load_share"), None)
+    if share is not None:
+        said = (
+            f"friction of the pivot took {share.mean:.2g} (sd {share.sd:.1g}) of the cut's torque, "
+            "which is not rendered."
+        )
+        return (abs(share.mean) + SURE * share.sd) * mean, said, cure
+    if any(parameter.name == "load_share" for parameter in friction.parameters):
+        return 0.0, "the empty sweeps were loaded, and friction's fit has it.", ""
+    if recipe.fit.cut.load_share != "none":
+        return 0.0, "laws with and without it were compared, and the strokes show none.", ""
+    said = f"jaw tools have up to {LOAD_SHARE_SD:g} of the load as friction, and none was fitted."
+    return LOAD_SHARE_SD * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'

@@ -1,0 +1,63 @@
+"""What of a cut's recordings enters its fit, by stroke and speed, and why the rest does not."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.segments import Segments
+from scissorcal.calibration.signals.usage import GAP, SPOILT, Usage, count_usage
+from scissorcal.recording.recording import Recording
+
+Mask = NDArray[np.bool_]
+
+STARTING = "crack about to start"
+FREE = "blades free of the material"
+
+
+def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> Usage:
+    """Count the samples that elastic and running segments span.
+
+    Between the end of loading and where a running crack is trusted a crack is about to start, and
+    no segment can say when. The rest of a stroke is spent free of the material, or on the turn.
+    """
+    sizes = [len(recording.samples) for recording in recordings]
+    masks = {
+        name: tuple(np.zeros(size, dtype=bool) for size in sizes)
+        for name in ("used", "inside", SPOILT, STARTING)
+    }
+    for motion in segments.motions:
+        span = slice(motion.start, motion.start + len(motion.opening))
+        masks["inside"][motion.recording][span] = True
+        masks[SPOILT][motion.recording][span] = ~motion.usable
+    loaded: dict[int, list[int]] = {}
+    for piece in segments.pieces:
+        _mark(masks["used"], segments, piece.motion, int(piece.ends[0]), int(piece.ends[-1]))
+        if piece.kind != "unloading":
+            loaded.setdefault(piece.motion, []).append(int(piece.ends[-1]))
+    for run in segments.stretches:
+        low = int(run.ends[0])
+        _mark(masks["used"], segments, run.motion, low, int(run.ends[-1]))
+        motion = segments.motions[run.motion]
+        before = max((end for end in loaded.get(run.motion, []) if end <= low), default=low)
+        if motion.stroke[before] == motion.stroke[low]:
+            _mark(masks[STARTING], segments, run.motion, before, low)
+    reasons = {
+        GAP: tuple(~inside for inside in masks["inside"]),
+        SPOILT: masks[SPOILT],
+        STARTING: masks[STARTING],
+        FREE: masks["inside"],
+    }
+    return count_usage(recordings, masks["used"], reasons)
+
+
+def usage_sentence(recordings: tuple[Recording, ...], usage: Usage) -> str:
+    """How much of the closing strokes is used, and of which speed least: opening ones are free."""
+    kinds = [stroke.kind for recording in recordings for stroke in recording.strokes]
+    closing = [row for row in usage.rows if row.stroke >= 0 and kinds[row.stroke] != "opening"]
+    if not closing:
+        return usage.sentence
+    return Usage(tuple(closing)).sentence.replace("in strokes", "in closing strokes", 1)
+
+
+def _mark(masks: tuple[Mask, ...], segments: Segments, index: int, low: int, high: int) -> None:
+    motion = segments.motions[index]
+    masks[motion.recording][motion.start + low : motion.start + high + 1] = True

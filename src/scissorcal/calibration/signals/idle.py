@@ -1,0 +1,62 @@
+"""Idle seconds: motors off and blades at rest, where sensors show their zeros."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.signals.segments import pieces_of, stretches
+from scissorcal.calibration.signals.sensors import resolution_of
+from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+IDLE_S = 1.0
+"""A rest that lasts so long, motors off, tells a zero."""
+STILL_STEPS = 2.0
+"""Steps of the encoder by which an opening at rest may differ."""
+
+
+@dataclass(frozen=True)
+class Zero:
+    """What a sensor shows while nothing acts on it: its mean, and how well that is known."""
+
+    mean: float
+    sd: float
+    seconds: float
+
+
+def idle_zero(recordings: tuple[Recording, ...], what: Literal["opening", "drive"]) -> Zero | None:
+    """What the opening (rad) or the drive (N m) shows over idle seconds; None without any.
+
+    Idle is where nothing is commanded, the blades stand and no stroke is under way, for
+    ``IDLE_S``. Recordings without a single command say nothing of when motors were off.
+    """
+    found: list[Array] = []
+    seconds = 0.0
+    for recording in recordings:
+        samples = recording.samples
+        command = np.asarray(samples["torque_command"], dtype=np.float64)
+        if not np.any(command):
+            continue
+        opening = np.asarray(samples["opening"], dtype=np.float64)
+        still = resolution_of(opening)
+        still = STILL_STEPS * still if np.isfinite(still) else 0.0
+        quiet = (command == 0.0) & (np.asarray(samples["stroke"]) < 0)
+        tick = float(np.median(np.diff(recording.device_time_s)))
+        for first, last in pieces_of(recording):
+            for low, high in zip(*stretches(quiet[first:last]), strict=True):
+                part = slice(first + int(low), first + int(high))
+                long = (high - low) * tick >= IDLE_S
+                if not long or np.ptp(opening[part]) > still:
+                    continue
+                values = opening[part] if what == "opening" else recording.drive_effort[part]
+                found.append(np.asarray(values, dtype=np.float64))
+                seconds += float((high - low) * tick)
+    if not found:
+        return None
+    every = np.concatenate(found)
+    blocks = np.array_split(every, max(2, int(10 * seconds)))
+    means = np.array([float(block.mean()) for block in blocks])
+    return Zero(float(every.mean()), float(means.std(ddof=1) / np.sqrt(len(means))), seconds)

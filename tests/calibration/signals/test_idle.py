@@ -1,0 +1,42 @@
+"""Idle seconds show the zeros of sensors; anything else does not."""
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.signals.idle import idle_zero
+from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+
+ZERO, NOISE = 4e-4, 1e-3
+
+
+def recording(idle_s: float = 1.5, command: float = 0.02, creep: float = 0.0) -> Recording:
+    """Two seconds of motion, then motors off at 0.01 rad."""
+    rng = np.random.default_rng(5)
+    moving, still = 2000, round(1000 * idle_s)
+    samples = np.zeros(moving + still, SAMPLE_DTYPE)
+    samples["device_time_us"] = 1000 * np.arange(len(samples))
+    samples["opening"][:moving] = 0.5 + 0.3 * np.sin(np.arange(moving) / 200)
+    samples["opening"][moving:] = 0.01 + creep * np.arange(still)
+    samples["opening"] = np.round(samples["opening"] / 5e-5) * 5e-5
+    samples["torque_command"][:moving] = command
+    samples["motor_torque"] = ZERO + NOISE * rng.standard_normal(len(samples))
+    samples["motor_torque"][:moving] += command
+    samples["stroke"] = np.where(np.arange(len(samples)) < moving, 0, -1)
+    return Recording("cut", samples, source="cut.mcap")
+
+
+def test_an_idle_second_tells_both_zeros():
+    drive, opening = (idle_zero((recording(),), what) for what in ("drive", "opening"))
+    assert abs(drive.mean - ZERO) < 3 * drive.sd
+    assert drive.sd == pytest.approx(NOISE / np.sqrt(1500), rel=0.5)
+    assert opening.mean == pytest.approx(0.01, abs=5e-5)
+    assert drive.seconds == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"idle_s": 0.5}, {"creep": 1e-5}, {"command": 0.0}],
+    ids=["too short", "the blades creep", "nothing says when motors were off"],
+)
+def test_what_is_no_idle_second_tells_nothing(changes):
+    assert idle_zero((recording(**changes),), "drive") is None

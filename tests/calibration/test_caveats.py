@@ -1,0 +1,102 @@
+"""Parameters whose calibration is known to be poor carry that, and only where it holds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scissorcal.calibration import FittedParameter
+from scissorcal.calibration.caveats import FEW_COUNTS, caveats_by_parameter, caveats_of
+from scissorcal.cli.fit import _parameter_facts, _text
+from scissorcal.report.sections.parameters import tabulate_parameters
+from scissorcal.workday.fits import FitOutcome
+from tests.package.fits import cut_fit, friction_fit, recipe
+
+GOOD = {"counts_per_sample": 8.0, "teeth_line": True, "fresh_loadings": 0}
+
+
+def fitted(structure=None, **diagnostics):
+    fit = cut_fit(recipe(), kappa=0.7)
+    return replace(
+        fit,
+        structure={**fit.structure, **(structure or {})},
+        diagnostics={**fit.diagnostics, **GOOD, **diagnostics},
+    )
+
+
+def loaded(q05):
+    share = FittedParameter("load_share", "1", 0.09, 0.02, q05, 0.09, 0.12, 0.2)
+    return replace(fitted({"load_share": True}), nuisance=(share,))
+
+
+def test_a_load_share_that_the_data_do_not_show_is_no_caveat():
+    assert caveats_of(loaded(0.0)) == ()
+
+
+def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
+    assert caveats_of(fitted()) == ()
+    assert caveats_of(friction_fit()) == ()
+
+
+@pytest.mark.parametrize(
+    ("fit", "parameters", "begins"),
+    [
+        (
+            fitted(counts_per_sample=0.5 * FEW_COUNTS),
+            ("response_force", "response_exponent"),
+            "0.5 encoder counts per sample",
+        ),
+        (
+            loaded(0.05),
+            ("response_force", "response_exponent"),
+            "0.09 of the cut's torque is friction",
+        ),
+        (fitted(teeth_line=False), ("fracture_energy", "kappa"), "0 lines of the teeth"),
+        (
+            fitted(fresh_loadings=3),
+            ("response_force", "response_exponent"),
+            "3 loadings of fresh sheets",
+        ),
+    ],
+    ids=["coarse encoder", "friction by load", "no line", "fresh edges"],
+)
+def test_each_kind_of_data_is_told_with_its_parameters(fit, parameters, begins):
+    (caveat,) = caveats_of(fit)
+    assert caveat.parameters == parameters
+    assert caveat.sentence.startswith(begins)
+    assert caveat.sentence.count(". ") >= 1 or caveat.sentence.endswith(".")
+
+
+def test_a_splines_caveat_names_its_deepest_knot():
+    shape = FittedParameter("response_shape_1", "1", 0.1, 0.1, 0.0, 0.1, 0.2, 0.5)
+    plain = fitted({"response": "spline", "response_knots_m": [1e-4, 4e-4]})
+    fit = replace(plain, parameters=(*plain.parameters, shape))
+    (caveat,) = caveats_of(fit)
+    assert caveat.parameters == ("response_force", "response_exponent", "response_shape_1")
+    assert caveat.sentence.startswith("0.4 mm is the deepest")
+
+
+def test_no_line_is_no_fault_where_nothing_ripples():
+    smooth = cut_fit(recipe())
+    fit = replace(smooth, diagnostics={**GOOD, "teeth_line": False})
+    assert caveats_of(fit) == ()
+
+
+def test_terminal_json_and_report_carry_it_beside_the_interval():
+    fit = fitted(teeth_line=False)
+    outcome = FitOutcome("cut", fit, Path("cut.nc"), cached=False)
+    said = _text(outcome)
+    sentence = caveats_by_parameter(fit)["kappa"][0]
+    assert "kappa *" in said
+    assert f"* fracture_energy, kappa: {sentence}" in said
+    facts = {row["name"]: row["caveats"] for row in _parameter_facts(outcome)}
+    rows = {row.name: list(row.caveats) for row in tabulate_parameters(fit)}
+    assert facts == rows
+    assert facts["kappa"] == [sentence]
+    assert facts["response_force"] == []
+
+
+def test_a_fit_without_its_trust_check_is_unverified():
+    outcome = FitOutcome("cut", fitted(), Path("cut.nc"), cached=False)
+    assert "unverified: 'scissorcal verify cut'" in _text(outcome)
+    assert "unverified" not in _text(replace(outcome, verified=True))
