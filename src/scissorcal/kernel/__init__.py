@@ -1,5 +1,6 @@
 """The C core and its thin binding: wire frames, tables, the model's step, the servo loop."""
 
+from scissorcal.kernel.crack import CrackLaw, CrackPath, Curve, walk_crack
 from scissorcal.kernel.cut_fit import (
     CutFitData,
     CutFitParameters,
@@ -53,6 +54,9 @@ __all__ = [
     "ConfigEcho",
     "ConfigKey",
     "ConfigStatus",
+    "CrackLaw",
+    "CrackPath",
+    "Curve",
     "CutFitData",
     "CutFitParameters",
     "EnergyLedger",
@@ -85,4 +89,5 @@ __all__ = [
     "encode_frame",
     "presliding_path",
     "run_loop",
+    "walk_crack",
 ]

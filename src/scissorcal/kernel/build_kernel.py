@@ -19,6 +19,7 @@ HEADERS = (
     "sc_block.h",
     "sc_loop.h",
     "sc_cut_fit.h",
+    "sc_crack.h",
     "sc_presliding.h",
 )
 
