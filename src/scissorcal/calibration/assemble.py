@@ -120,6 +120,7 @@ def _diagnostics(
     return {
         "k_hat": posterior.k_hat,
         "effective_samples": posterior.effective,
+        "effort_reached": posterior.effort_reached,
         "evaluations": sum(candidate.evaluations for candidate in climbed)
         + posterior.evaluations
         - posterior.optimum.evaluations,

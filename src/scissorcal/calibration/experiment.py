@@ -47,10 +47,3 @@ class Experiment(Protocol):
     def mean(self, u: Array) -> Array:
         """Expected effort (n,) at unconstrained parameters ``u`` (p,)."""
         ...
-
-    def simulate(self, u: Array, rng: np.random.Generator) -> Array:
-        """Mean (n,) and what the model itself says of irregularities, without sensor noise.
-
-        Noise is added by the caller (:class:`scissorcal.inference.ArNoise`).
-        """
-        ...

@@ -32,6 +32,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
+from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, Stop, infer, tails_of
 from scissorcal.model.terms import TERMS
@@ -74,6 +75,7 @@ def fit_friction(
     checkpoint: Path | None = None,
     last_chosen: str | None = None,
     stop: Stop | None = None,
+    prior: StatedPrior | None = None,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -90,7 +92,7 @@ def fit_friction(
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
     InputError where the recordings hold too little motion, and says what is missing.
     ``last_chosen`` is the law that draft effort fits where the recipe leaves several; ``stop`` says
-    whether the time allowed is used up.
+    whether the time allowed is used up. ``prior`` is one that a study of simulated data states.
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
@@ -101,7 +103,7 @@ def fit_friction(
     _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
-    every_law, cogging = _ladder(windows, strokes, settings, joint)
+    every_law, cogging = _ladder(windows, strokes, settings, joint, prior)
     ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     climbed: list[Climbed] = []
     for index, candidate in enumerate(ladder):
@@ -333,7 +335,11 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 
 
 def _ladder(
-    windows: Windows, strokes: NDArray[np.int64], settings: FitFriction, joint: Joint
+    windows: Windows,
+    strokes: NDArray[np.int64],
+    settings: FitFriction,
+    joint: Joint,
+    prior: StatedPrior | None,
 ) -> tuple[list[FrictionExperiment], Cogging]:
     """The laws to be compared, over columns that they share, with cogging where there is any."""
     laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
@@ -343,7 +349,7 @@ def _ladder(
     cogging = NO_COGGING if joint.kind == "linear" else find_cogging(plain.moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
     first, *others = (
-        design(windows, strokes, law, symmetric, joint, settings.adopt, periods)
+        design(windows, strokes, law, symmetric, joint, settings.adopt, periods, prior)
         for law in laws
         for symmetric in both[settings.symmetry]
     )

@@ -15,6 +15,7 @@ from scissorcal.calibration.ladder import Likelihood, Rung
 from scissorcal.calibration.layout import Layout
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
+from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import FrictionLaw
 from scissorcal.model.terms import TERMS
 from scissorcal.recording.recording import Joint
@@ -31,7 +32,7 @@ class FrictionExperiment:
     discrete choices: ``law``, ``symmetric``, ``angle_center``, ``adopt``, the names of adopted
     terms, and ``cogging_periods_per_turn`` where cogging was found. ``tails`` are the degrees of
     freedom of the noise. ``shared`` are moments that another law over the same windows has made
-    already, if any.
+    already, if any. ``prior_precision`` (p, p) takes the place of the layout's own, if given.
     """
 
     windows: Windows
@@ -43,6 +44,7 @@ class FrictionExperiment:
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
     shared: StrokeMoments | None = field(default=None, repr=False, compare=False)
+    prior_precision: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave basis and moments out of a pickle: they are made again sooner than sent."""
@@ -97,10 +99,6 @@ class FrictionExperiment:
         """
         return self.basis.drive(values)
 
-    def simulate(self, u: Array, rng: np.random.Generator) -> Array:
-        """Give the mean (n,): a friction law has no irregularities of its own."""
-        return self.mean(u)
-
     def rung(self, measured: Array) -> Rung:
         """Give the law over ``measured`` (n,), ready to be fitted."""
 
@@ -118,7 +116,9 @@ class FrictionExperiment:
             likelihood=Likelihood(residuals, normal, self.tails),
             starts=self._starts(measured),
             prior_mean=layout.mean,
-            prior_precision=np.diag(1 / layout.sd**2),
+            prior_precision=(
+                np.diag(1 / layout.sd**2) if self.prior_precision is None else self.prior_precision
+            ),
             blocks=self.strokes,
             reduced=self._reduced(measured),
         )
@@ -170,8 +170,9 @@ def design(
     joint: Joint,
     adopt: tuple[str, ...] = (),
     cogging: float = 0.0,
+    prior: StatedPrior | None = None,
 ) -> FrictionExperiment:
-    """One law over windows, with priors of the data's own size.
+    """One law over windows, with priors of the data's own size, or ``prior`` where it states them.
 
     ``cogging`` is the number of its periods a turn, 0 where there is none.
     """
@@ -186,7 +187,11 @@ def design(
     if cogging:
         key["cogging_periods_per_turn"] = cogging
     layout = friction_layout(windows, law, symmetric, joint, adopt, cogging=bool(cogging))
-    return FrictionExperiment(windows, strokes, key, layout, joint)
+    precision = None
+    if prior is not None:
+        precision = prior.precision(layout, np.diag(1 / layout.sd**2))
+        layout = prior.layout(layout)
+    return FrictionExperiment(windows, strokes, key, layout, joint, prior_precision=precision)
 
 
 def friction_law(values: dict[str, Array], angle_center: float) -> FrictionLaw:

@@ -21,12 +21,19 @@ from scissorcal.workday.workspace import FitKind, Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.experiment import Experiment
-    from scissorcal.calibration.verify import Check, PriorKind, Study, Task, VerifyResult
+    from scissorcal.calibration.verify import (
+        Check,
+        PriorKind,
+        Simulator,
+        Study,
+        Task,
+        VerifyResult,
+    )
     from scissorcal.recording import Recording
 
 Progress = Callable[[float, str], None]
 
-ALGORITHM = 3
+ALGORITHM = 4
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
@@ -84,10 +91,11 @@ def verify_workspace(
         for index, kind in enumerate(kinds):
             tell = progress_share(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
-            experiment, sheets = _experiment(workspace, recipe, kind, fits)
+            experiment, simulator, sheets = _experiment(workspace, recipe, kind, fits)
             study = make_study(
                 experiment,
                 fits[kind],
+                simulator,
                 seed=chosen.seed,
                 prior=chosen.prior,
                 spread=chosen.spread,
@@ -109,18 +117,23 @@ def verify_workspace(
 
 def _experiment(
     workspace: Workspace, recipe: Recipe, kind: FitKind, fits: "dict[FitKind, FitResult]"
-) -> "tuple[Experiment, dict[int, int]]":
-    """The design of a fit, and the sheet that each of its strokes went through."""
+) -> "tuple[Experiment, Simulator, dict[int, int]]":
+    """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
     from scissorcal.calibration.cut import cut_experiment
     from scissorcal.calibration.friction import friction_experiment
+    from scissorcal.calibration.verify import cut_simulator, friction_simulator
     from scissorcal.workday.geometry import edge_belief
 
     recordings = usable_recordings(workspace, recipe, kind).recordings
     if kind == "friction":
-        return friction_experiment(recordings, recipe.fit.friction, fits["friction"]), {}
+        settings, fit = recipe.fit.friction, fits["friction"]
+        empty = friction_experiment(recordings, settings, fit)
+        return empty, friction_simulator(recordings, settings, fit, empty.layout), {}
     edge = edge_belief(workspace, recipe)
-    design = cut_experiment(recordings, recipe, fits["friction"], fits["cut"], edge)
-    return design, _sheets(recordings)
+    friction, fit = fits["friction"], fits["cut"]
+    design = cut_experiment(recordings, recipe, friction, fit, edge)
+    simulator = cut_simulator(recordings, recipe, friction, fit, design.layout, edge)
+    return design, simulator, _sheets(recordings)
 
 
 def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:

@@ -106,12 +106,6 @@ class CutExperiment:
         """Expected mean torque (n,) at ``u`` (p,)."""
         return np.asarray(self.likelihood.torque_at(self.evaluate(u)))
 
-    def simulate(self, u: Array, rng: np.random.Generator) -> Array:
-        """Draw torques (n,) as the likelihood has them, noise included."""
-        from scissorcal.calibration.cut.simulate import draw_torque
-
-        return draw_torque(self, u, rng)
-
     def rung(self, measured: Array) -> Rung:
         """Give the law over ``measured`` (n,), ready to be fitted."""
         design = self

@@ -39,6 +39,7 @@ from scissorcal.calibration.ladder import Climbed, choose, climb
 from scissorcal.calibration.path import PathMotion, path_motion
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import inspect_sensors
+from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop, infer
 from scissorcal.model import EdgeBelief
@@ -70,6 +71,7 @@ def fit_cut(
     checkpoint: Path | None = None,
     last_chosen: str | None = None,
     stop: Stop | None = None,
+    prior: StatedPrior | None = None,
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses), over their path.
 
@@ -82,12 +84,12 @@ def fit_cut(
     ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
     friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
     interrupted goes on. ``last_chosen`` is the law that draft effort fits where the recipe leaves
-    several, ``stop`` says whether the time allowed is used up. Raises InputError where the blades
-    hardly touched the material.
+    several, ``stop`` says whether the time allowed is used up. ``prior`` is one that a study of
+    simulated data states. Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = KnownFriction.of(friction)
+    known = replace(KnownFriction.of(friction), prior=prior)
     sensors = inspect_sensors(recordings, "fit.cut")
     motions = path_motion(recordings, known.inertia, sensors.usable)
     _refuse_no_contact(motions, known, recordings)

@@ -13,6 +13,7 @@ from scissorcal.calibration.path import (
     torque_noise_of,
 )
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque
 
@@ -31,7 +32,8 @@ class KnownFriction:
     ``law`` and ``offset`` (N m) stand at the posterior's mean. ``closing_sd`` and ``opening_sd``
     (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
     single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
-    what the motor adds to the measured drive.
+    what the motor adds to the measured drive. ``prior`` takes the recipe's place where a study of
+    simulated data states one.
     """
 
     law: FrictionLaw
@@ -42,6 +44,7 @@ class KnownFriction:
     closing_sd: float
     opening_sd: float
     stroke_sd: float
+    prior: StatedPrior | None = None
 
     @classmethod
     def of(cls, friction: FitResult) -> "KnownFriction":

@@ -114,6 +114,9 @@ def make_experiment(
     count = len(edge.parameters)
     if count:
         precision[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+    if known.prior is not None:
+        stated = known.prior.of_response(law.response)
+        precision, whole = stated.precision(whole, precision), stated.layout(whole)
     return CutExperiment(
         likelihood=CutLikelihood(
             segments, geometry, law.fracture, line if law.fracture == "rippled" else None

@@ -12,10 +12,6 @@ from scissorcal.model import FrictionLaw, friction_torque
 
 Array = NDArray[np.float64]
 
-REST_RAD = 2e-5
-"""Way (rad or m) over which dry friction turns after a reversal in any law: a joint that rests
-trembles by less, and is then held instead of rubbing to and fro."""
-
 
 @dataclass(frozen=True)
 class DriveTruth:
@@ -49,11 +45,13 @@ def measured_drive(
     ``material`` (n - 1,) is the material's mean torque over each tick, positive as it opens. Over a
     tick the mean drive is inertia * acceleration + friction + offset + cogging - material; a
     sample lies between two ticks, and shows the mean of both, each by its share of the time.
+    Dry friction of a joint that is nearly at rest may be anything up to its level: it is taken in
+    proportion to the speed there.
     """
     path, tick_s = piece.opening, piece.tick_s
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
-    sense = _built(path, REST_RAD) * np.sign(step)
+    sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
     direction, state = np.sign(step), None
     law = truth.friction
     if np.any(law.presliding_share):
@@ -73,9 +71,7 @@ def measured_drive(
     return (1.0 - shown) * before + shown * after + drawn_noise(truth.noise, len(path), tick_s, rng)
 
 
-def drawn_noise(
-    noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator
-) -> Array:
+def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator) -> Array:
     """Noise (count,) of two time scales: white, and one that lasts."""
     from scipy.signal import lfilter
 

@@ -14,6 +14,11 @@ from scissorcal.calibration.verify.result import (
     SensitivityRow,
     VerifyResult,
 )
+from scissorcal.calibration.verify.simulator import (
+    Simulator,
+    cut_simulator,
+    friction_simulator,
+)
 from scissorcal.calibration.verify.storage import load_verify, save_verify
 from scissorcal.calibration.verify.study import Study, Task, run
 
@@ -28,10 +33,13 @@ __all__ = [
     "RankedQuantity",
     "Sensitivity",
     "SensitivityRow",
+    "Simulator",
     "Study",
     "Task",
     "VerifyResult",
     "assess",
+    "cut_simulator",
+    "friction_simulator",
     "load_verify",
     "make_study",
     "run",

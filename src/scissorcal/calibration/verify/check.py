@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.experiment import Experiment
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.generating import generating_prior, residual_noise
+from scissorcal.calibration.verify.generating import generating_prior
 from scissorcal.calibration.verify.halves import StrokeFacts, split_strokes
 from scissorcal.calibration.verify.judgement import FALSE_ALARM, RANKS_SHARE, judge
 from scissorcal.calibration.verify.result import FORMAT, Check, PriorKind, VerifyResult
-from scissorcal.calibration.verify.study import Record, Study, Task
+from scissorcal.calibration.verify.simulator import Simulator
+from scissorcal.calibration.verify.study import Record, Study, Task, unconstrained_draws
 from scissorcal.calibration.verify.summary import (
     summarise_halves,
     summarise_sensitivity,
     summarise_simulated,
 )
-from scissorcal.errors import MissingError
 
 Array = NDArray[np.float64]
 
@@ -28,12 +28,13 @@ EVEN_WEIGHTS = 0.5
 """Share of draws that count as independent from which they are; below it, fits take as many draws
 as the fit itself."""
 
-_NOISE_STREAM, _HALVES_STREAM = 10, 11
+_HALVES_STREAM = 11
 
 
 def make_study(
     experiment: Experiment,
     fit: FitResult,
+    simulator: Simulator,
     *,
     seed: int,
     prior: PriorKind = "local",
@@ -42,20 +43,19 @@ def make_study(
 ) -> Study:
     """Say what data are simulated from and how they are parted, for a finished fit.
 
-    ``experiment`` is the fit's own design. ``sheets`` gives the piece of material of each stroke,
+    ``experiment`` is the fit's own design, ``simulator`` makes raw recordings over its motion and
+    fits them. ``sheets`` gives the piece of material of each stroke,
     where there are several. Raises MissingError where the fit does not hold the draws it takes.
     """
     draws = unconstrained_draws(experiment, fit)
     generating = generating_prior(experiment, draws, prior, spread)
-    start = draws.mean(axis=0)
-    rng = _stream(seed, _NOISE_STREAM)
     return Study(
         experiment=experiment,
+        simulator=simulator,
         effort=fit.effort,
         seed=seed,
         generating=generating,
-        noise=residual_noise(experiment, start, rng),
-        start=start,
+        start=draws.mean(axis=0),
         draws=FEWEST_DRAWS if _even(fit) else max(FEWEST_DRAWS, len(fit.draws)),
         split=split_strokes(experiment.strokes, _facts(fit, sheets or {})),
         between=_between(experiment, fit),
@@ -118,21 +118,6 @@ def assess(
         false_alarm=FALSE_ALARM,
         verdicts=judge(fit.what, checks, calibration, halves, sensitivity, not_done),
     )
-
-
-def unconstrained_draws(experiment: Experiment, fit: FitResult) -> Array:
-    """A fit's draws with those of its nuisance parameters, in unconstrained coordinates (n, p)."""
-    columns = {parameter.name: fit.draws[:, i] for i, parameter in enumerate(fit.parameters)}
-    if fit.nuisance_draws is not None:
-        columns |= {p.name: fit.nuisance_draws[:, i] for i, p in enumerate(fit.nuisance)}
-    parameters = experiment.layout.parameters
-    missing = [parameter.name for parameter in parameters if parameter.name not in columns]
-    if missing:
-        raise MissingError(
-            f"The fit of {fit.what} holds no draws of {', '.join(missing)}: an earlier version "
-            f"made it. Run 'scissorcal fit {fit.what} --force' first."
-        )
-    return np.stack([p.unconstrained(columns[p.name]) for p in parameters], axis=1)
 
 
 def _even(fit: FitResult) -> bool:

@@ -1,4 +1,4 @@
-"""What simulated data are made from: parameters around a posterior, noise like the residuals."""
+"""What truths are drawn from: parameters around a posterior, or a recipe's prior."""
 
 from dataclasses import dataclass
 
@@ -6,19 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.calibration.verify.result import PriorKind
-from scissorcal.inference import ArNoise, fit_ar
 
 Array = NDArray[np.float64]
 
-REPLICATES = 20
-NOISE_SIZES = ("noise", "slow_noise")
+NOISE_SIZES = ("noise", "noise_scale")
 """Parameters that only say how loud the noise is, in the terms of the likelihood."""
-
-QUIET = 0.05
-"""A model's own irregularity, as a share of the residuals' variance, that counts as none."""
-
-FEWEST_QUIET = 200
 
 
 @dataclass(frozen=True)
@@ -77,38 +71,24 @@ def generating_prior(
     return Generating(kind, spread, draws.mean(axis=0), prior + likelihood / spread**2)
 
 
-def refit_prior(experiment: Experiment, generating: Generating) -> tuple[Array, Array]:
-    """Mean (p,) and precision (p, p) of the prior that simulated data are refitted with.
+def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
+    """The prior that simulated data are refitted with: what their truths are drawn from.
 
-    That which truths are drawn from, but for the sizes of the noise: what autoregressive noise
-    amounts to in the terms of the likelihood is not known beforehand, so that these keep the
-    recipe's prior. Thousands of bins tell them well, whatever the prior.
+    But for the sizes of the noise, which keep the recipe's prior: what the noise of samples amounts
+    to in the terms of the likelihood is not known beforehand. Thousands of bins tell it well,
+    whatever the prior.
     """
-    if generating.kind == "recipe":
-        return generating.mean, generating.precision
     own = experiment.rung(experiment.observed)
-    free = np.isin(experiment.layout.names, NOISE_SIZES)
-    covariance = np.linalg.inv(generating.precision)
-    covariance[free, :] = 0.0
-    covariance[:, free] = 0.0
-    covariance += np.diag(np.where(free, experiment.layout.sd**2, 0.0))
-    return np.where(free, own.prior_mean, generating.mean), np.linalg.inv(covariance)
-
-
-def residual_noise(experiment: Experiment, point: Array, rng: np.random.Generator) -> ArNoise:
-    """Autoregression of the residuals at ``point`` (p,), where the model itself is regular.
-
-    Bins at which simulations differ among themselves (a ripple, an uneven sheet) are left out, so
-    that what the model adds by itself is not added twice; all are taken where too few remain.
-    """
-    mean = experiment.mean(point)
-    residuals = experiment.observed - mean
-    replicates = [experiment.simulate(point, rng) - mean for _ in range(REPLICATES)]
-    irregular = np.mean(np.square(replicates), axis=0)
-    quiet = irregular <= QUIET * np.median(residuals**2)
-    if np.count_nonzero(quiet) < FEWEST_QUIET:
-        return fit_ar(residuals, experiment.series)
-    return fit_ar(residuals[quiet], unbroken(experiment.series, quiet)[quiet])
+    names = experiment.layout.names
+    kept = [i for i, name in enumerate(names) if name not in NOISE_SIZES]
+    mean = generating.mean if generating.kind == "local" else own.prior_mean
+    covariance: Array = np.asarray(np.linalg.inv(generating.precision))
+    return StatedPrior(
+        tuple(names[i] for i in kept),
+        mean[kept],
+        covariance[np.ix_(kept, kept)],
+        str(own.key.get("response", "")),
+    )
 
 
 def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -119,38 +99,3 @@ def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.i
     """
     turns = (np.diff(series) != 0) | (np.diff(kept.astype(np.int64)) != 0)
     return np.concatenate([[0], np.cumsum(turns)]).astype(np.int64)
-
-
-def simulate(
-    experiment: Experiment,
-    noise: ArNoise,
-    reference: Array,
-    point: Array,
-    rng: np.random.Generator,
-) -> Array:
-    """Simulate efforts (n,) at ``point`` (p,): the model's own, and autoregressive noise.
-
-    The noise has its fitted size at the ``reference`` point, and grows with the parameter "noise"
-    from there.
-    """
-    grown = 1.0
-    if "noise" in experiment.layout.names:
-        where = experiment.layout.names.index("noise")
-        grown = float(np.exp(point[where] - reference[where]))
-    drawn = noise.draw(experiment.series, rng)
-    return np.asarray(experiment.simulate(point, rng) + grown * drawn)
-
-
-def noise_in_words(noise: ArNoise, unit: str) -> str:
-    """Describe an autoregression for people.
-
-    >>> noise_in_words(ArNoise(1, (0.9,), 0.001), "N m")
-    'AR(1), neighbours correlate by 0.90, standard deviation 0.00229 N m'
-    """
-    if noise.order == 0:
-        return f"white, standard deviation {noise.sd:.3g} {unit}"
-    memory = noise.autocovariance(2)
-    return (
-        f"AR({noise.order}), neighbours correlate by {memory[1] / memory[0]:.2f}, standard "
-        f"deviation {noise.marginal_sd:.3g} {unit}"
-    )

@@ -96,7 +96,7 @@ def _refits(scope: str, found: Calibration) -> Verdict:
     status: Status = "pass" if share <= UNRELIABLE_LIMIT else "fail"
     why = (
         f"{share:.1%} of {every} simulated fits broke or failed their own diagnostics, "
-        f"{found.escalated:.1%} went to a higher effort."
+        f"{found.escalated:.1%} went to a higher effort, {found.other_law:.1%} took another law."
     )
     if found.broken:
         why += f" One ended with: {found.broken[0]}"

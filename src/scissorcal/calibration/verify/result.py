@@ -64,14 +64,15 @@ class RankBand:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Simulation-based calibration of a fit over its own motion, with its own noise.
+    """Simulation-based calibration of a whole fit over its own motion, with its own noise.
 
     Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` say in words what truths and
     data were drawn from; ``spread`` is the factor by which the local prior is wider than the
     posterior. ``escalated`` is the share of fits that went to a higher effort by themselves,
     ``unreliable`` that of fits whose posterior failed its own diagnostics, ``broken`` the
-    sentences of fits that gave none. ``effective`` is the median number of independent draws of a
-    posterior, ``seconds`` the median time of a fit.
+    sentences of fits that gave none or refused the data; ``other_law`` the share that took another
+    law, whose ranks count for the quantities that both laws have. ``effective`` is the median
+    number of independent draws of a posterior, ``seconds`` the median time of a fit.
     """
 
     fits: int
@@ -87,6 +88,7 @@ class Calibration:
     broken: tuple[str, ...]
     effective: float
     seconds: float
+    other_law: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.experiment import Experiment
-from scissorcal.calibration.result import Effort
-from scissorcal.calibration.verify.generating import (
-    Generating,
-    refit_prior,
-    simulate,
-    unbroken,
-)
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.verify.generating import Generating, refit_prior, unbroken
 from scissorcal.calibration.verify.halves import Split
 from scissorcal.calibration.verify.power import power_sensitivity
+from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.calibration.verify.uniformity import rank_among
-from scissorcal.inference import ArNoise, Posterior, infer, ljung_box
+from scissorcal.errors import MissingError, ScissorcalError
+from scissorcal.inference import Posterior, infer, ljung_box
 
 Array = NDArray[np.float64]
 Kind = Literal["simulated", "half", "whole"]
@@ -47,20 +44,26 @@ class Task:
 class Study:
     """All that any fit of a trust check needs.
 
-    ``generating`` and ``noise`` make simulated data; ``start`` (p,) is where the fit ended,
-    ``draws`` how many are taken of each posterior; ``split`` parts the data (None where it cannot
-    be parted). ``between`` (p,) is the variance between recordings that the fit claims, if any.
+    ``generating`` gives truths, ``simulator`` raw data of them and their whole fit; ``start`` (p,)
+    is where the fit ended, ``draws`` how many are taken of the posteriors of halves and whole;
+    ``split`` parts the data (None where it cannot be parted). ``between`` (p,) is the variance
+    between recordings that the fit claims, if any.
     """
 
     experiment: Experiment
+    simulator: Simulator
     effort: Effort
     seed: int
     generating: Generating
-    noise: ArNoise
     start: Array
     draws: int
     split: Split | None
     between: Array | None = None
+
+    @property
+    def rung(self) -> str:
+        """The fit's law in words."""
+        return self.experiment.rung(self.experiment.observed).name
 
     @property
     def wanted(self) -> list[int]:
@@ -78,7 +81,8 @@ def run(study: Study, task: Task) -> Record:
     """Do one fit; the same numbers for the same study and task, wherever it runs.
 
     The result holds plain finite numbers alone, so that it can stand as one line of JSON. A fit
-    that breaks on its numbers yields ``{"broken": sentence}``; other errors are raised.
+    that breaks on its numbers, or refuses the data with a stated error, yields ``{"broken":
+    sentence}``; other errors are raised.
     """
     key = (_KINDS.index(task.kind), task.index)
     sequence = np.random.SeedSequence(study.seed, spawn_key=key)
@@ -87,30 +91,82 @@ def run(study: Study, task: Task) -> Record:
     try:
         found = _DO[task.kind](study, task.index, rng)
         json.dumps(found, allow_nan=False)
-    except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
+    except (ArithmeticError, np.linalg.LinAlgError, ValueError, ScissorcalError) as error:
         found = {"broken": f"{type(error).__name__}: {error}"}
     seconds = round(time.perf_counter() - began, 3)
     return {"kind": task.kind, "index": task.index, **found, "seconds": seconds}
 
 
 def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
-    experiment, generating = study.experiment, study.generating
-    truth = generating.draw(rng)
-    measured = simulate(experiment, study.noise, generating.mean, truth, rng)
-    rung = experiment.rung(measured)
-    if generating.kind == "local":
-        mean, precision = refit_prior(experiment, generating)
-        rung = replace(
-            rung,
-            prior_mean=mean,
-            prior_precision=precision,
-            starts=generating.mean[None, :],
+    """Draw a truth, simulate raw recordings of it, fit them as a whole, and rank it.
+
+    Where the refit took another law, quantities that this law lacks, or that mean something else
+    in it, have no rank.
+    """
+    truth = study.generating.draw(rng)
+    data = study.simulator.simulate(truth, rng)
+    prior = refit_prior(study.experiment, study.generating)
+    fit = study.simulator.refit(data, prior, study.effort, rng)
+    chosen = rng.choice(len(fit.draws), LEVELS - 1, replace=len(fit.draws) < LEVELS - 1)
+    truths = quantities(study, truth[None, :])[0]
+    found = _shown(study, fit, chosen)
+    known = [i for i, column in enumerate(found) if column is not None]
+    drawn = np.stack([column for column in found if column is not None], axis=1)
+    ranks: list[int | None] = [None] * len(truths)
+    for i, rank in zip(known, rank_among(drawn, truths[known], rng).tolist(), strict=True):
+        ranks[i] = rank
+    k_hat = float(fit.diagnostics["k_hat"])
+    return {
+        "ranks": ranks,
+        "truths": truths.tolist(),
+        "law": fit.rung,
+        "k_hat": k_hat if np.isfinite(k_hat) else None,
+        "effective": float(fit.diagnostics["effective_samples"]),
+        "effort": fit.diagnostics["effort_reached"],
+        "settled": all(v.check != "optimum" or v.status != "fail" for v in fit.verdicts),
+    }
+
+
+def _shown(study: Study, fit: FitResult, chosen: NDArray[np.int64]) -> list[Array | None]:
+    """Chosen draws of every quantity, None for those that the fit's law does not have."""
+    try:
+        u = unconstrained_draws(study.experiment, fit, chosen)
+    except MissingError:
+        u = None
+    own = study.experiment.rung(study.experiment.observed)
+    alike = fit.structure.get("response") == own.key.get("response")
+    if u is not None and alike:
+        return list(quantities(study, u).T)
+    names = [parameter.name for parameter in fit.parameters]
+    other = [n for n in names if not alike and n.startswith("response_") and n != "response_force"]
+    columns: list[Array | None] = [
+        fit.column(name)[chosen] if name in names and name not in other else None
+        for name in study.quantities[:-1]
+    ]
+    return [*columns, None]
+
+
+def unconstrained_draws(
+    experiment: Experiment, fit: FitResult, chosen: NDArray[np.int64] | None = None
+) -> Array:
+    """A fit's draws with those of its nuisance parameters, in unconstrained coordinates (n, p).
+
+    ``chosen`` (n,) picks draws, all if None. Raises MissingError where the fit lacks a parameter.
+    """
+    columns = {parameter.name: fit.draws[:, i] for i, parameter in enumerate(fit.parameters)}
+    if fit.nuisance_draws is not None:
+        columns |= {p.name: fit.nuisance_draws[:, i] for i, p in enumerate(fit.nuisance)}
+    layout = experiment.layout
+    missing = [name for name in layout.names if name not in columns]
+    if missing:
+        raise MissingError(
+            f"The fit of {fit.what} holds no draws of {', '.join(missing)}: an earlier version "
+            f"made it. Run 'scissorcal fit {fit.what} --force' first."
         )
-    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
-    chosen = posterior.draws[rng.choice(len(posterior.draws), LEVELS - 1, replace=False)]
-    truths = quantities(study, truth[None, :])
-    ranks = rank_among(quantities(study, chosen), truths[0], rng)
-    return {"ranks": ranks.tolist(), "truths": truths[0].tolist(), **_diagnostics(posterior)}
+    rows = range(len(fit.draws)) if chosen is None else chosen.tolist()
+    return np.stack(
+        [layout.unconstrained({n: float(columns[n][row]) for n in layout.names}) for row in rows]
+    )
 
 
 def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.layout import Layout
-from scissorcal.calibration.verify.generating import noise_in_words
 from scissorcal.calibration.verify.halves import HalfFit, compare, effort_difference
 from scissorcal.calibration.verify.power import SENSITIVE, diagnose
 from scissorcal.calibration.verify.result import (
@@ -48,13 +47,15 @@ def summarise_simulated(
     sound = [record for record in records if "broken" not in record]
     if not sound:
         return None
-    ranks = np.array([record["ranks"] for record in sound], dtype=np.int64)
+    ranks = np.array([record["ranks"] for record in sound], dtype=np.float64)  # NaN for None
     truths = np.array([record["truths"] for record in sound])
+    ranked = np.isfinite(ranks)
     names = study.quantities
     each = alpha / len(names)
     quantities = tuple(
-        _ranked(name, unit, ranks[:, i], truths[:, i], each)
+        _ranked(name, unit, ranks[ranked[:, i], i].astype(np.int64), truths[ranked[:, i], i], each)
         for i, (name, unit) in enumerate(zip(names, units, strict=True))
+        if ranked[:, i].any()
     )
     band = ecdf_band(len(sound), each)
     higher = RUNGS.index(study.effort)
@@ -65,10 +66,11 @@ def summarise_simulated(
         prior=study.generating.kind,
         spread=study.generating.spread,
         generating=study.generating.words,
-        noise=noise_in_words(study.noise, units[-1]),
+        noise=study.simulator.noise,
         quantities=quantities,
         band=RankBand(each, _plain(band.z), _plain(band.low), _plain(band.high)),
         escalated=float(np.mean([rung > higher for rung in reached])),
+        other_law=float(np.mean([record["law"] != study.rung for record in sound])),
         unreliable=float(np.mean([_unreliable(record) for record in sound])),
         broken=tuple(record["broken"] for record in records if "broken" in record),
         effective=float(np.median([record["effective"] for record in sound])),

@@ -1,0 +1,188 @@
+"""Who makes raw recordings of a known truth, and fits them as a day's recordings are fitted."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut import fit_cut
+from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.calibration.friction import fit_friction
+from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.path import torque_noise_of
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.simulation import (
+    Motion,
+    cut_truth,
+    friction_truth,
+    motion_of,
+    simulate_cut,
+    simulate_friction,
+)
+from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.calibration.torque_noise import TorqueNoise
+from scissorcal.model import EdgeBelief
+from scissorcal.recipe.schema import FitFriction, Recipe
+from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+class Simulator(Protocol):
+    """Data of a known truth, and the whole fit of them. Picklable, for worker processes.
+
+    ``noise`` says in words what is added to the law, by samples. ``simulate`` takes unconstrained
+    parameters (p,) of the fit's own layout; ``refit`` takes what it gave, with the prior that
+    truths are drawn from.
+    """
+
+    @property
+    def noise(self) -> str: ...
+
+    def simulate(self, truth: Array, rng: np.random.Generator) -> Any: ...
+
+    def refit(
+        self, data: Any, prior: StatedPrior, effort: Effort, rng: np.random.Generator
+    ) -> FitResult: ...
+
+
+@dataclass(frozen=True)
+class FrictionSimulator:
+    """Empty motion of a rig with other friction (see :class:`Simulator`)."""
+
+    motions: tuple[Motion, ...]
+    settings: FitFriction
+    layout: Layout
+    structure: Mapping[str, Any]
+    rung: str
+    torque_noise: TorqueNoise
+    stroke_sd: float
+
+    @property
+    def noise(self) -> str:
+        """What is added to each sample, in words."""
+        return noise_in_words(self.torque_noise, self.stroke_sd, self._unit)
+
+    def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
+        """Recordings of the same motion with the truth's friction."""
+        values = _plain(self.layout, truth)
+        rig = friction_truth(values, self.structure, self.torque_noise, self.stroke_sd)
+        return simulate_friction(self.motions, rig, rng)
+
+    def refit(
+        self,
+        data: tuple[Recording, ...],
+        prior: StatedPrior,
+        effort: Effort,
+        rng: np.random.Generator,
+    ) -> FitResult:
+        """The whole fit: sensors, windows, cogging, ladder, posterior."""
+        return fit_friction(
+            data, self.settings, effort=effort, rng=rng, last_chosen=self.rung, prior=prior
+        )
+
+    @property
+    def _unit(self) -> str:
+        return self.motions[0].recording.joint.effort_unit
+
+
+@dataclass(frozen=True)
+class CutSimulator:
+    """Cuts through other material along the same motion (see :class:`Simulator`)."""
+
+    motions: tuple[Motion, ...]
+    recipe: Recipe
+    friction: FitResult
+    edge: EdgeBelief | None
+    layout: Layout
+    structure: Mapping[str, Any]
+    rung: str
+
+    @property
+    def noise(self) -> str:
+        """What is added to each sample, in words."""
+        known = KnownFriction.of(self.friction)
+        return noise_in_words(known.noise, known.stroke_sd, "N m")
+
+    def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
+        """Recordings of the same motion through sheets of the truth's material."""
+        tick_s = self.motions[0].pieces[0].tick_s
+        known = KnownFriction.of(self.friction)
+        values = _plain(self.layout, truth)
+        return simulate_cut(self.motions, cut_truth(values, self.structure, known, tick_s), rng)
+
+    def refit(
+        self,
+        data: tuple[Recording, ...],
+        prior: StatedPrior,
+        effort: Effort,
+        rng: np.random.Generator,
+    ) -> FitResult:
+        """The whole fit: sensors, segments, scouting, teeth, ladder, posterior."""
+        return fit_cut(
+            data,
+            self.recipe,
+            self.friction,
+            effort=effort,
+            rng=rng,
+            edge=self.edge,
+            last_chosen=self.rung,
+            prior=prior,
+        )
+
+
+def friction_simulator(
+    recordings: tuple[Recording, ...], settings: FitFriction, fit: FitResult, layout: Layout
+) -> FrictionSimulator:
+    """A simulator for a finished friction fit over its own recordings.
+
+    ``layout`` is that of its design; noise and the offsets of strokes are those that it measured.
+    """
+    inertia = fit.parameter("inertia").mean
+    return FrictionSimulator(
+        motions=motion_of(recordings, inertia),
+        settings=settings.model_copy(update={"critic": False}),
+        layout=layout,
+        structure=dict(fit.structure),
+        rung=fit.rung,
+        torque_noise=torque_noise_of(fit.diagnostics),
+        stroke_sd=_finite(fit.diagnostics.get("stroke_offset_sd_Nm", 0.0)),
+    )
+
+
+def cut_simulator(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    fit: FitResult,
+    layout: Layout,
+    edge: EdgeBelief | None = None,
+) -> CutSimulator:
+    """A simulator for a finished fit of cuts or presses over its own recordings.
+
+    ``layout`` is that of its design, all else what the fit was made of.
+    """
+    cut = recipe.fit.cut.model_copy(update={"critic": False})
+    quiet = recipe.model_copy(update={"fit": recipe.fit.model_copy(update={"cut": cut})})
+    motions = motion_of(recordings, KnownFriction.of(friction).inertia)
+    return CutSimulator(motions, quiet, friction, edge, layout, dict(fit.structure), fit.rung)
+
+
+def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
+    """Describe what is added to simulated samples, for people.
+
+    >>> noise_in_words(TorqueNoise(1e-3, 5e-4, 0.02), 1e-4, "N m")
+    'white 0.001, over 20 ms 0.0005, by stroke 0.0001 N m'
+    """
+    lasting = f"over {noise.slow_time_s * 1e3:.3g} ms {noise.slow_Nm:.3g}"
+    return f"white {noise.white_Nm:.3g}, {lasting}, by stroke {stroke_sd:.3g} {unit}"
+
+
+def _plain(layout: Layout, u: Array) -> dict[str, float]:
+    return {name: float(value) for name, value in layout.natural(u).items()}
+
+
+def _finite(value: Any) -> float:
+    return float(value) if np.isfinite(value) else OFFSET_SD_FLOOR
