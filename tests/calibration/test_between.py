@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, fit_friction, friction_experiment
-from scissorcal.calibration.verify import VerifyResult, assess, make_study, run, tasks_of
+from scissorcal.calibration.verify import (
+    VerifyResult,
+    assess,
+    friction_simulator,
+    make_study,
+    run,
+    tasks_of,
+)
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.test_friction import emps
@@ -29,7 +36,9 @@ def fitted(given: tuple[Recording, ...], settings: FitFriction = SETTINGS) -> Fi
 
 
 def halves(given: tuple[Recording, ...], fit: FitResult) -> VerifyResult:
-    study = make_study(friction_experiment(given, SETTINGS, fit), fit, seed=0)
+    design = friction_experiment(given, SETTINGS, fit)
+    simulator = friction_simulator(given, SETTINGS, fit, design.layout)
+    study = make_study(design, fit, simulator, seed=0)
     records = [run(study, task) for task in tasks_of(study, ("halves",), 0)]
     return assess(study, fit, ("halves",), records)
 

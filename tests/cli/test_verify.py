@@ -30,7 +30,7 @@ def test_it_prints_tables_and_verdicts(
     assert said.out.count("FAIL  ") == 1
     for words in (
         "3 fits to simulated data (truths: a normal distribution around the posterior, 3 times as",
-        "noise: AR(",
+        "noise: white ",
         "effort_rms",
         "two halves: whole strokes of a kind, alternating by speed",
         "sensitivity to the powers of prior and likelihood",

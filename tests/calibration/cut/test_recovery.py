@@ -98,11 +98,6 @@ def test_an_edge_that_is_believed_stands_among_the_draws(friction):
     recovers(fit, SMOOTH, "response_force", "response_exponent", "fracture_energy")
     for name, sd in zip(edge.names, np.sqrt(np.diag(edge.covariance)), strict=True):
         assert 0.0 < fit.parameter(f"edge_{name}").sd < 1.1 * sd
-    design = cut_experiment((cuts,), wanted, friction, fit, edge)
-    u = np.array(design.start)
-    drawn = np.stack([design.simulate(u, rng) for _ in range(200)])
-    far = np.abs(drawn.mean(axis=0) - design.mean(u)) > 5 * drawn.std(axis=0) / np.sqrt(200) + 1e-5
-    assert np.mean(far) < 0.02
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """The whole check over a law whose posterior is known: right passes, overconfident is found out."""
 
 import pickle
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -8,20 +9,13 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.verify import Study, VerifyResult, assess, make_study, run, tasks_of
-from scissorcal.calibration.verify.generating import (
-    Generating,
-    generating_prior,
-    refit_prior,
-    residual_noise,
-    simulate,
-)
+from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
 from scissorcal.calibration.verify.study import Task
-from scissorcal.errors import MissingError
+from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer
 
-from .toy import BINS, LAYOUT, STROKES, Linear
+from .toy import BINS, LAYOUT, Linear, LinearSimulator, as_fit
 
 TRUTH = np.array([0.3, -0.5, np.log(0.8), np.log(0.3)])
 
@@ -36,39 +30,20 @@ def made(rho: float, naive: bool = False, change: float = 0.0) -> Linear:
 
 
 def fit_of(experiment: Linear) -> FitResult:
-    """What the check reads of a fit: draws, parameters, strokes."""
     problem = experiment.rung(experiment.observed).problem(experiment.series)
-    posterior = infer(problem, "standard", np.random.default_rng(0), count=1000)
-    natural = LAYOUT.columns(posterior.draws)
-    fitted = LAYOUT.fitted(posterior.draws)
-    held_out = tuple(
-        StrokeError(i, "", ("closing", "opening")[i % 2], 0.1 * (1 + i // 2), 0.1, 0.1)
-        for i in range(STROKES)
-    )
-    facts: dict[str, Any] = {
-        "what": "friction",
-        "effort": "standard",
-        "rung": "linear",
-        "parameters": fitted[:3],
-        "draws": natural[:, :3],
-        "nuisance": fitted[3:],
-        "nuisance_draws": natural[:, 3:],
-        "held_out": held_out,
-        "inputs_hash": "0" * 64,
-        "effort_unit": "N m",
-        "diagnostics": {"effective_samples": posterior.effective},
-        "series": SimpleNamespace(
-            stroke=experiment.strokes, recording=np.zeros(len(experiment.strokes), dtype=int)
-        ),
-        "parameter": lambda name: next(p for p in fitted if p.name == name),
-    }
-    return cast(FitResult, SimpleNamespace(**facts))
+    return as_fit(experiment, infer(problem, "standard", np.random.default_rng(0), count=1000))
+
+
+def study_of(experiment: Linear, rho: float = 0.8, seed: int = 0, fit: Any = None) -> Study:
+    """A study whose simulated noise is that of :func:`made`."""
+    noise = ArNoise(1, (rho,), 0.3 * np.sqrt(1 - rho**2))
+    simulator = LinearSimulator(experiment, noise, float(TRUTH[3]))
+    return make_study(experiment, fit or fit_of(experiment), simulator, seed=seed)
 
 
 def checked(experiment: Linear, checks: Any, fits: int = 0) -> tuple[Study, VerifyResult]:
     fit = fit_of(experiment)
-    study = make_study(experiment, fit, seed=0)
-    study = pickle.loads(pickle.dumps(study))
+    study = pickle.loads(pickle.dumps(study_of(experiment, fit=fit)))
     records = [run(study, task) for task in tasks_of(study, checks, fits)]
     return study, assess(study, fit, checks, records)
 
@@ -116,33 +91,58 @@ def test_a_local_prior_is_as_wide_as_stated_and_never_wider_than_the_recipes():
     drawn = np.stack([found.draw(rng) for _ in range(4000)])
     assert drawn.mean(axis=0) == pytest.approx(TRUTH, abs=0.2)
     assert drawn.std(axis=0) == pytest.approx([0.03, 0.06, 0.09, 2.0], rel=0.1)
-    mean, precision = refit_prior(experiment, found)
-    assert mean == pytest.approx([*found.mean[:3], LAYOUT.mean[3]])
-    refit_sd = np.sqrt(np.diag(np.linalg.inv(precision)))
-    assert refit_sd == pytest.approx([0.03, 0.06, 0.09, 2.0], rel=0.02)
+    prior = refit_prior(experiment, found)
+    assert prior.names == LAYOUT.names[:3]
+    assert prior.mean == pytest.approx(found.mean[:3])
+    assert np.sqrt(np.diag(prior.covariance)) == pytest.approx([0.03, 0.06, 0.09], rel=0.02)
     whole = generating_prior(experiment, draws, "recipe", 3.0)
     assert whole.mean == pytest.approx(LAYOUT.mean)
     assert np.diag(whole.precision) == pytest.approx(1 / LAYOUT.sd**2)
 
 
-def test_noise_is_taken_where_the_model_is_regular_and_grows_with_its_parameter():
-    rng = np.random.default_rng(2)
-    experiment = Linear(np.zeros(BINS), ripple=2.0)
-    noise = ArNoise(1, (0.7,), 0.1)
-    observed = simulate(experiment, noise, TRUTH, TRUTH, rng)
-    found = residual_noise(Linear(observed, ripple=2.0), TRUTH, rng)
-    assert found.marginal_sd == pytest.approx(noise.marginal_sd, rel=0.25)
-    louder = TRUTH + np.array([0, 0, 0, np.log(4.0)])
-    plain = Linear(np.zeros(BINS))
-    drawn = simulate(plain, noise, TRUTH, louder, rng) - plain.mean(louder)
-    assert drawn.std() == pytest.approx(4 * noise.marginal_sd, rel=0.25)
+class Refusing(LinearSimulator):
+    """Refuses every other recording, and takes a law that lacks the slope for the rest."""
+
+    def refit(self, data: Any, *given: Any) -> FitResult:
+        if data[0] > 0.0:
+            raise InputError("The recording holds no motion.")
+        fit = super().refit(data, *given)
+        kept = [p for p in fit.parameters if p.name != "slope"]
+        draws = np.delete(fit.draws, 1, axis=1)
+        other = {**fit.__dict__, "parameters": kept, "draws": draws, "rung": "flat"}
+        other["column"] = lambda name: draws[:, [p.name for p in kept].index(name)]
+        return cast(FitResult, SimpleNamespace(**other))
+
+
+def test_refusals_count_and_other_laws_are_ranked_by_what_they_share():
+    experiment = made(0.0)
+    plain = study_of(experiment, 0.0)
+    made_of = plain.simulator
+    assert isinstance(made_of, LinearSimulator)
+    study = replace(
+        plain,
+        simulator=Refusing(experiment, made_of.ar, made_of.reference),
+        generating=Generating("local", 3.0, np.array([0.0, 0.0, 0.0, -1.2]), np.eye(4)),
+    )
+    records = [run(study, Task("simulated", index)) for index in range(8)]
+    refused = [r for r in records if "broken" in r]
+    assert 0 < len(refused) < 8
+    assert all(r["broken"] == "InputError: The recording holds no motion." for r in refused)
+    result = assess(study, fit_of(experiment), ("sbc",), records)
+    assert result.calibration is not None
+    assert result.calibration.other_law == 1.0
+    assert len(result.calibration.broken) == len(refused)
+    assert [q.name for q in result.calibration.quantities] == ["offset", "level"]
+    verdict = next(v for v in result.verdicts if v.check == "refits")
+    assert verdict.status == "fail"
+    assert "100.0% took another law" in verdict.why
 
 
 def test_a_fit_that_breaks_is_counted_with_its_sentence():
     experiment = made(0.0)
-    study = make_study(experiment, fit_of(experiment), seed=0)
+    study = study_of(experiment)
     hopeless = Generating("local", 3.0, np.full(4, np.inf), np.eye(4))
-    broken = Study(experiment, "standard", 0, hopeless, study.noise, study.start, 600, study.split)
+    broken = replace(study, generating=hopeless)
     with np.errstate(all="ignore"):
         records = [run(broken, Task("simulated", index)) for index in range(3)]
     assert all("broken" in record for record in records)
@@ -153,7 +153,7 @@ def test_a_fit_that_breaks_is_counted_with_its_sentence():
 
 def test_equal_seeds_give_equal_fits_and_other_indices_others():
     experiment = made(0.0)
-    study = make_study(experiment, fit_of(experiment), seed=3)
+    study = study_of(experiment, seed=3)
     one, again, other = (run(study, Task("simulated", index)) for index in (5, 5, 6))
     assert one["ranks"] == again["ranks"]
     assert one["truths"] == again["truths"] != other["truths"]
@@ -164,4 +164,4 @@ def test_a_fit_without_its_nuisance_draws_is_to_be_made_again():
     fit = fit_of(experiment)
     fit.__dict__["nuisance_draws"] = None
     with pytest.raises(MissingError, match="scissorcal fit friction --force"):
-        make_study(experiment, fit, seed=0)
+        study_of(experiment, fit=fit)

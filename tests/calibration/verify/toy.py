@@ -1,14 +1,17 @@
 """A linear law over made-up motion: an experiment whose posterior is known."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from types import SimpleNamespace
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.ladder import Likelihood, Rung
 from scissorcal.calibration.layout import Layout, Parameter
-from scissorcal.inference import Problem
+from scissorcal.calibration.result import Effort, FitResult, StrokeError
+from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.inference import ArNoise, Posterior, Problem, infer
 
 Array = NDArray[np.float64]
 
@@ -44,7 +47,6 @@ class Linear:
 
     observed: Array
     naive: bool = False
-    ripple: float = 0.0
     what: Literal["friction", "cut"] = "friction"
     layout: Layout = LAYOUT
     nuisance: tuple[str, ...] = ("noise",)
@@ -54,10 +56,6 @@ class Linear:
 
     def mean(self, u: Array) -> Array:
         return np.asarray(self.design @ np.array([u[0], u[1], np.exp(u[2])]))
-
-    def simulate(self, u: Array, rng: np.random.Generator) -> Array:
-        irregular = np.arange(BINS) < BINS // 2
-        return self.mean(u) + self.ripple * irregular * rng.uniform(-1, 1, BINS)
 
     def rung(self, measured: Array) -> Rung:
         def residuals(u: Array) -> Array:
@@ -75,3 +73,66 @@ class Linear:
             prior_mean=LAYOUT.mean,
             prior_precision=np.diag(1 / LAYOUT.sd**2),
         )
+
+
+@dataclass(frozen=True)
+class LinearSimulator:
+    """Linear data with autoregressive noise that grows with its parameter, fitted as a whole."""
+
+    experiment: Linear
+    ar: ArNoise
+    reference: float
+    noise: str = "AR(1)"
+
+    def simulate(self, truth: Array, rng: np.random.Generator) -> Array:
+        if not np.all(np.isfinite(truth)):
+            raise ArithmeticError("the truth is not finite")
+        grown = float(np.exp(truth[3] - self.reference))
+        return self.experiment.mean(truth) + grown * self.ar.draw(self.experiment.series, rng)
+
+    def refit(
+        self, data: Array, prior: StatedPrior, effort: Effort, rng: np.random.Generator
+    ) -> FitResult:
+        experiment = replace(self.experiment, observed=data)
+        rung = experiment.rung(data)
+        rung = replace(
+            rung,
+            prior_mean=prior.layout(LAYOUT).mean,
+            prior_precision=prior.precision(LAYOUT, rung.prior_precision),
+        )
+        return as_fit(experiment, infer(rung.problem(experiment.series), effort, rng, count=600))
+
+
+def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
+    """What the check reads of a fit: draws, parameters, strokes."""
+    natural = LAYOUT.columns(posterior.draws)
+    fitted = LAYOUT.fitted(posterior.draws)
+    held_out = tuple(
+        StrokeError(i, "", ("closing", "opening")[i % 2], 0.1 * (1 + i // 2), 0.1, 0.1)
+        for i in range(STROKES)
+    )
+    facts: dict[str, Any] = {
+        "what": "friction",
+        "effort": "standard",
+        "rung": "linear",
+        "structure": {},
+        "verdicts": (),
+        "parameters": fitted[:3],
+        "draws": natural[:, :3],
+        "nuisance": fitted[3:],
+        "nuisance_draws": natural[:, 3:],
+        "held_out": held_out,
+        "inputs_hash": "0" * 64,
+        "effort_unit": "N m",
+        "diagnostics": {
+            "effective_samples": posterior.effective,
+            "k_hat": posterior.k_hat,
+            "effort_reached": posterior.effort_reached,
+        },
+        "series": SimpleNamespace(
+            stroke=experiment.strokes, recording=np.zeros(len(experiment.strokes), dtype=int)
+        ),
+        "parameter": lambda name: next(p for p in fitted if p.name == name),
+        "column": lambda name: natural[:, LAYOUT.names.index(name)],
+    }
+    return cast(FitResult, SimpleNamespace(**facts))

@@ -7,7 +7,9 @@ enum { NEWTON_STEPS = 40, ROOT_STEPS = 60 };
 
 static const double LEAST_DEPTH = 1e-12; /* m: below, an indentation counts as none */
 static const double LEAST_SLOPE = 1e-9;  /* tan(psi) up to which no force acts along the cut */
+static const double LEAST_RUN = 1e-3;   /* dx/ds from which an edge has a point over a place */
 static const double STEP_CLOSE_M = 1e-9;
+static const double LEAST_TOOTH_M = 1e-7; /* cracks with shorter teeth run along for the tick */
 static const double LOG_CLOSE = 1e-13;
 static const double FARTHEST_M = 10.0; /* a place beyond which no crack is followed */
 static const double LARGEST_LOG = 60.0;
@@ -60,7 +62,7 @@ static turned turn_of(const sc_crack_law *law, double opening)
     return t;
 }
 
-/* All about the edge's point at a station. */
+/* All about the edge's point at a station. An edge that stands upright touches nothing. */
 static void stand_at(const sc_crack_law *law, turned t, double station, spot *at)
 {
     double taper, offset = curve_at(&law->edge, station, &taper);
@@ -70,9 +72,10 @@ static void stand_at(const sc_crack_law *law, turned t, double station, spot *at
     at->run = t.cosine - taper * t.sine;
     at->contact = station * t.cosine - offset * t.sine;
     at->height = station * t.sine + offset * t.cosine;
-    at->slope = at->rise / at->run;
+    int upright = !(at->run > LEAST_RUN);
+    at->slope = upright ? 0.0 : at->rise / at->run;
     at->lever = at->contact + at->height * at->slope;
-    at->depth = law->upper_face - at->height;
+    at->depth = upright ? 0.0 : law->upper_face - at->height;
     at->power = 1.0;
     at->force = at->release = 0.0;
     if (at->depth > LEAST_DEPTH) {
@@ -91,6 +94,7 @@ static void stand_over(const sc_crack_law *law, turned t, double contact, spot *
         double step = (contact - station * t.cosine + offset * t.sine) / (t.cosine - taper * t.sine);
         if (!isfinite(step)) break;
         station += step;
+        if (fabs(station) > FARTHEST_M) station = copysign(FARTHEST_M, station);
         if (fabs(step) < STEP_CLOSE_M) break; /* Newton: what is left is its square */
     }
     stand_at(law, t, station, at);
@@ -276,7 +280,7 @@ static void walk_tick(const sc_crack_law *law, const tick *k, spot *at, double *
         if (!starts) return;
         double before = books->place;
         if (law->fracture == SC_CRACK_RIPPLED) jump(law, k, from, at, books);
-        if (law->fracture == SC_CRACK_SMOOTH || !(books->place > before)) {
+        if (law->fracture == SC_CRACK_SMOOTH || !(books->place - before > LEAST_TOOTH_M)) {
             run_along(law, k, from, at, torque, push, books);
             return;
         }

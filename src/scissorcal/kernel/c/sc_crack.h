@@ -2,7 +2,8 @@
  *
  * Between two samples opening and advance change linearly. The crack stands and the edge is elastic
  * until what the edge would release, m g(delta) tan(psi), exceeds the energy J at the crack's place;
- * it then runs until that has fallen to kappa J (kappa = 1: it runs along with the edge).
+ * it then runs until that has fallen to kappa J (kappa = 1, or teeth below 0.1 um: it runs along with
+ * the edge).
  */
 #ifndef SC_CRACK_H
 #define SC_CRACK_H
