@@ -1,5 +1,7 @@
 """The walk of a crack in C: against its plain twin, its energy, closed forms, and the extremes."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from scissorcal.calibration.simulation import Sheet, Unevenness, crack_law, material_torque
 from scissorcal.kernel import CrackPath, walk_crack
 from scissorcal.model import Cutting, Edge, Response, cut_torque
+from tests.kernel import golden_crack
 from tests.kernel.reference_crack import walk
 
 LINE = Edge("line", -0.008, 0.03, 0.075)
@@ -190,3 +193,14 @@ def test_an_uneven_sheet_has_the_process_that_it_is_drawn_from():
     assert values.mean(axis=1).std() == pytest.approx(0.0211, rel=0.12)
     correlation = np.mean(within[:, lag:] * within[:, :-lag]) / np.mean(within**2)
     assert correlation == pytest.approx(np.exp(-1.0), abs=0.03)
+
+
+def test_the_golden_vectors_are_the_twins():
+    stored = json.loads(golden_crack.PATH.read_text(encoding="utf-8"))
+    made = json.loads(json.dumps(golden_crack.golden()))
+    assert [case["title"] for case in stored["cases"]] == [case["title"] for case in made["cases"]]
+    for case, twin in zip(stored["cases"], made["cases"], strict=True):
+        for name in ("torque", "push", "place"):
+            scale = np.abs(twin[name]).max()
+            assert case[name] == pytest.approx(twin[name], abs=1e-10 * scale), name
+        assert case["jumps"] == twin["jumps"]
