@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.signals.weak_form import HELD, SMOOTH
 from scissorcal.calibration.simulation.motion import SmoothPiece
 from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.kernel import presliding_path
@@ -21,7 +22,7 @@ class DriveTruth:
     sine, periods per turn) of what it gives besides. ``load_share`` of the material's torque is
     added to friction. ``closing_offset`` and ``opening_offset`` (N m) are added to the
     material's torque by direction, ``stroke_sd`` (N m) is what single strokes differ by.
-    ``delay_s`` is how much later than in the middle of a tick the torque is measured, ``noise``
+    ``delay_s`` is how much later than its sample says the torque is measured, ``noise``
     what is added to each sample.
     """
 
@@ -42,11 +43,14 @@ def measured_drive(
 ) -> Array:
     """Drive (n,) measured at the samples of a piece, which moves as it did.
 
-    ``material`` (n - 1,) is the material's mean torque over each tick, positive as it opens. Over a
-    tick the mean drive is inertia * acceleration + friction + offset + cogging - material; a
-    sample lies between two ticks, and shows the mean of both, each by its share of the time.
-    Dry friction of a joint that is nearly at rest may be anything up to its level: it is taken in
-    proportion to the speed there.
+    ``material`` (n - 1,) is the material's mean torque over each tick, positive as it opens. The
+    drive is taken as linear between samples, such that
+
+        inertia * acceleration = drive - friction - offset - cogging + material
+
+    holds exactly for means around each sample, as the second difference of the positions weighs
+    them; a sample shows it a delay later. Dry friction of a joint that is nearly at rest may be
+    anything up to its level: it is taken in proportion to the speed there.
     """
     path, tick_s = piece.opening, piece.tick_s
     step = np.diff(path)
@@ -60,15 +64,18 @@ def measured_drive(
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
     dry = sense * friction_torque(law, middle, step / tick_s, load, state)
     cosine, sine, number = truth.cogging
-    drive = truth.inertia * _acceleration(path, tick_s) + dry + truth.offset
+    drive = dry + truth.offset
     drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
     drive -= material - truth.load_share * np.abs(material) * sense * direction
     closing = 0.5 * (1.0 - sense * np.sign(step))
     drive -= closing * truth.closing_offset + (1.0 - closing) * truth.opening_offset
     drive += _by_stroke(piece, truth.stroke_sd, rng)[:-1]
-    shown = 0.5 - truth.delay_s / tick_s
-    before, after = np.append(drive[0], drive), np.append(drive, drive[-1])
-    return (1.0 - shown) * before + shown * after + drawn_noise(truth.noise, len(path), tick_s, rng)
+    around = _around(drive)
+    around[1:-1] += truth.inertia * np.diff(path, 2) / tick_s**2
+    nodes = _nodes(around, HELD if piece.held else SMOOTH)
+    late = truth.delay_s / tick_s
+    shown = (1.0 - late) * nodes + late * np.append(nodes[0], nodes[:-1])
+    return np.asarray(shown + drawn_noise(truth.noise, len(path), tick_s, rng))
 
 
 def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator) -> Array:
@@ -82,11 +89,19 @@ def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Ge
     return np.asarray(white + noise.slow_Nm * lfilter([1.0], [1.0, -keep], kicks))
 
 
-def _acceleration(path: Array, tick_s: float) -> Array:
-    """Mean acceleration (n - 1,) between two samples."""
-    at = np.zeros(len(path))
-    at[1:-1] = np.diff(path, 2) / tick_s**2
-    return np.asarray(0.5 * (at[1:] + at[:-1]))
+def _around(by_tick: Array) -> Array:
+    """Means (n,) around each sample of what is known by tick (n - 1,)."""
+    return np.asarray(0.5 * (np.append(by_tick[0], by_tick) + np.append(by_tick, by_tick[-1])))
+
+
+def _nodes(around: Array, neighbour: float) -> Array:
+    """Samples (n,) of which neighbours weigh so much in the means ``around`` (n,) each."""
+    from scipy.linalg import solveh_banded
+
+    band = np.full((2, len(around)), neighbour)
+    band[1] = 1.0 - 2.0 * neighbour
+    band[1, [0, -1]] = 1.0 - neighbour
+    return np.asarray(solveh_banded(band, around))
 
 
 def _built(path: Array, length: float) -> Array:

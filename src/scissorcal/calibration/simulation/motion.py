@@ -17,9 +17,9 @@ PATH_SD = 2.0
 """Standard deviation in samples of a Gaussian that takes off what is left of the encoder's steps:
 accelerations of a rough path would stand in the torque that drives it."""
 SLEDGE_SD = 10.0
-REST_S = 0.005
+REST_S = 0.01
 """Below one step of the encoder in so long a joint counts as nearly at rest."""
-REST_RATES = (1e-3, 1e-2)
+REST_RATES = (1e-3, 5e-3)
 """Least and largest of the speeds (rad/s or m/s) that this may give."""
 
 
@@ -29,7 +29,8 @@ class SmoothPiece:
 
     ``opening`` (rad) and ``advance`` (m) are without steps, ``load`` (N m) is what a hand takes,
     ``stroke`` numbers movements, the rest after one counted to it; ``sheet`` is -1 for none.
-    Below ``rest_rate`` (rad/s) the joint counts as nearly at rest.
+    Below ``rest_rate`` (rad/s) the joint counts as nearly at rest; ``held`` says that commands held
+    the drive from one sample to the next.
     """
 
     start: int
@@ -40,6 +41,7 @@ class SmoothPiece:
     sheet: Integers
     tick_s: float
     rest_rate: float
+    held: bool
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
         stroke=_held(motion.stroke),
         sheet=motion.sheet,
         tick_s=motion.tick_s,
+        held=bool(np.ptp(recording.samples["torque_command"][span]) > 0),
         rest_rate=float(np.clip(motion.resolution / REST_S, *REST_RATES)),
     )
 
