@@ -17,9 +17,9 @@ PATH_SD = 2.0
 """Standard deviation in samples of a Gaussian that takes off what is left of the encoder's steps:
 accelerations of a rough path would stand in the torque that drives it."""
 SLEDGE_SD = 10.0
-REST_S = 0.01
+REST_S = 0.005
 """Below one step of the encoder in so long a joint counts as nearly at rest."""
-REST_RATES = (1e-3, 5e-3)
+REST_RATES = (1e-6, 1e-2)
 """Least and largest of the speeds (rad/s or m/s) that this may give."""
 
 
