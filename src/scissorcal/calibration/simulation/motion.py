@@ -98,8 +98,6 @@ def motion_of(recordings: tuple[Recording, ...], inertia: float) -> tuple[Motion
 
 
 def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
-    from scipy.ndimage import gaussian_filter1d
-
     span = slice(motion.start, motion.start + len(motion.opening))
     load = np.zeros(len(motion.opening))
     if not np.isnan(recording.handle_radius_m):
@@ -107,8 +105,8 @@ def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
         load = recording.handle_radius_m * force
     return SmoothPiece(
         start=motion.start,
-        opening=np.asarray(gaussian_filter1d(motion.opening, PATH_SD, mode="nearest")),
-        advance=np.asarray(gaussian_filter1d(motion.advance, SLEDGE_SD, mode="nearest")),
+        opening=_smoothed(motion.opening, PATH_SD),
+        advance=_smoothed(motion.advance, SLEDGE_SD),
         load=load,
         stroke=_held(motion.stroke),
         sheet=motion.sheet,
@@ -116,6 +114,17 @@ def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
         held=bool(np.ptp(recording.samples["torque_command"][span]) > 0),
         rest_rate=float(np.clip(motion.resolution / REST_S, *REST_RATES)),
     )
+
+
+def _smoothed(values: Array, sd: float) -> Array:
+    """A path (n,) under a Gaussian of ``sd`` samples; its ends go on as they come."""
+    from scipy.ndimage import gaussian_filter1d
+
+    reach = min(int(4 * sd), len(values) - 1)
+    before = 2.0 * values[0] - values[reach:0:-1]
+    after = 2.0 * values[-1] - values[-2 : -reach - 2 : -1]
+    wider = np.concatenate([before, values, after])
+    return np.asarray(gaussian_filter1d(wider, sd)[reach : reach + len(values)])
 
 
 def _held(stroke: Integers) -> Integers:

@@ -1,0 +1,134 @@
+"""Raw recordings over the motion of a rig of other construction, and the whole fit of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import FitResult, cut_experiment, fit_cut, fit_friction
+from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.structure import edge_of
+from scissorcal.calibration.friction import friction_experiment
+from scissorcal.calibration.simulation import (
+    CutTruth,
+    DriveTruth,
+    Unevenness,
+    motion_of,
+    simulate_cut,
+)
+from scissorcal.calibration.verify import (
+    assess,
+    cut_simulator,
+    friction_simulator,
+    make_study,
+    run,
+    tasks_of,
+)
+from scissorcal.model import Cutting, Response
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Recording
+from tests.second_rig import capture_cut, capture_friction, draw_truth, fine, paper, recipe_for
+
+pytestmark = pytest.mark.slow
+
+
+@dataclass(frozen=True)
+class Day:
+    recipe: Recipe
+    empty: Recording
+    cuts: Recording
+    friction: FitResult
+
+
+@pytest.fixture(scope="module")
+def day() -> Day:
+    """Paper cut on the fine rig, with its friction fitted; critics are left out."""
+    rng = np.random.default_rng(21)
+    rig = draw_truth(fine(paper()), rng, spread=0.3, shape="uniform")
+    recipe = recipe_for(rig)
+    settings = {
+        "friction": recipe.fit.friction.model_copy(update={"critic": False}),
+        "cut": recipe.fit.cut.model_copy(update={"critic": False}),
+    }
+    recipe = recipe.model_copy(update={"fit": recipe.fit.model_copy(update=settings)})
+    empty, _ = capture_friction(rig, recipe, rng)
+    cuts, _ = capture_cut(rig, recipe, rng)
+    fit = fit_friction((empty,), recipe.fit.friction, effort="standard", rng=rng)
+    return Day(recipe, empty, cuts, fit)
+
+
+@pytest.mark.parametrize("load_share", [0.0, 0.1])
+def test_another_material_comes_back_with_its_teeth(day: Day, load_share: float) -> None:
+    """Force, exponent, energy and kappa within four standard deviations, and kappa to 1 %.
+
+    The material has nothing of the one that was cut: what is found is what was put in.
+    """
+    recipe, known = day.recipe, KnownFriction.of(day.friction)
+    reference_m = recipe.fit.cut.reference_indentation_mm * 1e-3
+    wanted = {
+        "response_force": 1.0,
+        "response_exponent": 1.5,
+        "fracture_energy": 0.5,
+        "kappa": 0.68,
+    }
+    truth = CutTruth(
+        cutting=Cutting(
+            edge_of(recipe).edge,
+            Response("power", 1.0, 1.5, reference_m),
+            recipe.rig.moving_blades,
+            recipe.upper_face_m,
+            0.5,
+            0.68,
+        ),
+        uneven=Unevenness(0.04, 1.5e-3, 0.004),
+        drive=DriveTruth(
+            known.inertia,
+            known.law,
+            known.noise,
+            offset=known.offset,
+            cogging=(-known.cogging[0], -known.cogging[1], known.cogging[2]),
+            load_share=load_share,
+            stroke_sd=known.stroke_sd,
+        ),
+    )
+    rng = np.random.default_rng(5)
+    made = simulate_cut(motion_of((day.cuts,), known.inertia), truth, rng)
+    fit = fit_cut(made, recipe, day.friction, effort="standard", rng=rng)
+    assert not [note for note in fit.notes if "kappa is open" in note]
+    for name, value in wanted.items():
+        found = fit.parameter(name)
+        assert abs(found.mean - value) < 4.0 * found.sd, name
+    assert fit.parameter("kappa").mean == pytest.approx(0.68, rel=0.01)
+
+
+def test_the_fit_of_friction_is_calibrated_on_raw_samples(day: Day) -> None:
+    """30 whole fits, 1 % of false alarms, and no parameter's intervals too narrow by a half."""
+    settings = day.recipe.fit.friction
+    design = friction_experiment((day.empty,), settings, day.friction)
+    simulator = friction_simulator((day.empty,), settings, day.friction, design.layout)
+    study = make_study(design, day.friction, simulator, seed=1)
+    records = [run(study, task) for task in tasks_of(study, ("sbc",), 30)]
+    result = assess(study, day.friction, ("sbc",), records)
+    assert result.calibration is not None
+    assert not result.calibration.broken
+    assert result.calibration.other_law < 0.2
+    assert max(quantity.width for quantity in result.calibration.quantities) < 1.5
+    assert {v.status for v in result.verdicts} == {"pass"}
+
+
+def test_the_fit_of_a_cut_is_calibrated_on_raw_samples(day: Day) -> None:
+    """20 whole fits: 90 % intervals hold 16 of 20 at least in all but 4 % of the cases each."""
+    rng = np.random.default_rng(6)
+    fit = fit_cut((day.cuts,), day.recipe, day.friction, effort="standard", rng=rng)
+    design = cut_experiment((day.cuts,), day.recipe, day.friction, fit)
+    simulator = cut_simulator((day.cuts,), day.recipe, day.friction, fit, design.layout)
+    study = make_study(design, fit, simulator, seed=1)
+    records = [run(study, task) for task in tasks_of(study, ("sbc",), 20)]
+    result = assess(study, fit, ("sbc",), records)
+    assert result.calibration is not None
+    assert not result.calibration.broken
+    names = [quantity.name for quantity in result.calibration.quantities]
+    assert names[:4] == ["response_force", "response_exponent", "fracture_energy", "kappa"]
+    for quantity in result.calibration.quantities:
+        assert quantity.coverage[1].share >= 0.8, quantity.name
+        assert quantity.width < 1.6, quantity.name
