@@ -84,8 +84,8 @@ def verify(
 ) -> Answer:
     """Check whether a fit's intervals mean what they say.
 
-    sbc: data are simulated over your own motion, with the noise of your own residuals, from
-    parameters around your fit, and fitted again in the same way. The intervals must hold the
+    sbc: raw recordings are simulated over your own motion, with the noise of your own sensors, from
+    parameters around your fit, and the whole fit is run on them. The intervals must hold the
     truth as often as they say. halves: your strokes are parted into two halves, which must differ
     by no more than each claims. prior: how much the result owes to the recipe's prior.
 

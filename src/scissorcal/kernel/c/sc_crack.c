@@ -8,8 +8,9 @@ enum { NEWTON_STEPS = 40, ROOT_STEPS = 60 };
 static const double LEAST_DEPTH = 1e-12; /* m: below, an indentation counts as none */
 static const double LEAST_SLOPE = 1e-9;  /* tan(psi) up to which no force acts along the cut */
 static const double LEAST_RUN = 1e-3;   /* dx/ds from which an edge has a point over a place */
-static const double STEP_CLOSE_M = 1e-9;
+static const double STEP_CLOSE_M = 1e-7;
 static const double LEAST_TOOTH_M = 1e-7; /* cracks with shorter teeth run along for the tick */
+static const double DEPTH_CLOSE_M = 1e-17;
 static const double LOG_CLOSE = 1e-13;
 static const double FARTHEST_M = 10.0; /* a place beyond which no crack is followed */
 static const double LARGEST_LOG = 60.0;
@@ -170,27 +171,41 @@ static void look(const sc_crack_law *law, const tick *k, double s, double place,
     stand_over(law, blades_at(law, k, s), place - (k->advance + s * k->by_advance), at);
 }
 
-/* The time between from and to (release above limit) at which the release reaches the limit. */
-static double time_of_start(const sc_crack_law *law, const tick *k, double place, double limit,
-                            double from, double to, double below, double above)
+/* How much deeper the edge sits than where its release would be the limit: nearly linear in time, as
+ * a response is nearly a power. Without contact, against the depth `critical` of another place. */
+static double beyond(const spot *at, double limit, double critical)
 {
-    spot at = {0};
-    double low = from, high = to;
-    at.station = place;
-    for (int32_t i = 0; i < ROOT_STEPS && high - low > 1e-15; i++) {
+    if (!(at->release > 0.0)) return at->depth - critical;
+    return at->depth * (1.0 - exp(-log(at->release / limit) / at->power));
+}
+
+/* The time after `from`, where *begin stands, at which the release reaches the limit; at the tick's
+ * end, *end, it is above. *at gets what is there. Regula falsi, by Illinois. */
+static double time_of_start(const sc_crack_law *law, const tick *k, double place, double limit,
+                            double from, const spot *begin, const spot *end, spot *at)
+{
+    double low = from, high = 1.0, above = beyond(end, limit, 0.0);
+    const double critical = end->depth - above;
+    double below = beyond(begin, limit, critical);
+    int32_t side = 0;
+    *at = *end;
+    for (int32_t i = 0; i < ROOT_STEPS; i++) {
         double s = low + (high - low) * below / (below - above);
         if (!(s > low && s < high)) s = 0.5 * (low + high);
-        look(law, k, s, place, &at);
-        double off = at.release - limit;
-        if (fabs(off) < LOG_CLOSE * limit) return s;
+        if (!(s > low && s < high)) return high;
+        look(law, k, s, place, at);
+        double off = beyond(at, limit, critical);
+        if (fabs(off) < DEPTH_CLOSE_M) return s;
         if (off < 0.0) {
             low = s;
             below = off;
-            above *= 0.5;
+            if (side < 0) above *= 0.5;
+            side = -1;
         } else {
             high = s;
             above = off;
-            below *= 0.5;
+            if (side > 0) below *= 0.5;
+            side = 1;
         }
     }
     return high;
@@ -257,7 +272,7 @@ static void walk_tick(const sc_crack_law *law, const tick *k, spot *at, double *
     double from = 0.0;
     *torque = *push = 0.0;
     while (from < 1.0) {
-        spot begin = *at, end = *at, middle = *at;
+        spot begin = *at, end = *at, middle = *at, found = *at;
         look(law, k, 1.0, books->place, &end);
         double limit = HUGE_VAL, to = 1.0;
         if (law->fracture != SC_CRACK_NONE) limit = toughness(law, books->place);
@@ -265,10 +280,8 @@ static void walk_tick(const sc_crack_law *law, const tick *k, spot *at, double *
         if (starts) {
             to = from;
             if (begin.release < limit)
-                to = time_of_start(law, k, books->place, limit, from, 1.0, begin.release - limit,
-                                   end.release - limit);
-            end = begin;
-            if (to > from) look(law, k, to, books->place, &end);
+                to = time_of_start(law, k, books->place, limit, from, &begin, &end, &found);
+            end = to > from ? found : begin;
         }
         if (to > from && (begin.depth > 0.0 || end.depth > 0.0)) {
             look(law, k, 0.5 * (from + to), books->place, &middle);
