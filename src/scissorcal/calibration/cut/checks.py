@@ -84,9 +84,10 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
     runs = scouted.segments.stretches
     if unseen := sum(not run.resolved for run in runs):
         notes.append(
-            f"In {unseen} of {len(runs)} running strokes the blades nearly stop at each tooth, and the "
-            "encoder is too coarse to show whether they swing back: only the teeth of these strokes "
-            "count, not their mean torque. Faster strokes or a finer encoder would let them count."
+            f"In {unseen} of {len(runs)} running strokes the blades nearly stop at each tooth, and "
+            "the encoder is too coarse to show whether they swing back: only the teeth of these "
+            "strokes count, not their mean torque. Faster strokes or a finer encoder would let them "
+            "count."
         )
     names = design.layout.names
     shown = [
