@@ -86,8 +86,7 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
         notes.append(
             f"In {unseen} of {len(runs)} running strokes the blades nearly stop at each tooth, and "
             "the encoder is too coarse to show whether they swing back: only the teeth of these "
-            "strokes count, not their mean torque. Faster strokes or a finer encoder would let them "
-            "count."
+            "strokes count, not their mean torque. Faster strokes or a finer encoder would help."
         )
     names = design.layout.names
     shown = [
