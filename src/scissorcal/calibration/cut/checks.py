@@ -81,6 +81,14 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
         )
     elif design.law.fracture == "rippled":
         notes.append(f"kappa is open: {scouted.reason}")
+    runs = scouted.segments.stretches
+    if unseen := sum(not run.resolved for run in runs):
+        notes.append(
+            f"In {unseen} of {len(runs)} running strokes the blades nearly stop at each tooth, and "
+            "the encoder is too coarse to show whether they swing back: only the teeth of these "
+            "strokes count, not their mean torque. Faster strokes or a finer encoder would let them "
+            "count."
+        )
     names = design.layout.names
     shown = [
         f"{name} {sd:.2%}"

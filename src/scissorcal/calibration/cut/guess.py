@@ -52,13 +52,20 @@ class Guess:
         A sawtooth of height H and period p: H p / sqrt(720), from the variance of (u^2 - 1/4) / 2
         over a cycle. It is taken at the guess and held, so that kappa is never told by a variance.
         """
+        height, period = self.tooth(geometry, opening)
+        return height * period / float(np.sqrt(720.0))
+
+    def tooth(self, geometry: Geometry, opening: Array) -> tuple[float, float]:
+        """Height (N m) and period (rad) of a tooth at the middle of some openings."""
         view = geometry.running(np.asarray([float(np.median(opening))]))
         peak = self.mean_energy * self.peak_ratio / (geometry.moving_blades * view.slope)
         kappa = 2.0 / self.peak_ratio - 1.0
         depth = self.response.indentation_at(peak) - self.response.indentation_at(kappa * peak)
-        period = geometry.moving_blades * depth / view.lever
-        height = (1.0 - kappa) * peak * view.lever
-        return float((height * period)[0] / np.sqrt(720.0))
+        height, period = (
+            (1.0 - kappa) * peak * view.lever,
+            geometry.moving_blades * depth / view.lever,
+        )
+        return float(height[0]), float(period[0])
 
     def torque(self, geometry: Geometry, opening: Array, contact: Array) -> tuple[Array, Array]:
         """Torque (k,) that opening blades show of a standing crack, and its derivative by place."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
+from scissorcal.calibration.cut.swings import swings_unseen
 from scissorcal.calibration.path import (
     Material,
     PathMotion,
@@ -85,6 +86,8 @@ class Stretch:
     ``torque`` (k,) is the mean over the path that the sledge's motion leaves, ``path`` (k,) that
     path in rad; ``noise`` (k,) is the variance of the drive's noise in the mean torque.
     ``tooth_sd`` (J) is what a tooth that the segment's end cuts off leaves of its work.
+    ``resolved`` is false where the blades may swing back unseen (:func:`swings_unseen`); ``noise``
+    then keeps the mean torque from counting, and only the teeth do.
     """
 
     sheet: int
@@ -97,6 +100,7 @@ class Stretch:
     noise: Array
     speed: float
     tooth_sd: float
+    resolved: bool = True
 
 
 @dataclass(frozen=True)
@@ -317,6 +321,9 @@ class _Builder:
             turned = np.diff(motion.opening[ends])
             _, late = mean_torque(motion, material.work, ends)
             ticks = np.diff(ends).astype(np.float64)
+            noise = np.array([self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks])
+            _, period = self.guess.tooth(geometry, motion.opening[ends])
+            unseen = swings_unseen(motion, ends, period)
             self.stretches.append(
                 Stretch(
                     sheet=self.sheet,
@@ -326,11 +333,10 @@ class _Builder:
                     late=late * turned / path,
                     direction=mean_direction(motion, material, ends, by_torque=True),
                     path=path,
-                    noise=np.array(
-                        [self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks]
-                    ),
+                    noise=noise + (work / path) ** 2 if unseen else noise,
                     speed=float(np.median(np.abs(turned) / (ticks * motion.tick_s))),
                     tooth_sd=self.guess.cut_off_tooth(geometry, motion.opening[ends]),
+                    resolved=not unseen,
                 )
             )
 
