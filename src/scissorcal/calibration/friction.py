@@ -217,7 +217,7 @@ def _bandwidth(
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
-    """Fit the same law once more at a higher cutoff, from where the fit ended."""
+    """Fit the same law once more over shorter windows, from where the fit ended."""
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
         return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
@@ -225,7 +225,7 @@ def _bandwidth(
     if other_Hz is None:
         why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
         return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
-    every = weigh(recordings, other_Hz, sensors.usable)
+    every = weigh(recordings, settings.cutoff_Hz, sensors.usable, window_Hz=other_Hz)
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
@@ -240,7 +240,7 @@ def _bandwidth(
     here = chosen.optimum.point
     rung = replace(there.rung(there.observed), starts=here[None, :])
     optimum = optimum_of(rung, there.series)
-    cutoffs = (settings.cutoff_Hz, other_Hz)
+    cutoffs = (law.windows.half_at, other_Hz)
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 
 
@@ -248,11 +248,16 @@ def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint)
     """What was left out near rest, and how late torque was measured."""
     left = 1.0 - len(windows.first) / len(every.first)
     notes = [
-        f"{left:.1%} of the time the joint rests, or moves by less than "
+        f"{left:.1%} of the time the joint rests or turns, or moves by less than "
         f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
         "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
         "it is left out."
     ]
+    if windows.lengthening > 1.0:
+        notes.append(
+            f"The encoder's steps are coarse: windows pass half at {windows.half_at:.3g} Hz, "
+            "below fit.friction.cutoff_Hz, so that the steps do not lower the inertia."
+        )
     if "delay" in posterior.names:
         delays = posterior.draws[:, posterior.names.index("delay")]
         notes.append(
@@ -346,7 +351,12 @@ def _ladder(
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
     plain = design(windows, strokes, laws[0], False, joint, settings.adopt)
-    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(plain.moments)
+    steady = windows.without_turns
+    clear = plain
+    if not np.all(steady):
+        some = windows.where(steady), strokes[steady]
+        clear = design(*some, laws[0], False, joint, settings.adopt)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(clear.moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
     first, *others = (
         design(windows, strokes, law, symmetric, joint, settings.adopt, periods, prior)

@@ -23,6 +23,10 @@ from scissorcal.recording.recording import Joint
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+BESIDE = 1.02
+"""A search begins a little beside least squares: for the simplest law they are its optimum, and a
+parameter that has not moved is one that the data do not know."""
+
 
 @dataclass(frozen=True)
 class FrictionExperiment:
@@ -139,10 +143,10 @@ class FrictionExperiment:
         inertia, offset, coulomb, viscous = np.linalg.lstsq(columns, measured, rcond=None)[0]
         effort = float(np.std(measured))
         begin = {
-            "inertia": max(inertia, 1e-3 * float(np.exp(layout.mean[0]))),
-            "offset": offset,
-            "coulomb": max(coulomb, 1e-2 * effort),
-            "viscous": max(viscous, 1e-2 * effort / float(np.sqrt(np.mean(bins.rate**2)))),
+            "inertia": BESIDE * max(inertia, 1e-3 * float(np.exp(layout.mean[0]))),
+            "offset": BESIDE * offset,
+            "coulomb": BESIDE * max(coulomb, 1e-2 * effort),
+            "viscous": BESIDE * max(viscous, 1e-2 * effort / float(np.sqrt(np.mean(bins.rate**2)))),
             "stribeck": 0.1 * effort,
             "noise": 0.1 * effort,
         }

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 NUISANCE = ("cogging_cos", "cogging_sin", "delay", "noise")
 WIDE = 2.8
 """Prior standard deviation of a logarithm: 90 % within a factor of 100 of its centre."""
+EXCESS = 1.4
+"""The same for static minus Coulomb friction, 90 % within a factor of 10: of sweeps that are all
+faster than Stribeck's speed only the prior says that it is no multiple of the whole drive."""
 DELAY_TICKS = (0.1, 0.15)
 """Mean and standard deviation of how late a held torque is: at most half a tick, by the motor."""
 
@@ -78,7 +81,15 @@ def friction_layout(
             )
     if parts.base == "stribeck":
         slow = float(np.log(np.quantile(np.abs(bins.rate), 0.25)))
-        rows.append(level("stribeck", unit, 0.3 * effort, "static minus Coulomb friction"))
+        excess = Parameter(
+            "stribeck",
+            unit,
+            "log",
+            float(np.log(0.3 * effort)),
+            EXCESS,
+            "static minus Coulomb friction",
+        )
+        rows.append(excess)
         rows.append(Parameter("stribeck_rate", f"{position}/s", "log", slow, 1.0, "Stribeck speed"))
     rows += _place(parts, float(np.ptp(bins.opening)), position)
     rows += _load(parts)

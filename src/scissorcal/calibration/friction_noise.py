@@ -46,7 +46,8 @@ def sample_noise(law: FrictionExperiment, point: Array) -> TorqueNoise | None:
         expected = expected + values["cogging_cos"] * np.cos(phase)
         expected = expected + values["cogging_sin"] * np.sin(phase)
     late = float(values.get("delay", np.asarray(0.0)))
-    drive = windows.drive + late * np.gradient(windows.drive) / windows.tick_s
+    ahead = late / windows.tick_s + (0.5 if windows.held else 0.0)
+    drive = windows.drive + ahead * np.diff(windows.drive, append=windows.drive[-1])
     left, momentum = drive - expected, float(values["inertia"]) * windows.rate
     low, high = _moving(windows)
     pairs = list(zip(low.tolist(), high.tolist(), strict=True))

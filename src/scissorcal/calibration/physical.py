@@ -20,7 +20,7 @@ MOVED_LIMIT = 4.0
 """Posterior standard deviations by which a parameter may move with the cutoff."""
 UNMOVED = 1e-9
 NOTHING = 0.02
-"""Share of the drive's standard deviation below which a Stribeck level counts as absent."""
+"""Share of the drive's standard deviation below which Stribeck friction counts as absent."""
 
 CURES = {
     "inertia": "check the signs of the torque and of the opening, and record a quicker excitation",
@@ -91,7 +91,7 @@ def bandwidth_verdict(
     value, name = float(moved[worst]), layout.names[worst]
     status: Status = "pass" if value <= MOVED_LIMIT else "fail"
     why = (
-        f"With cutoff_Hz = {cutoffs_Hz[1]:.3g} in the place of {cutoffs_Hz[0]:.3g}, {name} moves "
+        f"With windows of {cutoffs_Hz[1]:.3g} Hz in the place of {cutoffs_Hz[0]:.3g}, {name} moves "
         f"by {value:.1f} of its standard deviations, more than any other parameter."
     )
     if status == "fail":
@@ -120,10 +120,15 @@ class _Level:
 def _rated(experiment: FrictionExperiment, values: dict[str, float]) -> list[dict[str, float]]:
     """Points to look from: the optimum, and without Stribeck friction several speeds of it.
 
-    A Stribeck level that the data want negative ends at nothing, and its speed anywhere.
+    A Stribeck level that the data want negative ends at nothing and its speed anywhere, or its
+    speed below all that were recorded.
     """
     rows = [values]
-    if 0.0 < values.get("stribeck", 0.0) < NOTHING * float(np.std(experiment.observed)):
+    level = values.get("stribeck", 0.0)
+    if level <= 0.0:
+        return rows
+    felt = level * float(np.sqrt(np.mean(_slope(experiment, values, "stribeck") ** 2)))
+    if felt < NOTHING * float(np.std(experiment.observed)):
         names = experiment.layout.names
         slow = float(np.exp(experiment.layout.mean[names.index("stribeck_rate")]))
         rows += [{**values, "stribeck_rate": factor * slow} for factor in (0.3, 1.0, 3.0)]

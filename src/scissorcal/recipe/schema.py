@@ -258,7 +258,8 @@ class FitFriction(Section):
     """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both.
 
     ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
-    the windows, over which data and law are averaged alike, pass half.
+    the windows, over which data and law are averaged alike, pass half; they are longer where the
+    encoder is too coarse for that.
     ``critic`` searches what the law leaves for terms that it lacks (not at draft effort).
     """
 

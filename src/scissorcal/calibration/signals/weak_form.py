@@ -10,11 +10,21 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S, Bins, low_pass, rate_floor
 from scissorcal.calibration.signals.segments import (
-    edge_samples,
     no_piece,
     pieces_of,
     sheets_of,
     stretches,
+)
+from scissorcal.calibration.signals.window_length import (
+    HALF_AT,
+    SMOOTH,
+    Motion,
+    knot_samples,
+    longer_knot,
+    second_derivative,
+    spline,
+    widened,
+    with_turns,
 )
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
@@ -26,17 +36,14 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-HALF_AT = 0.365
-"""Frequency times knot distance at which a quadratic B-spline passes half: sinc^3 = 1 / 2."""
 RATE_BAND = 2.0
-"""The rate that friction is taken at is low-passed at this many times the windows' cutoff."""
+"""The rate that friction is taken at is low-passed at this many times the cutoff."""
+HELD = 1 / 6
+"""What a neighbouring sample counts in a mean over two ticks of a signal with corners at its
+samples, as a held drive has."""
 TURN_S = 5e-3
 STICK_SLIP_S = 0.5
 SWIFT = 8.0
-SMOOTH = 1 / 12
-HELD = 1 / 6
-"""What a neighbouring sample counts in a mean over two ticks: of a signal that is smooth (Numerov
-1924, doi:10.1093/mnras/84.8.592), and of one with corners at its samples, as a held drive has."""
 LOADED = 0.1
 """A load counts from this share of the drive's standard deviation; below it is noise."""
 
@@ -51,7 +58,8 @@ class Windows:
     friction is taken at every sample and weighed by :meth:`average`, as the drive was. ``first``
     (n,) is where each window begins, ``weights`` (k,) its weights, ``starts`` where the pieces
     without a gap begin. ``slope`` (n,) is the time derivative of the weighed drive, ``tick_s`` the
-    time between samples; ``held`` says that commands held the drive from one to the next.
+    time between samples; ``held`` says that commands held the drive from one to the next,
+    ``lengthening`` how many times longer the encoder asked windows to be than the cutoff.
     """
 
     bins: Bins
@@ -65,6 +73,12 @@ class Windows:
     slope: Array
     tick_s: float
     held: bool
+    lengthening: float = 1.0
+
+    @property
+    def half_at(self) -> float:
+        """Frequency in Hz at which the weights pass half."""
+        return HALF_AT / (self.tick_s * (len(self.weights) // 3))
 
     def average(self, values: Array) -> Array:
         """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
@@ -83,6 +97,12 @@ class Windows:
         )
 
     @property
+    def without_turns(self) -> Mask:
+        """Which windows (n,) hold no sample of rest and none of a turn."""
+        turns = _turns(self.rate, self.bins.rate_floor).astype(np.float64)
+        return np.asarray(self.average(turns) == 0.0)
+
+    @property
     def bears_load(self) -> bool:
         """Whether the passive end bears a load that a friction law can depend on."""
         if self.load is None:
@@ -99,9 +119,13 @@ class Windows:
 
 
 def weigh(
-    recordings: tuple[Recording, ...], cutoff_Hz: float, usable: tuple[Mask, ...] | None = None
+    recordings: tuple[Recording, ...],
+    cutoff_Hz: float,
+    usable: tuple[Mask, ...] | None = None,
+    *,
+    window_Hz: float | None = None,
 ) -> Windows:
-    """Weigh recordings over windows whose weights pass half at ``cutoff_Hz``.
+    """Weigh recordings over windows whose weights pass half at ``cutoff_Hz``, or below it.
 
     Each window is a quadratic B-spline. Against such a weight psi the equation of motion holds in
     its weak form,
@@ -110,32 +134,48 @@ def weigh(
 
     without any derivative of the position but the rate within F (Shinbrot 1957, Trans. ASME 79,
     547; Messenger and Bortz 2021, doi:10.1137/20M1343166). So nothing is smeared that is not
-    smeared on both sides, and a window knows nothing of what lies outside it. ``bins.moving`` is
-    false for windows that hold a rest: a stretch where the sign of the rate is not certain, unless
-    it is a quick turn. ``usable`` has a mask of samples for each recording; windows that touch
-    others are left out of ``moving`` too. Raises InputError where no piece is long enough.
+    smeared on both sides, and a window knows nothing of what lies outside it. Windows are longer
+    than the cutoff asks for where the encoder's steps would else be a part of psi''
+    (:func:`~.window_length.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
+    prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same.
+
+    ``bins.moving`` is false for windows that hold a rest or a turn: a sample where the sign of the
+    rate is not certain, or changes. When a turn was is known to a fraction of the low-pass only,
+    and friction jumps there by twice its level. With a coarse encoder quick turns count all the
+    same (:func:`~.window_length.with_turns`). ``usable`` has a mask of samples for each
+    recording; windows that touch others are left out of ``moving`` too. Raises InputError where no
+    piece is long enough.
     """
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
-    pieces: list[Windows] = []
     loaded = all(np.isfinite(recording.handle_radius_m) for recording in recordings)
-    stroke_offset = samples = 0
+    found: list[tuple[int, tuple[int, int], Motion]] = []
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
         for low, high in pieces_of(recording):
-            numbers = (index, stroke_offset, len(pieces))
-            piece = _weigh_piece(recording, (low, high), cutoff_Hz, numbers, good[low:high])
-            shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
-            pieces.append(shifted)
-            samples += high - low
-        stroke_offset += len(recording.strokes)
-    if not pieces:
+            motion = _motion(recording, (low, high), cutoff_Hz, good[low:high])
+            found.append((index, (low, high), motion))
+    if not found:
         raise no_piece(recordings)
-    if len({len(piece.weights) for piece in pieces}) > 1:
+    motions = [motion for _, _, motion in found]
+    knots = {knot_samples(window_Hz or cutoff_Hz, motion.rate_Hz) for motion in motions}
+    if len(knots) > 1:
         raise InputError(
             "The recordings have different sampling rates; fit those of one rate together."
         )
-    return _joined(pieces, loaded)
+    asked = knots.pop()
+    motions = with_turns(motions, asked)
+    knot = asked if window_Hz else longer_knot(motions, asked)
+    strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
+    pieces: list[Windows] = []
+    samples = 0
+    for number, ((index, (low, high), _), motion) in enumerate(zip(found, motions, strict=True)):
+        numbers = (index, strokes[index], number)
+        piece = _weigh_piece(recordings[index], (low, high), motion, knot, cutoff_Hz, numbers)
+        shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
+        pieces.append(shifted)
+        samples += high - low
+    return replace(_joined(pieces, loaded), lengthening=knot / asked)
 
 
 def next_cutoff(windows: Windows) -> float | None:
@@ -169,29 +209,36 @@ def _joined(pieces: list[Windows], loaded: bool) -> Windows:
     )
 
 
-def _weigh_piece(
-    recording: Recording,
-    piece: tuple[int, int],
-    cutoff_Hz: float,
-    numbers: tuple[int, int, int],
-    usable: Mask,
-) -> Windows:
+def _motion(recording: Recording, piece: tuple[int, int], cutoff_Hz: float, usable: Mask) -> Motion:
     low, high = piece
-    index, stroke_offset, number = numbers
-    samples, time = recording.samples[low:high], recording.device_time_s[low:high]
-    rate_Hz = (len(time) - 1) / (time[-1] - time[0])
-    position = np.asarray(samples["opening"], dtype=np.float64)
+    time = recording.device_time_s[low:high]
+    rate_Hz = float((len(time) - 1) / (time[-1] - time[0]))
+    position = np.asarray(recording.samples["opening"][low:high], dtype=np.float64)
     band_Hz = RATE_BAND * cutoff_Hz
     opening = low_pass(position, band_Hz, rate_Hz)
     rate = np.gradient(opening) * rate_Hz
     floor = rate_floor(position, band_Hz, rate_Hz)
-    knot = max(1, round(HALF_AT * rate_Hz / cutoff_Hz))
+    turns = _turns(rate, floor or np.inf) | ~usable
+    rests = _rests(rate, floor or np.inf, 1.0 / rate_Hz) | ~usable
+    return Motion(position, opening, rate, floor, turns, rests, rate_Hz)
+
+
+def _weigh_piece(
+    recording: Recording,
+    piece: tuple[int, int],
+    motion: Motion,
+    knot: int,
+    cutoff_Hz: float,
+    numbers: tuple[int, int, int],
+) -> Windows:
+    low, high = piece
+    index, stroke_offset, number = numbers
+    samples, time = recording.samples[low:high], recording.device_time_s[low:high]
+    opening, rate, rate_Hz = motion.opening, motion.rate, motion.rate_Hz
     held = bool(np.ptp(samples["torque_command"]) > 0)
-    weights, twice = _weights(knot, rate_Hz)
-    driving = _widened(_spline(knot), HELD if held else SMOOTH)
-    width = max(1, round(BIN_S * rate_Hz))
-    edge = edge_samples(rate_Hz)
-    first = np.arange(edge, len(time) - edge - len(weights), width)
+    weights, twice = widened(spline(knot), SMOOTH), second_derivative(knot, rate_Hz)
+    driving = widened(spline(knot), HELD if held else SMOOTH)
+    first = motion.places(len(weights))
     middle = first + len(weights) // 2
 
     def over(values: Array, kernel: Array, at: Integers) -> Array:
@@ -199,29 +246,27 @@ def _weigh_piece(
 
     drive = recording.drive_effort[low:high]
     stroke = np.asarray(samples["stroke"], dtype=np.int64)
-    rests = _rests(rate, floor or np.inf, 1.0 / rate_Hz)
-    spoilt = np.concatenate([[0], np.cumsum(rests | ~usable)])
     bins = Bins(
         time_s=time[middle],
         opening=over(opening, weights, first),
         rate=over(rate, weights, first),
-        acceleration=over(position, twice, first),
+        acceleration=over(motion.position, twice, first),
         drive=over(drive, driving, first),
         advance=over(np.asarray(samples["advance"], dtype=np.float64), weights, first),
-        moving=spoilt[first + len(weights)] == spoilt[first],
+        moving=motion.moving(first, len(weights)),
         series=np.full(len(first), number),
         recording=np.full(len(first), index),
         stroke=np.where(stroke[middle] >= 0, stroke[middle] + stroke_offset, -1),
         sheet=sheets_of(recording)[low:high][middle],
-        bin_s=width / rate_Hz,
-        rate_floor=floor,
+        bin_s=max(1, round(BIN_S * rate_Hz)) / rate_Hz,
+        rate_floor=motion.floor,
     )
     hand = np.asarray(samples["handle_force"], dtype=np.float64)
     return Windows(
         bins=bins,
         opening=opening,
         rate=rate,
-        load=low_pass(recording.handle_radius_m * hand, band_Hz, rate_Hz),
+        load=low_pass(recording.handle_radius_m * hand, RATE_BAND * cutoff_Hz, rate_Hz),
         drive=drive,
         first=first,
         weights=weights,
@@ -232,25 +277,11 @@ def _weigh_piece(
     )
 
 
-def _weights(knot: int, rate_Hz: float) -> tuple[Array, Array]:
-    """Weights of a window, and of the position for its second derivative, both of equal length.
-
-    A second difference of samples is the acceleration's mean over two ticks, exactly, so all else
-    must be averaged over two ticks too: hence the widening of the B-spline.
-    """
-    second = np.zeros(2 * knot + 1)
-    second[[0, knot, -1]] = np.array([1.0, -2.0, 1.0]) * (rate_Hz / knot) ** 2
-    box = np.full(knot, 1.0 / knot)
-    return _widened(_spline(knot), SMOOTH), np.convolve(box, second)
-
-
-def _spline(knot: int) -> Array:
-    box = np.full(knot, 1.0 / knot)
-    return np.convolve(np.convolve(box, box), box)
-
-
-def _widened(weights: Array, neighbour: float) -> Array:
-    return np.convolve(weights, np.array([neighbour, 1.0 - 2.0 * neighbour, neighbour]))
+def _turns(rate: Array, floor: float) -> Mask:
+    """Samples (m,) where the rate's sign is not certain, or has just changed."""
+    uncertain = np.abs(rate) <= floor
+    uncertain[1:] |= rate[1:] * rate[:-1] <= 0.0
+    return np.asarray(uncertain)
 
 
 def _rests(rate: Array, floor: float, tick_s: float) -> Mask:

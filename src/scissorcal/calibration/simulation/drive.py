@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.weak_form import HELD, SMOOTH
+from scissorcal.calibration.signals.weak_form import HELD
+from scissorcal.calibration.signals.window_length import SMOOTH
 from scissorcal.calibration.simulation.motion import SmoothPiece
 from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.kernel import presliding_path
