@@ -125,11 +125,16 @@ def _held_torque(data: CutFitData, given: CutFitParameters, table: Table, moved:
         + data.lever_dx * node_moved
         + data.lever_de.reshape(len(data.lever), q) @ given.edge
     )
+    pairs = data.depth.reshape(-1, 2)
+    span = np.repeat(0.25 * np.sqrt(3.0) * np.abs(pairs[:, 1] - pairs[:, 0]), 2)
+    share = np.clip((depth + span) / (2.0 * span), 0.0, 1.0)
+    depth = np.where(np.abs(depth) < span, span * share**2, np.maximum(depth, 0.0))
     force, by_place = np.zeros(len(depth)), np.zeros(len(depth))
     for i in np.flatnonzero(depth > 1e-12):
         log_force, power = table.log_force(float(np.log(depth[i])))
         force[i] = np.exp(log_force) * _damped(given.damping, data.sinking[i])
-        by_place[i] = force[i] * (power / depth[i] * data.depth_dx[i] * lever[i] + data.lever_dx[i])
+        sinking = share[i] * data.depth_dx[i]
+        by_place[i] = force[i] * (power / depth[i] * sinking * lever[i] + data.lever_dx[i])
     return (force * lever).reshape(-1, 2).mean(axis=1), by_place.reshape(-1, 2).mean(axis=1)
 
 

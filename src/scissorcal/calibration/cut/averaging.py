@@ -89,7 +89,11 @@ def average(
     filled = np.zeros((count, len(names)))
     filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
     draws = rng.permutation(np.concatenate([richest.posterior.draws[:own], filled[own:]]))
-    worst = max(richest, poorer, key=lambda one: np.nan_to_num(one.posterior.k_hat))
+    worst = max(
+        richest,
+        poorer,
+        key=lambda one: (not one.posterior.status.trusted, np.nan_to_num(one.posterior.k_hat)),
+    )
     averaged = replace(
         richest.posterior,
         draws=draws,

@@ -51,7 +51,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 DRAWS = 2000
-STANDARD_BUDGET = 12_000
+STANDARD_BUDGET = 25_000
 """Evaluations of the likelihood, a fifth of a millisecond each, that standard effort may take."""
 FELT_SDS = 5.0
 FEWEST_FELT_RAD = 0.02

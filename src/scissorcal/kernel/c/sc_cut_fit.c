@@ -49,25 +49,40 @@ static double damped(double damping, double sinking)
     return factor > 0.0 ? factor : 0.0;
 }
 
-/* Torque (N m) of the response averaged over a segment's nodes, and its derivative by the crack's
+/* Mean of the positive part of a depth over +-span, and its derivative by the depth. A node stands
+ * for half a segment; without this mean the likelihood jumps where a node leaves the material. */
+static double touching(double depth, double span, double *slope)
+{
+    *slope = depth > 0.0 ? 1.0 : 0.0;
+    if (depth >= span || depth <= -span) return depth > 0.0 ? depth : 0.0;
+    *slope = 0.5 * (depth + span) / span;
+    return 0.25 * (depth + span) * (depth + span) / span;
+}
+
+/* Torque (N m) of the response averaged over a segment's two nodes, and its derivative by the crack's
  * place, with the crack `moved` from where the nodes were expanded. */
 static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p, int32_t segment,
                              double moved, double *by_place)
 {
     double torque = 0.0;
+    int32_t low = segment * SC_CUT_NODES;
+    /* The nodes stand 1 / sqrt(3) of half a segment from its middle. */
+    double span = 0.25 * sqrt(3.0) * fabs(data->depth[low + 1] - data->depth[low]);
     *by_place = 0.0;
-    for (int32_t node = segment * SC_CUT_NODES; node < (segment + 1) * SC_CUT_NODES; node++) {
+    for (int32_t node = low; node < low + SC_CUT_NODES; node++) {
         const double *de = data->depth_de + (ptrdiff_t)node * data->edge_count;
         const double *le = data->lever_de + (ptrdiff_t)node * data->edge_count;
-        double depth = data->depth[node] + data->depth_dx[node] * moved +
-                       departure(de, p->edge, data->edge_count);
+        double inside, depth = touching(data->depth[node] + data->depth_dx[node] * moved +
+                                            departure(de, p->edge, data->edge_count),
+                                        span, &inside);
         if (depth <= LEAST_DEPTH) continue;
         double lever = data->lever[node] + data->lever_dx[node] * moved +
                        departure(le, p->edge, data->edge_count);
         double power, force = exp(sc_response_log_force(&p->response, log(depth), &power));
         force *= damped(p->damping, data->sinking[node]);
         torque += force * lever;
-        *by_place += force * (power / depth * data->depth_dx[node] * lever + data->lever_dx[node]);
+        *by_place += force * (power / depth * inside * data->depth_dx[node] * lever +
+                              data->lever_dx[node]);
     }
     *by_place /= SC_CUT_NODES;
     return torque / SC_CUT_NODES;
