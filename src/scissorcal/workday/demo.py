@@ -1,5 +1,6 @@
 """The whole day on a virtual rig in virtual time, ending in truth against estimate."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from scissorcal.workday.demo_photographs import (
 )
 from scissorcal.workday.fits import fit_workspace
 from scissorcal.workday.packages import build_workspace_package
+from scissorcal.workday.pool import open_pool
 from scissorcal.workday.reports import write_workspace_report
 from scissorcal.workday.workspace import Workspace, create_workspace
 
@@ -89,29 +91,26 @@ def run_demo(
     Time is virtual: equal seeds give equal numbers on every machine. Raises InputError where the
     recipe has no specimen or the folder is a workspace already.
     """
-    import numpy as np
-
     from scissorcal.device.lockstep import LockstepLink
-    from scissorcal.device.sim.specimen import load_specimen
-    from scissorcal.device.sim.truth import varied
 
     tell = progress or (lambda done, sentence: None)
     workspace = create_workspace(folder, recipe_name)
     recipe = workspace.recipe()
-    rng = np.random.default_rng(seed)
-    specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
-    _capture(workspace, recipe, specimen, rng, _part(tell, 0.0, 0.2))
-    photograph(workspace, recipe, seed, _part(tell, 0.2, 0.35))
-    geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.35, 0.45))
-    outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.45, 0.85))
+    specimen, streams = _drawn(recipe, seed)
+    with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
+        tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
+        captured = pool.executor.submit(_capture, workspace.root, seed)
+        photograph(workspace, recipe, seed, _part(tell, 0.05, 0.25))
+        geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.25, 0.4))
+        tell(0.4, "waiting for the captures")
+        captured.result()
+    outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.4, 0.85))
     tell(0.85, "building the package")
     built = build_workspace_package(workspace, seed=seed)
     tell(0.88, "writing the report")
     reported = write_workspace_report(workspace)
     tell(0.92, "rendering")
-    package, rendering, recording = _render(
-        workspace, recipe, LockstepLink(specimen, rng.spawn(1)[0])
-    )
+    package, rendering, recording = _render(workspace, recipe, LockstepLink(specimen, streams[1]))
     tell(0.98, "judging")
     fits = [outcome.result for outcome in outcomes]
     verdicts = [verdict for found in geometry for verdict in found.verdicts]
@@ -192,34 +191,31 @@ def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe"
     return float(np.sqrt(np.mean(difference**2) / np.mean(size[counts] ** 2)))
 
 
-def _capture(
-    workspace: Workspace,
-    recipe: "Recipe",
-    specimen: "Specimen",
-    rng: "np.random.Generator",
-    tell: Progress,
-) -> None:
+def _drawn(recipe: "Recipe", seed: int) -> tuple["Specimen", list["np.random.Generator"]]:
+    """The specimen of a seed, and streams of noise for its captures and for rendering."""
+    import numpy as np
+
+    from scissorcal.device.sim.specimen import load_specimen
+    from scissorcal.device.sim.truth import varied
+
+    rng = np.random.default_rng(seed)
+    specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
+    return specimen, rng.spawn(2)
+
+
+def _capture(root: Path, seed: int) -> None:
+    """Capture friction and cuts of a seed's specimen; another process may do it."""
     from scissorcal.device.capture import capture_cut, capture_friction, open_writer
     from scissorcal.device.lockstep import LockstepLink
 
-    text = read_text(workspace.recipe_path)
-    link = LockstepLink(specimen, rng.spawn(1)[0])
-    path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, recipe, text) as writer:
-        capture_friction(
-            link,
-            recipe,
-            writer,
-            lambda done, sentence, coverage: tell(0.6 * done, f"friction: {sentence}"),
-        )
-    path = workspace.new_recording("cut")
-    with open_writer(path, "cut", link, recipe, text) as writer:
-        capture_cut(
-            link,
-            recipe,
-            writer,
-            progress=lambda done, sentence, coverage: tell(0.6 + 0.4 * done, f"cut: {sentence}"),
-        )
+    workspace = Workspace(root)
+    recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
+    specimen, streams = _drawn(recipe, seed)
+    link = LockstepLink(specimen, streams[0])
+    with open_writer(workspace.new_recording("friction"), "friction", link, recipe, text) as writer:
+        capture_friction(link, recipe, writer)
+    with open_writer(workspace.new_recording("cut"), "cut", link, recipe, text) as writer:
+        capture_cut(link, recipe, writer)
     link.close()
 
 
