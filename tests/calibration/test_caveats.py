@@ -12,7 +12,7 @@ from scissorcal.report.sections.parameters import tabulate_parameters
 from scissorcal.workday.fits import FitOutcome
 from tests.package.fits import cut_fit, friction_fit, recipe
 
-GOOD = {"counts_per_sample": 8.0, "teeth_line": True, "fresh_loadings": 0}
+GOOD = {"counts_per_sample": 8.0, "teeth_line": True}
 
 
 def fitted(structure=None, **diagnostics):
@@ -22,15 +22,6 @@ def fitted(structure=None, **diagnostics):
         structure={**fit.structure, **(structure or {})},
         diagnostics={**fit.diagnostics, **GOOD, **diagnostics},
     )
-
-
-def loaded(q05):
-    share = FittedParameter("load_share", "1", 0.09, 0.02, q05, 0.09, 0.12, 0.2)
-    return replace(fitted({"load_share": True}), nuisance=(share,))
-
-
-def test_a_load_share_that_the_data_do_not_show_is_no_caveat():
-    assert caveats_of(loaded(0.0)) == ()
 
 
 def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
@@ -46,19 +37,9 @@ def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
             ("response_force", "response_exponent"),
             "0.5 encoder counts per sample",
         ),
-        (
-            loaded(0.05),
-            ("response_force", "response_exponent"),
-            "0.09 of the cut's torque is friction",
-        ),
         (fitted(teeth_line=False), ("fracture_energy", "kappa"), "0 lines of the teeth"),
-        (
-            fitted(fresh_loadings=3),
-            ("response_force", "response_exponent"),
-            "3 loadings of fresh sheets",
-        ),
     ],
-    ids=["coarse encoder", "friction by load", "no line", "fresh edges"],
+    ids=["coarse encoder", "no line"],
 )
 def test_each_kind_of_data_is_told_with_its_parameters(fit, parameters, begins):
     (caveat,) = caveats_of(fit)

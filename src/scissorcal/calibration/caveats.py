@@ -79,20 +79,6 @@ def _coarse_words(fit: FitResult) -> str:
     )
 
 
-def _loaded(fit: FitResult) -> bool:
-    """Whether the data show load-dependent friction: at 95 %, averaged over laws without it."""
-    return any(p.name == "load_share" and p.q05 > 0.0 for p in fit.nuisance)
-
-
-def _loaded_words(fit: FitResult) -> str:
-    share = next(p.mean for p in fit.nuisance if p.name == "load_share")
-    return (
-        f"{share:.2g} of the cut's torque is friction of the pivot: with 0.1 errors of 1 to 3 % "
-        "were seen and intervals were too narrow by about 2. Oil the pivot, or record loaded "
-        "sweeps to know it apart."
-    )
-
-
 def _no_line(fit: FitResult) -> bool:
     return fit.structure.get("fracture") == "rippled" and fit.diagnostics.get("teeth_line") is False
 
@@ -112,27 +98,12 @@ def _spline_words(fit: FitResult) -> str:
     )
 
 
-def _fresh(fit: FitResult) -> bool:
-    return (_number(fit, "fresh_loadings") or 0.0) > 0.0
-
-
-def _fresh_words(fit: FitResult) -> str:
-    count = int(fit.diagnostics["fresh_loadings"])
-    return (
-        f"{count} loadings of fresh sheets count their near edge as exactly where advance is 0: on "
-        "six virtual days 90 % intervals held the force in 4 to 6 and the exponent in 3 to 4. Put "
-        "each sheet's edge against a stop."
-    )
-
-
 _ROWS = (
     _Row(_coarse, RESPONSE, _coarse_words),
-    _Row(_loaded, RESPONSE, _loaded_words),
     _Row(_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
     _Row(
         lambda fit: fit.structure.get("response") == "spline",
         ("response_*",),
         _spline_words,
     ),
-    _Row(_fresh, RESPONSE, _fresh_words),
 )

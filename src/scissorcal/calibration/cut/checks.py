@@ -63,7 +63,6 @@ def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
     return {
         "counts_per_sample": float(np.median(np.concatenate(counts))) if counts else None,
         "teeth_line": design.likelihood.line is not None,
-        "fresh_loadings": sum(piece.kind == "fresh" for piece in segments.pieces),
     }
 
 
