@@ -33,7 +33,9 @@ ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 LEAST_SEGMENT_COUNTS = 6.0
 """An elastic segment spans at least so many steps of the encoder."""
-RUNNING_RAD = 5e-3
+RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
+"""Running segments hold so many teeth at least: in shorter ones the teeth themselves pass for
+unevenness of a short range, which takes the long range's place and makes intervals too narrow."""
 LOADING_END = 0.88
 """Share of the critical indentation at which loading ends: weak places start the crack sooner."""
 RUNNING_FROM = 1.6
@@ -313,7 +315,9 @@ class _Builder:
     def _stretch(self, run: Run, low: int) -> None:
         """Running segments; those with a spoilt sample part a stretch in two."""
         motion, geometry = self.motions[run.motion], self.geometry
-        every = split(motion.opening, low, run.high, RUNNING_RAD)
+        _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
+        step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
+        every = split(motion.opening, low, run.high, step)
         spoilt = np.concatenate([[0], np.cumsum(~motion.usable)])
         for ends in _parts(every, spoilt):
             material = self.materials[run.motion]
@@ -322,7 +326,6 @@ class _Builder:
             _, late = mean_torque(motion, material.work, ends)
             ticks = np.diff(ends).astype(np.float64)
             noise = np.array([self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks])
-            _, period = self.guess.tooth(geometry, motion.opening[ends])
             unseen = swings_unseen(motion, ends, period)
             self.stretches.append(
                 Stretch(
