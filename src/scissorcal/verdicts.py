@@ -7,7 +7,8 @@ Status = Literal["pass", "fail", "not_evaluated"]
 Limit = Literal["at most", "at least", ""]
 
 TORQUE = "torque: "
-"""What a verdict guards begins so where its number is an error of torque, or a share of torque."""
+"""What a verdict guards begins so where its number judges torque itself: an error of it, its share,
+a share of its variance, or how likely a difference of it is."""
 
 _INTERVALS = "whether intervals hold what they promise"
 _SEARCH = "whether the estimate is an optimum at all"

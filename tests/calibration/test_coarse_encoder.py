@@ -1,4 +1,4 @@
-"""Friction of the second rig by a coarse encoder: intervals hold, and cogging is found."""
+"""Friction of the second rig by a fine and by a coarse encoder, over whole days."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from scissorcal.calibration.result import FitResult
 from tests.second_rig import (
     Rig,
     capture_friction,
+    coarse,
     draw_truth,
     fine,
     recipe_for,
@@ -32,14 +33,13 @@ def fitted(rig: Rig, seed: int) -> tuple[FitResult, dict[str, float]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rig", [fine])
-def test_intervals_of_friction_hold_with_either_encoder(rig):
-    """20,000 and 500,000 counts a turn, six days each: of 36 intervals of 90 % at least 27 hold
+def test_intervals_of_friction_hold_with_a_fine_encoder():
+    """500,000 counts a turn, six days: of 36 intervals of 90 % at least 27 hold
     (with dependent parameters some three are lost by chance), none misses by five of its standard
     deviations, and on five days at least the motor is found to cog at 140 periods a turn."""
     held, away, cogging = [], [], []
     for seed in range(600, 606):
-        fit, truth = fitted(rig(), seed)
+        fit, truth = fitted(fine(), seed)
         for name in JUDGED:
             found = fit.parameter(name)
             held.append(found.q05 < truth[name] < found.q95)
@@ -49,3 +49,21 @@ def test_intervals_of_friction_hold_with_either_encoder(rig):
     assert sum(held) >= 27
     assert np.max(np.abs(away)) < 5.0
     assert np.sqrt(np.mean(np.square(away))) < 1.5
+
+
+@pytest.mark.slow
+def test_a_coarse_encoder_leaves_levels_right_and_the_inertia_a_little_low():
+    """20,000 counts a turn, four days: of 16 intervals of 90 % at least 11 hold, cogging is found
+    on three days, and the inertia, which docs/uncertainty.md calls poor, is within 8 %."""
+    levels = ("coulomb_pos", "coulomb_neg", "viscous_pos", "viscous_neg")
+    held, errors, cogging = [], [], []
+    for seed in range(610, 614):
+        fit, truth = fitted(coarse(), seed)
+        errors.append(fit.parameter("inertia").mean / truth["inertia"] - 1.0)
+        for name in levels:
+            found = fit.parameter(name)
+            held.append(found.q05 < truth[name] < found.q95)
+        cogging.append(fit.structure.get("cogging_periods_per_turn", 0.0))
+    assert sum(held) >= 11
+    assert np.max(np.abs(errors)) < 0.08
+    assert np.count_nonzero(np.abs(np.array(cogging) - 140) < 1.0) >= 3

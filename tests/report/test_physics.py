@@ -134,7 +134,13 @@ def test_torque_over_the_scene_is_the_law_with_its_band() -> None:
     assert "nobody measured" not in findings(section)
     wide = Verdict("fit.cut", "edge shape", "not_evaluated", 0.21, 0.07, "Photograph it.")
     small = Verdict("fit.cut", "torque zero", "pass", 0.01, 0.07, "Small.")
-    open_fit = replace(fit, verdicts=(*fit.verdicts, wide, small))
+    elsewhere = Verdict("fit.cut", "recordings", "not_evaluated", 0.3, 0.2, "They differ.")
+    measured = {"not_measured": [{"name": "edge shape"}, {"name": "torque zero"}]}
+    open_fit = replace(
+        fit,
+        verdicts=(*fit.verdicts, wide, small, elsewhere),
+        diagnostics={**fit.diagnostics, **measured},
+    )
     doubted = scene_torque(recipe, [open_fit])
     assert doubted.not_in_band == (("edge shape", 0.21),)
     assert "nobody measured, as shares of the mean torque: edge shape up to 21" in findings(doubted)

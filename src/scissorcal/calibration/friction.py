@@ -125,6 +125,7 @@ def fit_friction(
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     noise = sample_noise(law, chosen.optimum.point)
     diagnostics = {
+        "window_lengthening": windows.lengthening,
         "jackknife_sd": jackknife(law, chosen.optimum.point, NUISANCE),
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),

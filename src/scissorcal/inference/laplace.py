@@ -107,8 +107,8 @@ def polish(problem: Problem, optimum: Optimum) -> tuple[Optimum, Shape]:
 
     The last ones use fine differences, so that smooth problems reach their optimum to rounding
     while rough ones keep what the search found. Where a Hessian costs p^2 evaluations (a smooth
-    posterior without squares), the one at the first point serves for all steps that stay within a
-    tenth of a standard deviation.
+    posterior without squares), the one before a full step of less than a tenth of a standard
+    deviation is taken as that after it.
     """
     point, value = optimum.point, optimum.value
     shape = shape_at(problem, point)
@@ -144,7 +144,7 @@ def _polish_by_one_hessian(
             break
         away = reached[0] - point
         point, value = reached
-        if away @ precision @ away < NEAR**2:
+        if np.allclose(away, move) and 0.0 <= away @ precision @ away < NEAR**2:
             break
         shape = shape_at(problem, point)
     return move_optimum(optimum, point, value), shape

@@ -92,6 +92,7 @@ class Problem:
             return np.array([self.log_likelihood(point) for point in points])
         prior = np.array([float(self.log_prior(point)) for point in points])
         if not np.all(np.isfinite(prior)):
-            return np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
+            sums = np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
+            return np.where(np.isfinite(sums), sums, -np.inf)
         heights = np.asarray(self.log_posterior_many(points)) - prior
         return np.where(np.isfinite(heights), heights, -np.inf)

@@ -185,6 +185,9 @@ def _structs(given: CutFitParameters, count: int) -> tuple[Any, list[Any]]:
         name: np.ascontiguousarray(np.atleast_2d(getattr(given, name)), dtype=np.float64)
         for name in (*_TABLES, "edge")
     }
+    wrong = [name for name, array in arrays.items() if len(array) not in (1, count)]
+    if wrong:
+        raise ValueError(f"{', '.join(wrong)}: one row, or one for each of {count} points")
     buffers = {name: ffi.from_buffer("double[]", array) for name, array in arrays.items()}
     strides = {name: a.shape[1] if len(a) > 1 else 0 for name, a in arrays.items()}
     numbers = {name: _each(getattr(given, name), count) for name in _NUMBERS}

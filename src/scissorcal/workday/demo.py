@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.demo_photographs import (
@@ -88,8 +89,9 @@ def run_demo(
 
     Makes a workspace in ``folder``. The specimen is drawn anew for each ``seed`` around the
     recipe's own, so that nothing of it can be known beforehand; the fits see recordings only.
-    Time is virtual: equal seeds give equal numbers on every machine. Raises InputError where the
-    recipe has no specimen or the folder is a workspace already.
+    Time is virtual: equal seeds give equal numbers on every machine. Where two cores are free a
+    second process captures, so a script that calls this needs the usual guard on ``__main__``.
+    Raises InputError where the recipe has no specimen or the folder is a workspace already.
     """
     from scissorcal.device.lockstep import LockstepLink
 
@@ -103,7 +105,13 @@ def run_demo(
         photograph(workspace, recipe, seed, _part(tell, 0.05, 0.25))
         geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.25, 0.4))
         tell(0.4, "waiting for the captures")
-        captured.result()
+        try:
+            captured.result()
+        except BrokenProcessPool as error:
+            raise ScissorcalError(
+                "The process that captured was killed, most likely for want of memory: free some, "
+                f"remove {folder} and run the demo again."
+            ) from error
     outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.4, 0.85))
     tell(0.85, "building the package")
     built = build_workspace_package(workspace, seed=seed)

@@ -122,7 +122,11 @@ def test_draws_come_from_each_law_as_often_as_it_is_probable():
         return Inferred(candidate, infer(problem(data, names), "standard", rng, count=1000), None)
 
     loaded, plain = by_load(climbed[0][0], climbed)
-    found = average([loaded, plain], infer_one, rng).posterior
+    inferred = average([loaded, plain], infer_one, rng)
+    found, best = inferred.posterior, inferred.candidate.climbed.optimum.point
+    assert plain.probability > loaded.probability
+    assert best[1] == 0.0
+    assert best[0] == pytest.approx(plain.climbed.optimum.point[0], abs=1e-4)
     assert found.names == ("a", "b")
     without = np.mean(found.draws[:, 1] == 0.0)
     assert without == pytest.approx(plain.probability, abs=1e-3)

@@ -31,7 +31,7 @@ def rig(**changes):
 def test_nothing_measured_is_four_bounds_and_four_remedies():
     found, fit = checks()
     for name, remedy in {
-        "opening zero": "idle second",
+        "opening zero": "opening_zero_sd_deg",
         "torque zero": "idle second",
         "edge shape": "Photograph the blade",
         "friction by load": "loaded sweeps",
@@ -51,15 +51,27 @@ def test_nothing_measured_is_four_bounds_and_four_remedies():
 
 def test_an_edge_known_by_numbers_or_photographs_is_no_unknown():
     photographed, _ = checks(rig(edge={"source": "photographs"}))
-    believed = cut_fit(paper())
-    edge = FittedParameter("edge_offset_m", "m", -8e-3, 1e-5, -8e-3, -8e-3, -8e-3, 1.0)
-    believed = replace(
-        believed,
-        parameters=(*believed.parameters, edge),
-        map_point=np.append(believed.map_point, -8e-3),
-    )
+    believed = with_edge(cut_fit(paper()), "offset_m", "taper_rad")
     for found in (photographed, checks(fit=believed)[0]):
         assert (found["edge shape"].status, found["edge shape"].value) == ("pass", 0.0)
+
+
+def with_edge(fit, *fields):
+    """The fit with parameters of the edge, at what it has already."""
+    values = [fit.structure["edge"][field] for field in fields]
+    rows = [
+        FittedParameter(f"edge_{field}", "1", value, 1e-5, value, value, value, 1.0)
+        for field, value in zip(fields, values, strict=True)
+    ]
+    return replace(
+        fit, parameters=(*fit.parameters, *rows), map_point=np.append(fit.map_point, values)
+    )
+
+
+def test_an_offset_alone_leaves_the_taper_open():
+    every = checks()[0]["edge shape"].value
+    offset_known = checks(fit=with_edge(cut_fit(paper()), "offset_m"))[0]["edge shape"].value
+    assert 0.0 < offset_known < every
 
 
 def test_the_bound_of_an_edge_is_what_its_three_shapes_do_to_the_scene():
@@ -91,7 +103,7 @@ def test_a_stated_zero_takes_the_place_of_half_a_millimetre():
     stated, _ = checks(rig(opening_zero_sd_deg=0.02))
     assert stated["opening zero"].status == "pass"
     assert stated["opening zero"].value < 0.05 * checks()[0]["opening zero"].value
-    assert "idle second" not in stated["opening zero"].why
+    assert "half a millimetre" not in stated["opening zero"].why
 
 
 def test_an_idle_second_takes_the_place_of_the_asymmetry():
@@ -115,5 +127,10 @@ def test_a_fitted_load_share_counts_with_twice_its_sd():
     verdict = checks(recipe, fit)[0]["friction by load"]
     assert verdict.value == pytest.approx(0.07)
     assert "loaded sweeps" in verdict.why
-    compared = checks(paper(load_share="auto"))[0]["friction by load"]
+    auto = paper(load_share="auto")
+    laws = ("power response", "power response, load-dependent friction")
+    both = replace(cut_fit(auto), rungs=tuple({"name": law} for law in laws))
+    compared = checks(auto, both)[0]["friction by load"]
     assert (compared.status, compared.value) == ("pass", 0.0)
+    one = replace(both, rungs=both.rungs[:1])
+    assert checks(auto, one)[0]["friction by load"].value == pytest.approx(0.1)

@@ -209,6 +209,8 @@ def _elastic(data: CutFitData, given: CutFitParameters, table: Table):
             while not after[0] <= now[0] and abs(move) >= ARRIVED_M:
                 move *= 0.25
                 after = seen(r, places[r] + move)
+            if not after[0] <= now[0]:
+                break
             places[r] += move
             now = after
         residuals += now[3]

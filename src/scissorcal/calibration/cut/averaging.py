@@ -77,7 +77,8 @@ def average(
     """Infer each law and draw from each as often as it is probable, in the richest one's terms.
 
     Where the poorer law lacks a parameter its draws have zero: no friction by the load. The draws
-    of both are shuffled, so that any part of them stands for the whole.
+    of both are shuffled, so that any part of them stands for the whole. The best point is that of
+    the more probable law.
     """
     richest, *others = [infer_one(candidate) for candidate in candidates]
     if not others:
@@ -89,6 +90,13 @@ def average(
     filled = np.zeros((count, len(names)))
     filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
     draws = rng.permutation(np.concatenate([richest.posterior.draws[:own], filled[own:]]))
+    candidate = richest.candidate
+    if poorer.candidate.probability > candidate.probability:
+        optimum = candidate.climbed.optimum
+        point = np.zeros(len(names))
+        point[[names.index(n) for n in poorer.posterior.names]] = poorer.posterior.optimum.point
+        moved = replace(candidate.climbed, optimum=replace(optimum, point=point))
+        candidate = replace(candidate, climbed=moved)
     worst = max(
         richest,
         poorer,
@@ -103,7 +111,7 @@ def average(
         sentence=worst.posterior.sentence,
         evaluations=richest.posterior.evaluations + poorer.posterior.evaluations,
     )
-    return replace(richest, posterior=averaged)
+    return replace(richest, candidate=candidate, posterior=averaged)
 
 
 def load_note(candidates: Sequence[Candidate]) -> tuple[str, ...]:

@@ -29,8 +29,12 @@ def compare_cuts(
     """Fit every recording by itself and by the others; None where fewer than two can be.
 
     ``design`` is the law over all recordings, ``point`` (p,) its optimum, from which each search
-    begins. No two recordings share a sheet, so that terms of the likelihood belong to one each.
+    begins. No two recordings share a sheet, so that segments belong to one each. The line of the
+    teeth is left out: it is one number for all recordings, and what it says of kappa is not
+    compared.
     """
+    # One line is read off all recordings together, so it says nothing of their differences.
+    design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
     rung = replace(design.rung(design.observed), starts=point[None, :])
 
     def own(here: Mask) -> Posterior:

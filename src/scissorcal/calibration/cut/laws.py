@@ -31,6 +31,9 @@ DELAY_TICKS = (0.08, 0.06)
 """A motor whose lag is 0 to 2 ticks is late by 0 to 0.13 ticks; 0.08 for a lag of one tick."""
 SHAPE_SD = 0.5
 
+LOADED = "load-dependent friction"
+"""What the name of a law says of a load share."""
+
 NUISANCE = (
     "rest_phase",
     "rest_spread",
@@ -90,7 +93,7 @@ class CutLaw:
         """The law in words."""
         fracture = "no fracture" if self.fracture == "none" else f"{self.fracture} fracture"
         damped = ", damped" if self.damped else ""
-        loaded = ", load-dependent friction" if self.loaded else ""
+        loaded = f", {LOADED}" if self.loaded else ""
         return f"{self.response} response{damped}, {fracture}{loaded}"
 
 

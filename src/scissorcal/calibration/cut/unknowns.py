@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.laws import LOAD_SHARE_SD
+from scissorcal.calibration.cut.laws import LOAD_SHARE_SD, LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
@@ -124,7 +124,7 @@ def find_unknowns(
     scene = SceneMean.of(fit, recipe)
     mean = scene.torque()
     rows = (
-        ("opening zero", *_opening_zero(scene, recipe, recordings)),
+        ("opening zero", *_opening_zero(scene, recipe)),
         ("torque zero", *_torque_zero(recipe, friction, recordings)),
         ("edge shape", *_edge_shape(scene, fit, recipe)),
         ("friction by load", *_load(mean, fit, recipe, friction)),
@@ -144,22 +144,13 @@ def _verdict(one: Unknown, limit: float) -> Verdict:
     return Verdict("fit.cut", one.name, status, one.share, limit, why)
 
 
-def _opening_zero(
-    scene: SceneMean, recipe: Recipe, recordings: tuple[Recording, ...]
-) -> tuple[float, str, str]:
-    cure = (
-        "Record an idle second, motors off, with the centrelines of the blades together, or state "
-        "rig.opening_zero_sd_deg."
-    )
+def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:
+    cure = "Zero the opening with the centrelines together, and state rig.opening_zero_sd_deg."
     spread = recipe.rig.moving_blades * BY_EYE_M / (recipe.rig.edge.length_mm * 1e-3)
-    known = idle_zero(recordings, "opening")
     stated = recipe.rig.opening_zero_sd_deg
     if stated is not None:
         spread, cure = SURE * float(np.radians(stated)), ""
         said = f"the recipe has the zero of the opening known to {stated:.2g} deg (sd)."
-    elif known is not None and abs(known.mean) < spread:
-        spread, cure = abs(known.mean) + SURE * known.sd, ""
-        said = f"an idle second shows {known.mean:.2g} rad where the blades' centrelines meet."
     else:
         said = f"the zero of the opening may be off by {spread:.2g} rad, half a millimetre a tip."
     return scene.change(spread), said, cure
@@ -174,7 +165,7 @@ def _torque_zero(
     levels = [p.mean for p in friction.parameters if p.name in ("coulomb_pos", "coulomb_neg")]
     if len(levels) < 2:
         return 0.0, "friction's fit has an offset of its own, which is not rendered.", ""
-    known = idle_zero(recordings, "drive")
+    known = idle_zero(recordings)
     if known is not None:
         said = f"an idle second shows {known.mean:.2g} N m (sd {known.sd:.1g}) of drive."
         return abs(known.mean) + SURE * known.sd, said, ""
@@ -188,21 +179,20 @@ def _torque_zero(
 
 
 def _edge_shape(scene: SceneMean, fit: FitResult, recipe: Recipe) -> tuple[float, str, str]:
-    if recipe.rig.edge.source == "photographs" or any(
-        parameter.name.startswith("edge_") for parameter in fit.parameters
-    ):
+    fitted = {p.name.removeprefix("edge_") for p in fit.parameters if p.name.startswith("edge_")}
+    if recipe.rig.edge.source == "photographs" or {"offset_m", "taper_rad"} <= fitted:
         said = "photographs or the recipe say how well the edge is known; the intervals hold it."
         return 0.0, said, ""
     length = scene.cutting.edge.length_m
     bend = 8.0 * BY_EYE_M / length**2
-    changes = (
-        scene.change(offset_m=BY_EYE_M),
-        scene.change(taper_rad=BY_EYE_M / length),
-        scene.change(curvature_per_m=bend, taper_rad=-0.5 * bend * length),
-    )
+    changes = [scene.change(curvature_per_m=bend, taper_rad=-0.5 * bend * length)]
+    if "offset_m" not in fitted:
+        changes.append(scene.change(offset_m=BY_EYE_M))
+    if "taper_rad" not in fitted:
+        changes.append(scene.change(taper_rad=BY_EYE_M / length))
     said = (
-        "the recipe has the edge as exact, without a standard deviation: its offset, its tip and "
-        "its middle may each be off by half a millimetre."
+        "the recipe does not say how well offset and taper of the edge are known: what it leaves "
+        "open of offset, tip and middle may each be off by half a millimetre."
     )
     cure = (
         'Photograph the blade (rig.edge.source = "photographs"), or state offset_sd_mm and '
@@ -224,7 +214,7 @@ def _load(
         return (abs(share.mean) + SURE * share.sd) * mean, said, cure
     if any(parameter.name == "load_share" for parameter in friction.parameters):
         return 0.0, "the empty sweeps were loaded, and friction's fit has it.", ""
-    if recipe.fit.cut.load_share != "none":
+    if any(LOADED in str(row["name"]) for row in fit.rungs):
         return 0.0, "laws with and without it were compared, and the strokes show none.", ""
     said = f"jaw tools have up to {LOAD_SHARE_SD:g} of the load as friction, and none was fitted."
     return LOAD_SHARE_SD * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'

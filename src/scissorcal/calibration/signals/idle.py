@@ -1,7 +1,6 @@
-"""Idle seconds: motors off and blades at rest, where sensors show their zeros."""
+"""Idle seconds: motors off and blades at rest, where the drive shows its zero."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,8 @@ class Zero:
     seconds: float
 
 
-def idle_zero(recordings: tuple[Recording, ...], what: Literal["opening", "drive"]) -> Zero | None:
-    """What the opening (rad) or the drive (N m) shows over idle seconds; None without any.
+def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
+    """What the drive (N m) shows over idle seconds; None without any.
 
     Idle is where nothing is commanded, the blades stand and no stroke is under way, for
     ``IDLE_S``. Recordings without a single command say nothing of when motors were off.
@@ -51,8 +50,7 @@ def idle_zero(recordings: tuple[Recording, ...], what: Literal["opening", "drive
                 long = (high - low) * tick >= IDLE_S
                 if not long or np.ptp(opening[part]) > still:
                     continue
-                values = opening[part] if what == "opening" else recording.drive_effort[part]
-                found.append(np.asarray(values, dtype=np.float64))
+                found.append(np.asarray(recording.drive_effort[part], dtype=np.float64))
                 seconds += float((high - low) * tick)
     if not found:
         return None

@@ -164,7 +164,8 @@ def weigh(
             "The recordings have different sampling rates; fit those of one rate together."
         )
     asked = knots.pop()
-    motions = with_turns(motions, asked)
+    # Turns are judged by the cutoff alone, so that other windows see the same data.
+    motions = with_turns(motions, knot_samples(cutoff_Hz, motions[0].rate_Hz))
     knot = asked if window_Hz else longer_knot(motions, asked)
     strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
     pieces: list[Windows] = []

@@ -134,11 +134,14 @@ def _shown(study: Study, fit: FitResult, chosen: NDArray[np.int64]) -> list[Arra
     except MissingError:
         u = None
     own = study.experiment.rung(study.experiment.observed)
-    alike = fit.structure.get("response") == own.key.get("response")
-    if u is not None and alike:
+    if u is not None and fit.rung == own.name:
         return list(quantities(study, u).T)
     names = [parameter.name for parameter in fit.parameters]
-    other = [n for n in names if not alike and n.startswith("response_") and n != "response_force"]
+    other = []
+    if fit.structure.get("response") != own.key.get("response"):
+        other = [n for n in names if n.startswith("response_") and n != "response_force"]
+    if fit.structure.get("fracture") != own.key.get("fracture"):
+        other += ["fracture_energy", "toughness"]
     columns: list[Array | None] = [
         fit.column(name)[chosen] if name in names and name not in other else None
         for name in study.quantities[:-1]

@@ -6,7 +6,7 @@
 static const double TINY = 1e-300;
 static const double LEAST_DEPTH = 1e-12;
 static const double LEAST_SLOPE = 1e-6;
-/* Steps of the crack's place towards its highest density are held to this share of a cycle. */
+/* Longest step of a crack's place towards its highest density. */
 static const double REST_REACH_M = 3e-5;
 /* A step below this is not taken: what it would gain is added, by the parabola that it comes from. */
 static const double REST_ARRIVED_M = 1e-7;
@@ -157,6 +157,10 @@ static double settle(const sc_cut_data *data, const sc_cut_parameters *p, const 
         while (!(next.cost <= sums->cost) && fabs(move) >= REST_ARRIVED_M) {
             move *= 0.25;
             next = rest_pass(data, p, rest, place + move, residuals, z, zx);
+        }
+        if (!(next.cost <= sums->cost)) {
+            *sums = rest_pass(data, p, rest, place, residuals, z, zx);
+            break;
         }
         place += move;
         *sums = next;

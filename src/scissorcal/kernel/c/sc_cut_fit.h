@@ -89,14 +89,14 @@ typedef struct {
     const double *line_weight;
 } sc_cut_data;
 
-/* Parameters in SI. delay (ticks) is how late a torque is measured: late and run_late say by how much
- * mean torques fall for one tick of it; load the share of the cut's torque that friction adds,
- * against the motion: direction and run_direction are the segments' mean directions, -1 closing and
- * 1 opening, in between where friction has not built up. fracture is one of SC_CUT_*; energy is J_c h (N), rest_phase the mean place of
- * rests in the cycle (0: just arrested, 1: about to run) and rest_spread their standard deviation
- * in cycles; variation, its length (m) and sheet_variation describe unevenness as shares; load is
- * the share of the cut's torque that friction adds; noise_scale multiplies the standard deviation
- * of elastic pieces. edge holds edge_count departures from the nominal edge. */
+/* Parameters in SI. energy is J_c h (N); fracture is one of SC_CUT_*. delay (ticks) is how late a
+ * torque is measured: late and run_late say by how much mean torques fall for one tick of it. load is
+ * the share of the cut's torque that friction adds against the motion: direction and run_direction are
+ * the segments' mean directions, -1 closing and 1 opening, in between where friction has not built
+ * up. rest_phase is the mean place of rests in the cycle (0: just arrested, 1: about to run) and
+ * rest_spread their standard deviation in cycles; variation, its length (m) and sheet_variation
+ * describe unevenness as shares; noise_scale multiplies the standard deviation of elastic pieces.
+ * edge holds edge_count departures from the nominal edge. */
 typedef struct {
     sc_response_table response;
     int32_t fracture;

@@ -143,7 +143,7 @@ def scene_torque(recipe: Recipe, fits: Sequence[FitResult]) -> SceneTorque:
             tuple(bool(value) for value in supported & reached),
             tuple(bool(value) for value in reached & probe.touches(places[0], places[2])),
         ),
-        tuple((v.check, finite(v.value)) for v in cut.verdicts if _open_bound(v)),
+        tuple((v.check, finite(v.value)) for v in cut.verdicts if _open_bound(v, cut)),
     )
 
 
@@ -173,9 +173,10 @@ def findings(section: SceneTorque) -> str:
     return " ".join(words)
 
 
-def _open_bound(verdict: Verdict) -> bool:
-    """Whether a verdict bounds torque by more than its limit, without rejecting the fit."""
-    return verdict.status == "not_evaluated" and verdict.bounds_torque and verdict.value is not None
+def _open_bound(verdict: Verdict, cut: FitResult) -> bool:
+    """Whether a verdict is on what nobody measured, and bounds torque by more than its limit."""
+    names = {row["name"] for row in cut.diagnostics.get("not_measured", ())}
+    return verdict.status == "not_evaluated" and verdict.check in names
 
 
 class Support:
