@@ -143,4 +143,4 @@ def test_on_emps_lack_of_fit_repeats_and_the_jackknife_does_not_see_it():
     fit = fitted((emps(),), settings)
     for name in ("coulomb_pos", "coulomb_neg"):
         assert fit.parameter(name).sd == pytest.approx(0.20, abs=0.03)
-        assert fit.diagnostics["jackknife_sd"][name] == pytest.approx(0.048, abs=0.01)
+        assert fit.diagnostics["jackknife_sd"][name] < 0.25 * fit.parameter(name).sd

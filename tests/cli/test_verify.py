@@ -26,8 +26,8 @@ def test_it_prints_tables_and_verdicts(
 ) -> None:
     monkeypatch.chdir(fitted.captures_dir)
     said = cli("verify", "friction", "--fits", "3", "--workers", "1")
-    assert said.code == 3, "the sweeps leave the inertia to its prior, and only that fails"
-    assert said.out.count("FAIL  ") == 1
+    assert said.code == 0, said.out
+    assert "FAIL  " not in said.out
     for words in (
         "3 fits to simulated data (truths: a normal distribution around the posterior, 3 times as",
         "noise: white ",

@@ -9,6 +9,6 @@ def c_sources() -> Path:
     All but ``sc_block`` and ``sc_loop``, which need POSIX, is portable C99 without allocation.
 
     >>> sorted(path.name for path in c_sources().glob("*.h"))[:2]
-    ['sc_block.h', 'sc_cut_fit.h']
+    ['sc_block.h', 'sc_crack.h']
     """
     return Path(__file__).parent / "c"
