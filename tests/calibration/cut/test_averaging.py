@@ -14,12 +14,10 @@ from scissorcal.calibration.cut.averaging import (
     log_evidence,
 )
 from scissorcal.calibration.cut.laws import CutLaw
-from scissorcal.calibration.layout import Layout
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem
 
 DATA_SD = 0.3
-NO_LAYOUT = Layout(())
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,6 @@ class Fitted:
 @dataclass(frozen=True)
 class Design:
     law: CutLaw
-    layout: Layout = NO_LAYOUT
 
 
 def problem(data, names):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.lack_of_fit import Budget
-from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
+from scissorcal.calibration.ladder import Climbed
 from scissorcal.inference import Posterior
 
 Array = NDArray[np.float64]
@@ -24,15 +24,6 @@ class Candidate:
     climbed: Climbed
     design: CutExperiment
     probability: float = 1.0
-
-    @property
-    def absent(self) -> float:
-        """The unconstrained load share of a law that has none: as low as a search goes."""
-        layout = self.design.layout
-        if "load_share" not in layout.names:
-            return 0.0
-        at = layout.names.index("load_share")
-        return float(layout.mean[at] - SEARCH_REACH * layout.sd[at])
 
 
 @dataclass(frozen=True)
@@ -85,9 +76,9 @@ def average(
 ) -> Inferred:
     """Infer each law and draw from each as often as it is probable, in the richest one's terms.
 
-    Where the poorer law lacks a parameter its draws have next to none of it: 2e-5 of load. The
-    draws of both are shuffled, so that any part of them stands for the whole. The best point is
-    that of the more probable law.
+    Where the poorer law lacks a parameter its draws have zero: no friction by the load. The draws
+    of both are shuffled, so that any part of them stands for the whole. The best point is that of
+    the more probable law.
     """
     richest, *others = [infer_one(candidate) for candidate in candidates]
     if not others:
@@ -96,13 +87,13 @@ def average(
     names = richest.posterior.names
     count = len(richest.posterior.draws)
     own = round(count * richest.candidate.probability)
-    filled = np.full((count, len(names)), richest.candidate.absent)
+    filled = np.zeros((count, len(names)))
     filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
     draws = rng.permutation(np.concatenate([richest.posterior.draws[:own], filled[own:]]))
     candidate = richest.candidate
     if poorer.candidate.probability > candidate.probability:
         optimum = candidate.climbed.optimum
-        point = np.full(len(names), candidate.absent)
+        point = np.zeros(len(names))
         point[[names.index(n) for n in poorer.posterior.names]] = poorer.posterior.optimum.point
         moved = replace(candidate.climbed, optimum=replace(optimum, point=point))
         candidate = replace(candidate, climbed=moved)

@@ -25,11 +25,8 @@ VARIATION_LENGTH_M = (1.5e-3, 0.5)
 SHEET_VARIATION = (0.004, 1.0)
 """Sheets differ in their mean toughness: 90 % within 0.08 to 2 % before data."""
 NOISE_SCALE_SD = 0.2
-MOST_LOAD_SHARE = 0.1
+LOAD_SHARE_SD = 0.1
 """Share of the cut's torque by which friction of the pivot grows: up to 0.1 in jaw tools."""
-LOAD_SHARE = (0.05, 1.0)
-"""Its median and the standard deviation of its logarithm, 90 % within 0.01 to 0.26. Friction takes
-energy: a share below zero, which strong cloth asked for at -0.02, would put force 2 % off."""
 DELAY_TICKS = (0.08, 0.06)
 """A motor whose lag is 0 to 2 ticks is late by 0 to 0.13 ticks; 0.08 for a lag of one tick."""
 SHAPE_SD = 0.5
@@ -174,7 +171,7 @@ def cut_layout(recipe: Recipe, law: CutLaw, offset_sd: tuple[float, float]) -> L
     ]
     if law.loaded:
         meaning = "share of the cut's torque that friction adds"
-        rows.append(_log("load_share", "1", *LOAD_SHARE, meaning))
+        rows.append(_plain("load_share", "1", 0.0, LOAD_SHARE_SD, meaning))
     return (RippleLayout if law.fracture == "rippled" else Layout)(tuple(rows))
 
 
