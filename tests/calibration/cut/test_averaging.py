@@ -14,10 +14,12 @@ from scissorcal.calibration.cut.averaging import (
     log_evidence,
 )
 from scissorcal.calibration.cut.laws import CutLaw
+from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem
 
 DATA_SD = 0.3
+NO_LAYOUT = Layout(())
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Fitted:
 @dataclass(frozen=True)
 class Design:
     law: CutLaw
+    layout: Layout = NO_LAYOUT
 
 
 def problem(data, names):
@@ -105,6 +108,17 @@ def test_an_improbable_law_is_left_out():
     assert only.design.law.loaded
     assert only.probability == 1.0
     assert load_note([only]) == ()
+
+
+def test_a_share_below_zero_is_no_friction():
+    data = np.array([-0.9, -1.4, -1.1])
+    (plain, design), (loaded, other) = pair(data)
+    shares = tuple(Parameter(n, "1", "identity", 0.0, 1.0, "") for n in ("a", "load_share"))
+    climbed = [(plain, design), (loaded, replace(other, layout=Layout(shares)))]
+    assert loaded.optimum.point[1] < 0.0
+    (only,) = by_load(loaded, climbed)
+    assert only.climbed.rung.name == "plain"
+    assert only.probability == 1.0
 
 
 def test_a_law_without_a_twin_stands_alone():

@@ -39,8 +39,9 @@ def by_load(chosen: Climbed, climbed: Sequence[tuple[Climbed, CutExperiment]]) -
     """The chosen law and its twin with or without load-dependent friction, the richest first.
 
     Which of the two holds moves force and fracture energy by as much as the share itself, so where
-    the data leave both possible an interval has to cover both. Probabilities come from the evidence
-    by Laplace's method, equal before data (Kass and Raftery 1995,
+    the data leave both possible an interval has to cover both. Friction takes energy: where the
+    best share is not above zero, the law without one is taken alone. Probabilities come from the
+    evidence by Laplace's method, equal before data (Kass and Raftery 1995,
     doi:10.1080/01621459.1995.10476572).
     """
     design = next(d for c, d in climbed if c.rung.name == chosen.rung.name)
@@ -52,6 +53,9 @@ def by_load(chosen: Climbed, climbed: Sequence[tuple[Climbed, CutExperiment]]) -
     if len(twins) == 1:
         return [Candidate(chosen, design)]
     twins.sort(key=lambda twin: not twin[1].law.loaded)
+    (loaded, its_design), plain = twins
+    if its_design.layout.natural(loaded.optimum.point).get("load_share", 1.0) <= 0.0:
+        return [Candidate(replace(plain[0], alike=chosen.alike), plain[1])]
     logs = np.array([log_evidence(one) for one, _ in twins])
     odds = np.exp(logs - logs.max())
     kept = [i for i in range(len(twins)) if odds[i] / odds.sum() > LEAST_PROBABILITY]
