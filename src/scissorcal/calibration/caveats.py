@@ -21,7 +21,7 @@ RESPONSE = ("response_force", "response_exponent")
 
 @dataclass(frozen=True)
 class Caveat:
-    """Why the intervals of ``parameters`` are known to be poor, and what would mend it."""
+    """Why the intervals of ``parameters`` are known to be poor, and what would improve them."""
 
     parameters: tuple[str, ...]
     sentence: str

@@ -37,6 +37,7 @@ ONE_WINDOW, ONE_AND_A_HALF = 2 * WINDOW_CYCLES, 3 * WINDOW_CYCLES
 """Distances of windows in half cycles. A frequency that gains one cycle too many over a window
 gains one and a half over the longer distance: there its phases oppose."""
 FURTHEST_ALIAS = 4
+"""Steps of one cycle per window by which a search may be off: it begins within 0.25 to 2.5."""
 OVERLAP = 4.0
 """Windows half a cycle apart that count as one: the sum of the Hann window's squared
 autocorrelation."""
