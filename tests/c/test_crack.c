@@ -1,36 +1,10 @@
 /* The walk of a crack against its twin's answers; arrays have their exact sizes on the heap, so that
  * the sanitizers see every read beyond an end. */
+#include "arrays.h"
 #include "check.h"
-#include "json.h"
 #include "sc_crack.h"
 
 #include <stdlib.h>
-
-enum { MOST_ARRAYS = 32 };
-
-static void *arrays[MOST_ARRAYS];
-static size_t array_count;
-
-static double *room(size_t count)
-{
-    double *found = malloc(count * sizeof *found);
-    if (!found || array_count == MOST_ARRAYS) exit(2);
-    arrays[array_count++] = found;
-    return found;
-}
-
-static void free_arrays(void)
-{
-    while (array_count > 0) free(arrays[--array_count]);
-}
-
-static double *doubles(const json *object, const char *key)
-{
-    const json *array = json_get(object, key);
-    double *values = room(array->size);
-    for (size_t i = 0; i < array->size; i++) values[i] = array->items[i].number;
-    return values;
-}
 
 static sc_curve curve_of(const json *object, const char *key)
 {
@@ -76,7 +50,9 @@ static void check_case(const json *one, double tolerance)
     sc_crack_law law = law_of(one);
     double *opening = doubles(one, "opening"), *advance = doubles(one, "advance");
     const size_t count = json_get(one, "opening")->size;
-    double *torque = room(count - 1), *push = room(count - 1), *place = room(count);
+    size_t each = sizeof(double);
+    double *torque = room((count - 1) * each), *push = room((count - 1) * each);
+    double *place = room(count * each);
     sc_crack_books books = {0.0, 0.0, 0.0, 0};
     sc_crack_walk(&law, opening, advance, (int32_t)count, torque, push, place, &books);
     check_array(one, "torque", torque, tolerance);

@@ -1,44 +1,10 @@
 /* The cut's likelihood against its twin's answers; arrays have their exact sizes on the heap, so that
  * the sanitizers see every read beyond an end. */
+#include "arrays.h"
 #include "check.h"
-#include "json.h"
 #include "sc_cut_fit.h"
 
 #include <stdlib.h>
-
-enum { MOST_ARRAYS = 64 };
-
-static void *arrays[MOST_ARRAYS];
-static size_t array_count;
-
-static void *room(size_t bytes)
-{
-    void *found = malloc(bytes ? bytes : 1);
-    if (!found || array_count == MOST_ARRAYS) exit(2);
-    arrays[array_count++] = found;
-    return found;
-}
-
-static void free_arrays(void)
-{
-    while (array_count > 0) free(arrays[--array_count]);
-}
-
-static double *doubles(const json *object, const char *key)
-{
-    const json *array = json_get(object, key);
-    double *values = room(array->size * sizeof *values);
-    for (size_t i = 0; i < array->size; i++) values[i] = array->items[i].number;
-    return values;
-}
-
-static int32_t *integers(const json *object, const char *key)
-{
-    const json *array = json_get(object, key);
-    int32_t *values = room(array->size * sizeof *values);
-    for (size_t i = 0; i < array->size; i++) values[i] = (int32_t)array->items[i].number;
-    return values;
-}
 
 static sc_cut_data load_data(const json *one)
 {
