@@ -1,5 +1,6 @@
 """Motion over the path: smoothed as the encoder needs, work of a known force, its noise."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.signal import lfilter
 
 from scissorcal.calibration.path import (
     material_of,
+    mean_advance,
     mean_torque,
     path_motion,
     torque_covariance,
@@ -17,6 +19,7 @@ from scissorcal.calibration.path import (
 from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw
 from tests.calibration.path.made import COULOMB, INERTIA, RATE_HZ, record, swing
+from tests.calibration.truth import sweep
 
 COARSE = 2 * np.pi / 20_000
 FRICTION = FrictionLaw(coulomb_pos=COULOMB, coulomb_neg=COULOMB)
@@ -83,6 +86,38 @@ def test_the_work_of_a_known_force_is_its_potential(step_rad, share):
         done = material.work[b] - material.work[a]
         expected = potential(made.opening[b]) - potential(made.opening[a])
         assert done == pytest.approx(expected, abs=share * largest)
+
+
+def test_friction_does_no_work_where_the_blades_stand():
+    """A smoothed position trembles by 5 urad: 300 samples of it would add 20 mN m over 2 mrad."""
+    way = np.concatenate([sweep(0.6, 0.5, 0.2), np.full(300, 0.5), sweep(0.5, 0.4, 0.2)])
+    motion = motion_of(record(way, lambda q: 0.0 * q, step_rad=5e-5))
+    held = slice(len(sweep(0.6, 0.5, 0.2)) + 20, len(sweep(0.6, 0.5, 0.2)) + 280)
+    assert motion.standing[held].all()
+    assert not motion.standing[100:300].any()
+    trembling = 5e-6 * np.random.default_rng(5).standard_normal(len(way))
+    motion = replace(motion, opening=motion.opening + trembling)
+    work = material_of(motion, FRICTION, 0.0).work[held]
+    assert np.ptp(work) < 1e-4 * COULOMB
+    never = replace(motion, standing=np.zeros(len(way), dtype=bool))
+    assert np.ptp(material_of(never, FRICTION, 0.0).work[held]) > 1e-3 * COULOMB
+
+
+def test_blades_that_creep_do_work_against_friction():
+    """At 4 mrad/s they count as standing, and friction acts on what they turn by on the whole."""
+    motion = motion_of(record(sweep(0.6, 0.5, 0.004), lambda q: 0.0 * q, step_rad=1e-6))
+    assert motion.standing.all()
+    work = material_of(motion, FRICTION, 0.0).work
+    assert work[-1] - work[0] == pytest.approx(0.0, abs=0.01 * COULOMB * 0.1)
+
+
+def test_the_mean_advance_is_that_over_the_path():
+    """A sledge that moves on while the blades stand has no share in it."""
+    way = np.concatenate([sweep(0.6, 0.5, 0.2), np.full(300, 0.5)])
+    motion = motion_of(record(way, spring))
+    moved = np.where(np.arange(len(way)) < len(way) - 300, 0.01, 0.02)
+    mean = mean_advance(replace(motion, advance=moved), np.array([100, len(way) - 1]))
+    assert mean == pytest.approx([0.01], abs=1e-4)
 
 
 def test_cogging_and_offset_are_taken_off():

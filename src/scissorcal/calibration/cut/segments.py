@@ -261,7 +261,7 @@ class _Builder:
         length = float(opening[free[0]] - opening[0])
         if length < LEAST_RANGE_RAD:
             return
-        begin = int(np.argmax(opening > opening[0] + TURN_SHARE * length))
+        begin = _left_for_good(opening, opening[0] + TURN_SHARE * length, int(free[0]))
         end = int(free[0])
         while end < len(opening) - 1 and opening[end] < opening[free[0]] + FREE_SHARE * length:
             end += 1
@@ -285,7 +285,7 @@ class _Builder:
             contact = np.asarray(place - advance)
             depth, lever = geometry.depth_and_lever(geometry.edge, np.asarray(turn), contact)
             length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
-            begin = low + int(np.argmax(opening[low : run.high + 1] > turn + TURN_SHARE * length))
+            begin = low + _left_for_good(opening[low : run.high + 1], turn + TURN_SHARE * length)
             ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, 3e-4))
             ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
             if len(ends) < 4:
@@ -342,6 +342,12 @@ class _Builder:
                     resolved=not unseen,
                 )
             )
+
+
+def _left_for_good(opening: Array, least: float, stop: int | None = None) -> int:
+    """First sample after the last one, before ``stop``, that lies below an opening."""
+    below = np.flatnonzero(opening[:stop] < least)
+    return int(below[-1]) + 1 if len(below) else 0
 
 
 def free_path(

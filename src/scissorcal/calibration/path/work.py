@@ -34,7 +34,9 @@ class Material:
     """What the material does to the opening at each sample (n,).
 
     ``work`` (J) is what it did so far, ``torque`` (N m) what it does now: the former is summed and
-    exact, the latter carries the noise of an acceleration. ``direction`` (n - 1,) is how dry
+    exact, the latter carries the noise of an acceleration. Where blades stand, friction acts
+    against what they creep by on the whole: what a smoothed position trembles by is noise, and the
+    friction on it would add up. ``direction`` (n - 1,) is how dry
     friction acts between samples, from -1 (closing) to 1, less where it has not built up.
     """
 
@@ -64,7 +66,7 @@ def material_of(
         built = presliding_state(path, float(friction.presliding_length))
         state = 0.5 * (built[1:] + built[:-1])
         direction = direction + float(friction.presliding_share) * (state - direction)
-    law = friction_torque(friction, middle, step / motion.tick_s, 0.0, state)
+    law = friction_torque(friction, middle, _turning_rate(motion, step), 0.0, state)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
     cosine, sine, number = cogging
@@ -73,6 +75,16 @@ def material_of(
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
     return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+
+
+def _turning_rate(motion: PathMotion, step: Array) -> Array:
+    """Rate (n - 1,) between samples; its mean for as long as the blades stand."""
+    rate = step / motion.tick_s
+    still = np.concatenate([[False], motion.standing[1:] & motion.standing[:-1], [False]])
+    starts, ends = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2).T
+    for low, high in zip(starts.tolist(), ends.tolist(), strict=True):
+        rate[low:high] = rate[low:high].mean()
+    return np.asarray(rate)
 
 
 def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:
@@ -84,9 +96,11 @@ def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array,
 
 
 def mean_advance(motion: PathMotion, ends: Integers) -> Array:
-    """Mean advance (k,) in m between samples ``ends`` (k + 1,)."""
-    span = slice(int(ends[0]), int(ends[-1]))
-    return sums_between(motion.advance[span], ends - ends[0]) / np.diff(ends)
+    """Mean advance (k,) in m over the path between samples ``ends`` (k + 1,)."""
+    low, high = int(ends[0]), int(ends[-1])
+    step = np.diff(motion.opening[low : high + 1])
+    middle = 0.5 * (motion.advance[low + 1 : high + 1] + motion.advance[low:high])
+    return sums_between(middle * step, ends - low) / np.diff(motion.opening[ends])
 
 
 def sums_between(values: Array, ends: Integers) -> Array:
