@@ -122,24 +122,22 @@ def test_a_search_that_did_not_settle_fails_with_its_own_words():
 
 
 @pytest.mark.parametrize(
-    ("status", "concerned", "outcome"),
+    ("status", "concerns", "outcome"),
     [
-        (SearchStatus.AT_START, "b0", "pass"),
-        (SearchStatus.PLATEAU, "b0", "pass"),
-        (SearchStatus.AT_START, "b0, b1", "fail"),
-        (SearchStatus.ROUNDS_USED_UP, "", "fail"),
-        (SearchStatus.NOT_FINITE, "b0", "fail"),
-        (SearchStatus.AT_BOUNDS, "b0", "fail"),
+        (SearchStatus.AT_START, ("b0",), "pass"),
+        (SearchStatus.PLATEAU, ("b0",), "pass"),
+        (SearchStatus.AT_START, ("b0", "b1"), "fail"),
+        (SearchStatus.ROUNDS_USED_UP, (), "fail"),
+        (SearchStatus.NOT_FINITE, ("b0",), "fail"),
+        (SearchStatus.AT_BOUNDS, ("b0",), "fail"),
     ],
 )
-def test_only_a_silent_nuisance_may_stay_at_its_prior(status, concerned, outcome):
+def test_only_a_silent_nuisance_may_stay_at_its_prior(status, concerns, outcome):
     """b0 is a nuisance here, b1 the law's own."""
 
     def spoil(posterior, diagnostics):
-        sentence = status.value + (f" It concerns {concerned}." if concerned else "")
-        sentence += " 2 of 3 starts ended there, the others lower."
         ended = dataclasses.replace(
-            posterior.optimum, success=False, status=status, sentence=sentence
+            posterior.optimum, success=False, status=status, concerns=concerns
         )
         return dataclasses.replace(posterior, optimum=ended), diagnostics
 

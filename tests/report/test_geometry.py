@@ -112,7 +112,7 @@ def test_verdicts_join_the_list_on_top(shown: Shown) -> None:
     ids = shown.built.page.ids
     assert ids.index("verdicts") < ids.index("camera")
     stances = {row["fit"]: row["stance"] for row in shown.built.twin["geometry"]["headlines"]}
-    assert stances == {"camera": "reject", "blade": "trust", "plate": "care"}
+    assert stances == {"camera": "reject", "blade": "unverified", "plate": "care"}
 
 
 def test_the_page_says_what_staff_must_know(shown: Shown) -> None:

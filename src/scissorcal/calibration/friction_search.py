@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.friction_moments import Cell, ReducedLaw
 from scissorcal.inference.optimise import Cluster, Optimum
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SearchStatus, named
+from scissorcal.inference.status import SearchStatus, about, picked
 
 Array = NDArray[np.float64]
 
@@ -78,8 +78,8 @@ def search(problem: ReducedProblem) -> Optimum:
         if all(np.abs((one.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
             optima.append(Cluster(one.point, one.value, 1, True))
     optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
-    status, concerned = _status(problem, best.point)
-    sentence = status.value + (f" It concerns {concerned}." if concerned else "")
+    status, concerns = _status(problem, best.point)
+    sentence = about(status, concerns)
     if agreeing < len(ended):
         sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
     return Optimum(
@@ -92,6 +92,7 @@ def search(problem: ReducedProblem) -> Optimum:
         evaluations=sum(one.evaluations for one in ended),
         status=status,
         optima=tuple(optima),
+        concerns=concerns,
     )
 
 
@@ -209,12 +210,12 @@ def _dips(problem: Problem, best: Cluster, other: Cluster) -> bool:
     )
 
 
-def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, str]:
+def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, tuple[str, ...]]:
     """How the search ended, and the names of the parameters that it concerns."""
     scale = problem.prior_sd
     bound = np.minimum(point - problem.lower, problem.upper - point) < AT_BOUND * scale
     if np.any(bound):
-        return SearchStatus.AT_BOUNDS, named(problem.names, bound)
+        return SearchStatus.AT_BOUNDS, picked(problem.names, bound)
     law = problem.law
     height = law.log_likelihood(point)
     silent = np.array(
@@ -227,5 +228,5 @@ def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, str]:
         ]
     )
     if np.any(silent):
-        return SearchStatus.AT_START, named(problem.names, silent)
-    return SearchStatus.SETTLED, ""
+        return SearchStatus.AT_START, picked(problem.names, silent)
+    return SearchStatus.SETTLED, ()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.inference import Optimum, Posterior, SearchStatus
+from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.verdicts import Status, Verdict
 
 K_HAT_LIMIT = 0.7
@@ -78,21 +78,14 @@ def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verd
     """
     ended = posterior.optimum
     silent = ended.status in (SearchStatus.AT_START, SearchStatus.PLATEAU)
-    concerned = _concerned(ended)
-    if silent and concerned and set(concerned) <= set(nuisance):
+    if silent and ended.concerns and set(ended.concerns) <= set(nuisance):
         why = (
-            f"The search settled for every parameter that is reported. {', '.join(concerned)} "
+            f"The search settled for every parameter that is reported. {', '.join(ended.concerns)} "
             "stayed where the prior is, and the intervals have the prior's width for it."
         )
         return Verdict(scope, "optimum", "pass", float(ended.agreeing), 1.0, why)
     status: Status = "pass" if ended.success else "fail"
     return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
-
-
-def _concerned(ended: Optimum) -> tuple[str, ...]:
-    """Names of the parameters that the sentence on a search concerns."""
-    _, _, named = ended.sentence.partition(" It concerns ")
-    return tuple(named.partition(".")[0].split(", ")) if named else ()
 
 
 def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:

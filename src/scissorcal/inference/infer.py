@@ -15,7 +15,7 @@ from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SamplingStatus, SearchStatus, named
+from scissorcal.inference.status import SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 Array = NDArray[np.float64]
@@ -120,10 +120,10 @@ def _held(problem: Problem, best: Optimum, shape: Shape) -> Optimum:
     loose = values < LEAST_HELD
     if not best.success or not np.any(loose):
         return best
-    concerned = named(problem.names, np.asarray(np.any(vectors[:, loose] ** 2 > 0.1, axis=1)))
+    concerns = picked(problem.names, np.asarray(np.any(vectors[:, loose] ** 2 > 0.1, axis=1)))
     status = SearchStatus.PLATEAU
-    sentence = f"{status.value} It concerns {concerned}."
-    return replace(best, status=status, success=False, sentence=sentence)
+    sentence = about(status, concerns)
+    return replace(best, status=status, success=False, sentence=sentence, concerns=concerns)
 
 
 def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
@@ -291,7 +291,7 @@ def _thinned(chains: Chains, count: int, rng: np.random.Generator) -> Array:
 def _said(chains: Chains, names: tuple[str, ...]) -> str:
     never = ~np.isfinite(chains.tau)
     if np.any(never):
-        return f"{chains.status.value} It concerns {named(names, never)}."
+        return about(chains.status, picked(names, never))
     return (
         f"{chains.status.value} ({ENSEMBLES} ensembles of {chains.steps} steps, autocorrelation "
         f"time {chains.tau.max():.0f}, R-hat {chains.r_hat.max():.3f}.)"

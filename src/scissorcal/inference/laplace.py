@@ -10,7 +10,7 @@ from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.information import Slopes, likelihood_information, slopes_at
 from scissorcal.inference.optimise import Optimum, move_optimum
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import NotFiniteError, named
+from scissorcal.inference.status import NotFiniteError, picked
 
 Array = NDArray[np.float64]
 
@@ -96,8 +96,9 @@ def shape_at(problem: Problem, point: Array, fall: float = 0.3) -> Shape:
     if information is None:
         raise NotFiniteError(
             "The log-posterior is not a finite number right beside its optimum along "
-            f"{named(problem.names, ~finite)}, so its curvature cannot be measured: check the data "
-            "for gaps and extreme values, or narrow the priors to where the model holds."
+            f"{', '.join(picked(problem.names, ~finite))}, so its curvature cannot be measured: "
+            "check the data for gaps and extreme values, or narrow the priors to where the model "
+            "holds."
         )
     return Shape(point, slopes, scores, information, slope_prior, curvature_prior)
 

@@ -10,7 +10,7 @@ from scissorcal.inference.ascent import ascend
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.squares import descend, has_squares
-from scissorcal.inference.status import NotFiniteError, SearchStatus, named
+from scissorcal.inference.status import NotFiniteError, SearchStatus, about, picked
 
 Array = NDArray[np.float64]
 
@@ -64,10 +64,10 @@ class Cluster:
 class Optimum:
     """The best point that any start led to.
 
-    ``status`` says how the search ended and what to do, ``sentence`` the same with the names of
-    the parameters it concerns; ``success`` is true where the point may be used. ``optima`` are the
-    distinct optima, highest first. ``agreeing`` counts the starts that ended at the same height,
-    ``starts`` all of them; ``evaluations`` counts calls of the objective.
+    ``status`` says how the search ended and what to do, ``concerns`` names the parameters that it
+    is said of, ``sentence`` has both; ``success`` is true where the point may be used. ``optima``
+    are the distinct optima, highest first. ``agreeing`` counts the starts that ended at the same
+    height, ``starts`` all of them; ``evaluations`` counts calls of the objective.
     """
 
     point: Array
@@ -79,6 +79,7 @@ class Optimum:
     evaluations: int
     status: SearchStatus = SearchStatus.SETTLED
     optima: tuple[Cluster, ...] = ()
+    concerns: tuple[str, ...] = ()
 
 
 def find_optimum(
@@ -124,8 +125,8 @@ def find_optimum(
     best = ended[first]
     agreeing = sum(climb.value > best.value - SAME_HEIGHT for climb in ended)
     optima = _clusters(problem, ended)
-    status, concerned = _status(problem, best, around, stop)
-    sentence = status.value + (f" It concerns {concerned}." if concerned else "")
+    status, concerns = _status(problem, best, around, stop)
+    sentence = about(status, concerns)
     if agreeing < len(ended):
         sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
     if rivals := [c for c in optima[1:] if c.settled and c.value > best.value - SAME_HEIGHT * 6]:
@@ -140,6 +141,7 @@ def find_optimum(
         evaluations=counter.calls,
         status=status,
         optima=optima,
+        concerns=concerns,
     )
 
 
@@ -354,7 +356,7 @@ def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
 
 def _status(
     problem: Problem, best: _Climb, lost: Array, stop: Stop | None
-) -> tuple[SearchStatus, str]:
+) -> tuple[SearchStatus, tuple[str, ...]]:
     """How the best climb ended, and the names of the parameters that it concerns.
 
     ``lost`` (axes, 2) is what the log-posterior loses beside the end.
@@ -362,26 +364,26 @@ def _status(
     scale = problem.prior_sd
     at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
     if np.any(at_bound):
-        return SearchStatus.AT_BOUNDS, named(problem.names, at_bound)
+        return SearchStatus.AT_BOUNDS, picked(problem.names, at_bound)
     settled = best.gained < SETTLED and bool(np.all(lost > -SETTLED))
     if not settled and stop is not None and stop():
-        return SearchStatus.TIME_USED_UP, ""
+        return SearchStatus.TIME_USED_UP, ()
     width = np.sqrt(np.diag(best.root @ best.root.T))
     around = _beside(problem.log_posterior, problem, best.point, (1e-3 if settled else 2.0) * width)
     if np.any(edges := np.asarray(np.any(~np.isfinite(around), axis=1))):
-        return SearchStatus.NOT_FINITE, named(problem.names, edges)
+        return SearchStatus.NOT_FINITE, picked(problem.names, edges)
     if not settled:
-        return SearchStatus.ROUNDS_USED_UP, ""
+        return SearchStatus.ROUNDS_USED_UP, ()
     height = problem.log_likelihood(best.point)
     away = np.abs(_beside(problem.log_likelihood, problem, best.point, 0.1 * scale) - height)
     silent = np.all(away <= 1e-9 * (1 + abs(height)), axis=1)
     if np.any(silent):
-        return SearchStatus.AT_START, named(problem.names, silent)
+        return SearchStatus.AT_START, picked(problem.names, silent)
     if np.any(level := np.asarray(np.any(lost < SETTLED, axis=1))):
         share = np.square(best.root / problem.prior_sd[:, None])[:, level]
         concerned = np.any(share > 0.1 * share.sum(axis=0), axis=1)
-        return SearchStatus.PLATEAU, named(problem.names, np.asarray(concerned))
-    return SearchStatus.SETTLED, ""
+        return SearchStatus.PLATEAU, picked(problem.names, np.asarray(concerned))
+    return SearchStatus.SETTLED, ()
 
 
 def _beside(

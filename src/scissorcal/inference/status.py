@@ -88,6 +88,15 @@ class SamplingStatus(Enum):
         return self in (SamplingStatus.WEIGHED, SamplingStatus.CONVERGED)
 
 
-def named(names: tuple[str, ...], which: NDArray[np.bool_]) -> str:
-    """Names of the parameters that ``which`` (p,) picks, for the end of a sentence."""
-    return ", ".join(name for name, picked in zip(names, which, strict=True) if picked)
+def picked(names: tuple[str, ...], which: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Names of the parameters that ``which`` (p,) picks."""
+    return tuple(name for name, chosen in zip(names, which, strict=True) if chosen)
+
+
+def about(status: SearchStatus | SamplingStatus, concerns: tuple[str, ...]) -> str:
+    """The sentence of a status, with the names of the parameters that it concerns.
+
+    >>> about(SearchStatus.SETTLED, ())
+    'The search settled.'
+    """
+    return str(status.value) + (f" It concerns {', '.join(concerns)}." if concerns else "")

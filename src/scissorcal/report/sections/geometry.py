@@ -151,8 +151,9 @@ def write_geometry_headline(fit: GeometryKind, verdicts: Sequence[Verdict]) -> H
     made = "its one check" if count == 1 else f"all {count} checks"
     return Headline(
         fit,
-        "trust",
-        f"The {fit} fit can be trusted: it passed {made}.",
+        "unverified",
+        f"The {fit} fit is unverified: it passed {made} of its own, and whether its intervals "
+        "hold was not tested on these photographs.",
         ("Look at its pictures below: is what was drawn what you see?",),
     )
 
