@@ -57,6 +57,15 @@ def test_mean_torques_are_those_of_the_truth(two_strokes):
         assert stretch.speed == pytest.approx(0.4, rel=0.2)
 
 
+def test_unloading_begins_where_the_blades_have_left_the_turn_for_good():
+    """A servo that opens by 2 mrad, comes back to within 0.2 mrad of the turn, and then opens."""
+    made = cut(way(HIGH, LOW, LOW + 2e-3, LOW + 2e-4, HIGH))
+    piece = segments_of(made).pieces[-1]
+    opening = made.motions[0].opening
+    assert piece.kind == "unloading"
+    assert opening[piece.ends[0] :].min() == pytest.approx(opening[piece.ends[0]], abs=1e-5)
+
+
 def test_each_sheet_begins_fresh():
     found = segments_of(
         cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), places=(-0.018,) * 2, kinds=(0, 1))
