@@ -23,13 +23,19 @@ OFFSET_SD_FLOOR = 1e-4
 """Least standard deviation (N m) of friction in one stroke: levels differ by stroke and speed by
 more than the empty sweeps' posterior says."""
 USUAL_RATE = 0.3
+RATES = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])
+"""Rates (rad/s) at which two laws of friction are compared."""
+WITHIN_SD = (0.1587, 0.8413)
+"""Quantiles one standard deviation from the middle of a normal distribution."""
 
 
 @dataclass(frozen=True)
 class KnownFriction:
     """Friction as the empty sweeps left it.
 
-    ``law`` and ``offset`` (N m) stand at the posterior's mean. ``closing_sd`` and ``opening_sd``
+    ``law`` and ``offset`` (N m) are the posterior's mean or its highest point, whichever has the
+    torques in the middle of the posterior: where parameters trade against each other along a bend,
+    their means lie beside it. ``closing_sd`` and ``opening_sd``
     (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
     single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
     what the motor adds to the measured drive. ``prior`` takes the recipe's place where a study of
@@ -49,8 +55,8 @@ class KnownFriction:
     @classmethod
     def of(cls, friction: FitResult) -> "KnownFriction":
         """Take a finished fit of friction."""
-        means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
         centre = float(friction.structure["angle_center"])
+        means = _middle(friction, centre)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
         # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
@@ -80,9 +86,29 @@ def _of_law(values: dict[str, Array]) -> dict[str, Array]:
     return {name: value for name, value in values.items() if name not in others}
 
 
+def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
+    """Values by name: means, or the highest point where its torques are nearer to the middle."""
+    means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
+    names = [p.name for p in friction.parameters]
+    highest = {**means, **dict(zip(names, np.asarray(friction.map_point), strict=True))}
+    draws = {name: friction.column(name) for name in names}
+    middle = np.median([_level(draws, centre, rate) for rate in RATES], axis=1)
+
+    def away(values: dict[str, Array]) -> float:
+        levels = np.array([float(_level(values, centre, rate)) for rate in RATES])
+        return float(np.abs(levels - middle).max())
+
+    return min((means, highest), key=away)
+
+
 def _spread(friction: FitResult, centre: float, rate: float) -> float:
-    """Standard deviation of friction and offset together at one rate, over the posterior."""
+    """Standard deviation of friction and offset together at one rate, over the posterior's core."""
     draws = {p.name: friction.column(p.name) for p in friction.parameters}
-    law = friction_law(_of_law(draws), centre)
-    level = friction_torque(law, centre, rate) + draws.get("offset", np.asarray(0.0))
-    return float(np.std(level))
+    low, high = np.quantile(_level(draws, centre, rate), WITHIN_SD)
+    return float(0.5 * (high - low))
+
+
+def _level(values: dict[str, Array], centre: float, rate: float) -> Array:
+    """Friction and offset together at one rate, of one set of values or of many draws."""
+    torque = friction_torque(friction_law(_of_law(values), centre), centre, rate)
+    return np.asarray(torque + values.get("offset", np.asarray(0.0)))

@@ -1,0 +1,61 @@
+"""What a cut takes over from the fit of friction: a law in the middle of its posterior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.model import friction_torque
+from tests.package.fits import friction_fit
+
+RATE, LEVEL = 0.1, 0.015
+NOISE = {"noise_white_Nm": 1e-3, "noise_slow_Nm": 5e-4, "noise_slow_time_s": 0.01}
+
+
+def bent(spread: float):
+    """A fit that knows friction at 0.1 rad/s, with Stribeck friction open by ``spread`` in logs."""
+    fit = friction_fit(law="stribeck", draws=2000)
+    names = [p.name for p in fit.parameters]
+    rng = np.random.default_rng(4)
+    stribeck = 0.003 * np.exp(spread * rng.standard_normal(2000))
+    scale = 0.1 * np.sqrt(stribeck / 0.003)
+    coulomb = LEVEL - stribeck * np.exp(-((RATE / scale) ** 2))
+    draws = fit.draws.copy()
+    point = fit.map_point.copy()
+    open_ones = {"stribeck": stribeck, "stribeck_rate": scale, "coulomb": coulomb}
+    highest = {"stribeck": 0.003, "stribeck_rate": 0.1, "coulomb": LEVEL - 0.003 * np.exp(-1.0)}
+    parameters = list(fit.parameters)
+    for name, column in open_ones.items():
+        index = names.index(name)
+        draws[:, index], point[index] = column, highest[name]
+        parameters[index] = replace(parameters[index], mean=float(column.mean()))
+    viscous = names.index("viscous")
+    draws[:, viscous] = point[viscous] = parameters[viscous].mean
+    draws[:, names.index("offset")] = point[names.index("offset")] = 0.0
+    parameters[names.index("offset")] = replace(parameters[names.index("offset")], mean=0.0)
+    return replace(
+        fit, draws=draws, map_point=point, parameters=tuple(parameters), diagnostics=NOISE
+    )
+
+
+def test_means_of_parameters_on_a_bend_are_no_law_of_the_posterior():
+    """With Stribeck friction open by a factor of 4.5 they give 2 mN m less than every draw."""
+    fit = bent(1.5)
+    known = KnownFriction.of(fit)
+    viscous = fit.parameter("viscous").mean * RATE
+    level = float(friction_torque(known.law, known.law.angle_center, RATE))
+    assert level == pytest.approx(LEVEL + viscous, abs=1e-6)
+    means = {p.name: p.mean for p in fit.parameters}
+    bell = means["stribeck"] * np.exp(-((RATE / means["stribeck_rate"]) ** 2))
+    assert means["coulomb"] + bell < LEVEL - 1e-3
+
+
+def test_the_spread_is_that_of_the_posteriors_core():
+    """Friction at 0.3 rad/s: a few draws far out do not count."""
+    fit = bent(0.3)
+    draws = fit.draws.copy()
+    draws[:20, [p.name for p in fit.parameters].index("coulomb")] += 0.05
+    wide, narrow = KnownFriction.of(replace(fit, draws=draws)), KnownFriction.of(fit)
+    assert wide.closing_sd == pytest.approx(narrow.closing_sd, rel=0.1)
+    assert narrow.closing_sd > OFFSET_SD_FLOOR
