@@ -164,11 +164,12 @@ def spectrum_figure(cuts: tuple[Cut, ...]) -> Any:
 
     figure = Figure(figsize=(7.2, 4.8), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
-    largest = max(_power(cuts[0].signals, float(f)) for f in FREQUENCIES)
+    largest = max(teeth.coherent_power(cuts[0].signals, float(f)) for f in FREQUENCIES)
     for cut in cuts:
         looks = {"color": cut.colour, "lw": 1.2, "label": cut.name}
-        above.semilogy(FREQUENCIES, [_gain(cut.signals, float(f)) for f in FREQUENCIES], **looks)
-        power = np.array([_power(cut.signals, float(f)) for f in FREQUENCIES])
+        gains = [teeth.coherent_gain(cut.signals, float(f)) for f in FREQUENCIES]
+        above.semilogy(FREQUENCIES, gains, **looks)
+        power = np.array([teeth.coherent_power(cut.signals, float(f)) for f in FREQUENCIES])
         below.plot(FREQUENCIES, power / largest, **looks)
     above.axhline(teeth.COHERENT, color=GREY, lw=0.8, ls="--")
     above.text(2.5, 1.25 * teeth.COHERENT, f"limit {teeth.COHERENT:.0f}", ha="right", color=GREY)
@@ -184,17 +185,6 @@ def spectrum_figure(cuts: tuple[Cut, ...]) -> Any:
 
 def _middle(opening: Array, ends: NDArray[np.int64]) -> Array:
     return 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
-
-
-def _gain(signals: tuple[teeth.PhaseSignal, ...], frequency: float) -> float:
-    """The gain that the fit looks at, of all stretches together."""
-    found = [p for s in signals if (p := teeth._pairs(s, frequency)) is not None]
-    return teeth._gain(found) if found else 0.0
-
-
-def _power(signals: tuple[teeth.PhaseSignal, ...], frequency: float) -> float:
-    """Power that keeps its phase, each stroke's over the variance of its torque."""
-    return teeth._coherent(signals, frequency)
 
 
 if __name__ == "__main__":

@@ -167,7 +167,7 @@ def find_line(
     weights = np.concatenate([np.abs(paths[i]) for i in where])
     mean = float(np.average(np.concatenate([log_periods[i] for i in where]), weights=weights))
     chosen = [s for s in seen if s.stretch in kept]
-    own = _power(chosen, frequency)
+    own = coherent_power(chosen, frequency)
     return Line(
         ratio=1.0 / frequency,
         sd=float(np.hypot(jackknife, PERIOD_SD)),
@@ -175,8 +175,8 @@ def find_line(
         stretches=where,
         gain=_gain(list(kept.values())),
         speeds=_by_speed(seen, frequency),
-        half=_power(chosen, frequency / 2) / own,
-        third=_power(chosen, frequency / 3) / own,
+        half=coherent_power(chosen, frequency / 2) / own,
+        third=coherent_power(chosen, frequency / 3) / own,
     )
 
 
@@ -242,11 +242,25 @@ def _gain(pairs: Sequence[Complex]) -> float:
     return float(abs(sum(complex(pair.sum()) for pair in own)) ** 2 / max(chance, 1e-300))
 
 
+def coherent_gain(signals: Sequence[PhaseSignal], frequency: float) -> float:
+    """Power that keeps its phase at a frequency over what noise would leave."""
+    found = _pairs_of(signals, frequency)
+    return _gain(found) if found else 0.0
+
+
+def coherent_power(signals: Sequence[PhaseSignal], frequency: float) -> float:
+    """Power that keeps its phase, summed over strokes."""
+    found = _pairs_of(signals, frequency)
+    return max(float(sum(float(np.real(p.sum())) / len(p) for p in found)), 1e-300)
+
+
+def _pairs_of(signals: Sequence[PhaseSignal], frequency: float) -> list[Complex]:
+    return [p for s in signals if (p := _pairs(s, frequency)) is not None]
+
+
 def _shown(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """Gain at a frequency, 0 where the phase gains a part of a cycle between windows."""
-    found = [p for s in signals if (p := _pairs(s, frequency)) is not None]
-    if not found:
-        return 0.0
+    found = _pairs_of(signals, frequency)
     ahead = sum(float(np.real(p.sum())) / float(np.abs(p).mean()) for p in found)
     return _gain(found) if ahead > 0 else 0.0
 
@@ -262,15 +276,9 @@ def _coherence(signals: Sequence[PhaseSignal], frequency: float) -> float:
     return sum(float(np.real(pair.sum())) / float(np.abs(pair).mean()) for pair in found)
 
 
-def _power(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """Power that keeps its phase, summed over strokes."""
-    found = [p for s in signals if (p := _pairs(s, frequency)) is not None]
-    return max(float(sum(float(np.real(p.sum())) / len(p) for p in found)), 1e-300)
-
-
 def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
     for _ in range(4):
-        found = [p for s in signals if (p := _pairs(s, frequency)) is not None]
+        found = _pairs_of(signals, frequency)
         if not found:
             return frequency
         sums = sum(p.sum() / max(float(np.abs(p).sum()), 1e-300) * len(p) for p in found)
@@ -288,7 +296,7 @@ def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
     for _ in range(FURTHEST_ALIAS):
         for aside in (1.0 - 1.0 / WINDOW_CYCLES, 1.0, 1.0 + 1.0 / WINDOW_CYCLES):
             tried = _refined(signals, frequency * aside)
-            score = max(_coherence(signals, tried), 0.0) * _power(signals, tried)
+            score = max(_coherence(signals, tried), 0.0) * coherent_power(signals, tried)
             if score > highest:
                 best, highest = tried, score
         if best == frequency:
@@ -300,11 +308,11 @@ def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """The frequency, or a half or a third of it where that has teeth of its own."""
     frequency = _strongest(signals, frequency)
-    own = _power(signals, frequency)
+    own = coherent_power(signals, frequency)
     for order in HARMONICS:
         lower = _refined(signals, frequency / order)
         near = abs(np.log(lower * order / frequency)) < SAME_PERIOD
-        if near and _power(signals, lower) > HARMONIC_POWER * own:
+        if near and coherent_power(signals, lower) > HARMONIC_POWER * own:
             return lower
     return frequency
 
@@ -329,7 +337,7 @@ def _by_speed(
             groups.append([signal])
     rows = []
     for group in groups:
-        pairs = [p for s in group if (p := _pairs(s, frequency)) is not None]
+        pairs = _pairs_of(group, frequency)
         if pairs:
             total = sum(complex(p.sum()) for p in pairs)
             shift = float(np.angle(total)) / (2 * np.pi * WINDOW_CYCLES)
