@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_moments import FIXED, StrokeMoments
+from scissorcal.calibration.friction_moments import FIXED, MEASURED, StrokeMoments
 from scissorcal.calibration.signals.weak_form import Windows
 
 Array = NDArray[np.float64]
@@ -146,7 +146,7 @@ def _agree(*parts: tuple[complex, float]) -> bool:
 def _unexplained(moments: StrokeMoments) -> Array:
     """Residual (n,) of the columns that need no scale, each with a factor of its own."""
     products = moments.products(FIXED, FIXED).sum(axis=0)
-    slope = moments.products(FIXED, ("measured", 0)).sum(axis=0)[:, 0]
+    slope = moments.products(FIXED, MEASURED).sum(axis=0)[:, 0]
     size = np.sqrt(np.diag(products))
     used = np.flatnonzero(size > 0)
     inner = products[np.ix_(used, used)] / np.outer(size[used], size[used])

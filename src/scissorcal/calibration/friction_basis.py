@@ -1,5 +1,6 @@
 """A friction law weighed over windows: columns that its parameters multiply."""
 
+import itertools
 import math
 from collections.abc import Callable, Container, Mapping
 from functools import cached_property
@@ -29,7 +30,8 @@ class FrictionBasis:
     Its friction equals ``windows.average(friction_torque(law, samples))`` and costs a fraction of
     it: what is linear in its parameters is weighed once, and what depends on a scale (Stribeck's
     speed, Dahl's length) is weighed at nodes of that scale and interpolated. So a drive is
-    ``fixed`` (n, q) times coefficients, plus the columns of the scales' nodes times theirs.
+    ``fixed`` (n, q) times coefficients, plus the columns of the scales' nodes times theirs. What
+    Stribeck friction lacks after a reversal depends on both scales (``coupled``).
     """
 
     def __init__(
@@ -54,29 +56,37 @@ class FrictionBasis:
         self._places: dict[tuple[str, ...], list[tuple[Array, Integers, Integers, Integers]]] = {}
         self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
         self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
+        self._coupled: dict[tuple[int, int], Array] = {}
 
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
-        fixed, stribeck, late = self.coefficients(values)
+        fixed, *scaled = self.coefficients(values)
         own = np.concatenate([np.zeros(RIGID), fixed[RIGID:]])
-        return self._total(own, stribeck, late, values)
+        return self._total([own, *scaled], values)
 
     def drive(self, values: Mapping[str, Array]) -> Array:
         """Friction, inertia, offset, lateness and cogging together (n,)."""
-        return self._total(*self.coefficients(values), values)
+        return self._total(self.coefficients(values), values)
 
-    def coefficients(self, values: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-        """Factors of ``fixed`` (q,), of Stribeck's columns and of the late ones, from parameters.
+    def coupled(self, rate: int, length: int) -> Array:
+        """What Stribeck friction still lacks after a reversal, at a node of either scale."""
+        if (rate, length) not in self._coupled:
+            bell = np.exp(-((self.windows.rate / self.stribeck.scale_of(rate)) ** 2))
+            late = self._late(self.lag.scale_of(length))
+            self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
+        return self._coupled[rate, length]
 
-        The latter two are zero where the law has no such part.
+    def coefficients(self, values: Mapping[str, Array]) -> list[Array]:
+        """Factors of ``fixed`` (q,), of Stribeck's, the late and the coupled columns.
+
+        The latter three are zero where the law has no such part.
         """
 
         known = np.array([*(float(value) for value in values.values()), 1.0, 0.0])
-        parts = [
+        return [
             signs * known[first] * known[second] * known[third]
             for signs, first, second, third in self.places(tuple(values))
         ]
-        return parts[0], parts[1], parts[2]
 
     def places(self, names: tuple[str, ...]) -> list[tuple[Array, Integers, Integers, Integers]]:
         """Signs, and the places among ``names`` of three parameters, whose product a factor is.
@@ -100,7 +110,9 @@ class FrictionBasis:
 
     @cached_property
     def factors(self) -> tuple[tuple[Product, ...], ...]:
-        """What multiplies ``fixed``, Stribeck's columns and the late ones: sign and parameters.
+        """What multiplies ``fixed``, Stribeck's, the late and the coupled columns.
+
+        A sign and the names of parameters for each.
 
         A parameter of both directions stands for either side where a law has no sides; one that a
         law lacks is zero.
@@ -117,16 +129,21 @@ class FrictionBasis:
         fixed: list[Product] = [(-1.0 if name == "delay" else 1.0, (name,)) for name in plain]
         fixed += [one for name in (*dry, *sliding) for one in placed(1.0, (name,))]
         late = [one for name in dry for one in placed(-1.0, ("presliding_share", name))]
-        return tuple(fixed), tuple(placed(1.0, ("stribeck",))), tuple(late)
+        coupled = placed(-1.0, ("presliding_share", "stribeck"))
+        return tuple(fixed), tuple(placed(1.0, ("stribeck",))), tuple(late), tuple(coupled)
 
-    def _total(
-        self, fixed: Array, stribeck: Array, late: Array, values: Mapping[str, Array]
-    ) -> Array:
+    def _total(self, factors: list[Array], values: Mapping[str, Array]) -> Array:
+        fixed, stribeck, late, coupled = factors
         total = self.fixed @ fixed
         if np.any(stribeck):
             total += self.stribeck(float(values["stribeck_rate"])) @ stribeck
         if np.any(late):
             total += self.lag(float(values["presliding_length"])) @ late
+        if np.any(coupled):
+            rate, length = float(values["stribeck_rate"]), float(values["presliding_length"])
+            rates, lengths = self.stribeck.weights(rate), self.lag.weights(length)
+            for (i, by_rate), (j, by_length) in itertools.product(rates, lengths):
+                total += by_rate * by_length * (self.coupled(i, j) @ coupled)
         return np.asarray(total)
 
     def _rigid(self) -> list[Array]:
@@ -164,7 +181,11 @@ class FrictionBasis:
         return np.column_stack(self._weigh([bell]))
 
     def _lag_at(self, length: float) -> Array:
-        """What dry friction still lacks after a reversal, relative to its level."""
+        late = self._late(length)
+        return np.column_stack(self._weigh([late * side for side in self._sides()]))
+
+    def _late(self, length: float) -> Array:
+        """What dry friction still lacks after a reversal (m,), relative to its level."""
         windows = self.windows
         ends = [*windows.starts[1:].tolist(), len(windows.opening)]
         state = np.concatenate(
@@ -173,8 +194,7 @@ class FrictionBasis:
                 for low, high in zip(windows.starts.tolist(), ends, strict=True)
             ]
         )
-        late = np.sign(windows.rate) - state
-        return np.column_stack(self._weigh([late * side for side in self._sides()]))
+        return np.asarray(np.sign(windows.rate) - state)
 
     def _weigh(self, columns: list[Array]) -> list[Array]:
         """Each column (m,) times the powers of the place, weighed (n,); one at a time."""
@@ -210,13 +230,21 @@ class ScaledColumns:
     def __call__(self, scale: float) -> Array:
         """Cubic interpolation (Lagrange) in the logarithm of ``scale``."""
         if self.last is None or self.last[0] != scale:
-            nodes = self.cell_of(float(np.log(scale)))
-            weights = self.weights_over(np.asarray(scale), nodes).tolist()
-            total = weights[0] * self.node(nodes[0])
-            for index, weight in zip(nodes[1:], weights[1:], strict=True):
+            (first, own), *others = self.weights(scale)
+            total = own * self.node(first)
+            for index, weight in others:
                 total += weight * self.node(index)
             self.last = (scale, total)
         return self.last[1]
+
+    def weights(self, scale: float) -> list[tuple[int, float]]:
+        """Nodes around a scale, and what each of them weighs."""
+        nodes = self.cell_of(float(np.log(scale)))
+        return list(zip(nodes, self.weights_over(np.asarray(scale), nodes).tolist(), strict=True))
+
+    def scale_of(self, index: int) -> float:
+        """The scale of a node."""
+        return float(np.exp(index * self.spacing))
 
     def cell_of(self, log_scale: float) -> tuple[int, ...]:
         """The four nodes around a scale's logarithm.
@@ -240,7 +268,7 @@ class ScaledColumns:
     def node(self, index: int) -> Array:
         """Columns at one node."""
         if index not in self.known:
-            self.known[index] = self.at(float(np.exp(index * self.spacing)))
+            self.known[index] = self.at(self.scale_of(index))
         return self.known[index]
 
 

@@ -8,6 +8,7 @@ depend on how much was recorded, and leaving strokes out is leaving out their pr
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,11 @@ from scissorcal.calibration.layout import Layout
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Block = tuple[str, int]
+Block = tuple[str, int, int]
 Cell = tuple[tuple[int, ...], tuple[int, ...]]
 
-MEASURED: Block = ("measured", 0)
-FIXED: Block = ("fixed", 0)
+MEASURED: Block = ("measured", 0, 0)
+FIXED: Block = ("fixed", 0, 0)
 STEP = 1e-4
 """Step in unconstrained parameters by which coefficients are differentiated."""
 MOST_BYTES = 1e8
@@ -80,8 +81,9 @@ class StrokeMoments:
     ) -> Array:
         """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
         blocks = [MEASURED, FIXED]
-        blocks += [("stribeck", index) for index in cell[0]]
-        blocks += [("lag", index) for index in cell[1]]
+        blocks += [("stribeck", index, 0) for index in cell[0]]
+        blocks += [("lag", index, 0) for index in cell[1]]
+        blocks += [("coupled", rate, length) for rate, length in product(*cell)]
         ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
         result = np.empty((*shape, ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
@@ -96,11 +98,13 @@ class StrokeMoments:
     def _columns(self, block: Block) -> Array:
         """Columns of a block, stroke after stroke."""
         if block not in self._sorted:
-            kind, index = block
+            kind, index, other = block
             if kind == "measured":
                 columns = self.measured[:, None]
             elif kind == "fixed":
                 columns = self.basis.fixed
+            elif kind == "coupled":
+                columns = self.basis.coupled(index, other)
             else:
                 scaled = self.basis.stribeck if kind == "stribeck" else self.basis.lag
                 columns = scaled.node(index)
@@ -198,19 +202,27 @@ class ReducedLaw:
         known[..., self._logs] = np.exp(u[..., self._logs])
         known[..., self._logits] = 1.0 / (1.0 + np.exp(-u[..., self._logits]))
         known[..., -1] = 0.0
-        fixed, stribeck, late = (
+        fixed, stribeck, late, coupled = (
             -signs * known[..., first] * known[..., second] * known[..., third]
             for signs, first, second, third in self.moments.basis.places(self.layout.names)
         )
         parts = [np.ones((*u.shape[:-1], 1)), fixed]
         basis = self.moments.basis
-        for place, nodes, scaled, own in zip(
-            self._scales, cell, (basis.stribeck, basis.lag), (stribeck, late), strict=True
-        ):
-            if place is not None and nodes:
-                weights = scaled.weights_over(known[..., place], nodes)
-                joined = weights[..., :, None] * own[..., None, :]
-                parts.append(joined.reshape((*u.shape[:-1], -1)))
+        each = [
+            scaled.weights_over(known[..., place], nodes)
+            for place, nodes, scaled in zip(
+                self._scales, cell, (basis.stribeck, basis.lag), strict=True
+            )
+            if place is not None and nodes
+        ]
+        owns = [own for nodes, own in zip(cell, (stribeck, late), strict=True) if nodes]
+        if len(each) == 2:
+            pairs = each[0][..., :, None] * each[1][..., None, :]
+            each.append(pairs.reshape((*u.shape[:-1], -1)))
+            owns.append(coupled)
+        for weights, own in zip(each, owns, strict=True):
+            joined = weights[..., :, None] * own[..., None, :]
+            parts.append(joined.reshape((*u.shape[:-1], -1)))
         return np.concatenate(parts, axis=-1)
 
     @cached_property

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class FrictionLaw:
     """The friction ladder's parameters; a rung leaves those it lacks at zero.
 
-    F = A(theta) {z [Fc + mu |L|] + sgn(w) [S exp(-(|w| / w_s)^2) + Fv |w|]} + terms
+    F = A(theta) {z [Fc + S exp(-(|w| / w_s)^2) + mu |L|] + sgn(w) Fv |w|} + terms
     A = 1 + a_1 (theta - c) + a_2 (theta - c)^2
     z = (1 - p) sgn(w) + p z_d,     length dz_d/dtheta = 1 - z_d sgn(w)
 
@@ -23,9 +23,10 @@ class FrictionLaw:
     blades open), ``_neg`` where it is negative. S = ``stribeck`` is what static friction exceeds
     Coulomb friction by, w_s = ``stribeck_rate`` (Armstrong-Helouvry et al. 1994,
     doi:10.1016/0005-1098(94)90209-7). mu = ``load_share`` of the load L that the joint bears.
-    After a reversal the share p = ``presliding_share`` of Coulomb friction builds up over
-    ``presliding_length`` (Dahl 1976, doi:10.2514/3.61511; see :func:`presliding_state`). Levels in
-    N m (N for a linear joint), rates in rad/s (m/s). ``terms`` are names of
+    After a reversal the share p = ``presliding_share`` of dry friction builds up over
+    ``presliding_length`` (Dahl 1976, doi:10.2514/3.61511; see :func:`presliding_state`), the
+    Stribeck part with the rest (Canudas de Wit et al. 1995, doi:10.1109/9.376053). Levels in N m
+    (N for a linear joint), rates in rad/s (m/s). ``terms`` are names of
     :data:`scissorcal.model.terms.TERMS` with their ``coefficients``; those of the rate alone count
     as levels, and A multiplies them too. Fields may be arrays that broadcast with what they are
     evaluated on.
@@ -71,9 +72,9 @@ def friction_torque(
     speed, sign = np.abs(w), np.sign(w)
     forward = w > 0
     dry = np.where(forward, law.coulomb_pos, law.coulomb_neg) + law.load_share * np.abs(borne)
-    sliding = np.where(forward, law.viscous_pos, law.viscous_neg) * speed
     if np.any(np.asarray(law.stribeck) != 0.0):
-        sliding = sliding + law.stribeck * np.exp(-((speed / law.stribeck_rate) ** 2))
+        dry = dry + law.stribeck * np.exp(-((speed / law.stribeck_rate) ** 2))
+    sliding = np.where(forward, law.viscous_pos, law.viscous_neg) * speed
     built_up = sign
     if state is not None:
         built_up = sign + law.presliding_share * (np.asarray(state, dtype=np.float64) - sign)
