@@ -26,6 +26,7 @@ from scissorcal.calibration.torque_noise import TorqueNoise
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 TURN_RAD = 3e-3
 """A turn that is undone within so much is a tremor."""
@@ -261,7 +262,7 @@ class _Builder:
         length = float(opening[free[0]] - opening[0])
         if length < LEAST_RANGE_RAD:
             return
-        begin = _left_for_good(opening, opening[0] + TURN_SHARE * length, int(free[0]))
+        begin = _left_for_good(opening, motion.standing[span], length)
         end = int(free[0])
         while end < len(opening) - 1 and opening[end] < opening[free[0]] + FREE_SHARE * length:
             end += 1
@@ -285,7 +286,8 @@ class _Builder:
             contact = np.asarray(place - advance)
             depth, lever = geometry.depth_and_lever(geometry.edge, np.asarray(turn), contact)
             length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
-            begin = low + _left_for_good(opening[low : run.high + 1], turn + TURN_SHARE * length)
+            span = slice(low, run.high + 1)
+            begin = low + _left_for_good(opening[span], motion.standing[span], length)
             ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, 3e-4))
             ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
             if len(ends) < 4:
@@ -344,10 +346,17 @@ class _Builder:
             )
 
 
-def _left_for_good(opening: Array, least: float, stop: int | None = None) -> int:
-    """First sample after the last one, before ``stop``, that lies below an opening."""
-    below = np.flatnonzero(opening[:stop] < least)
-    return int(below[-1]) + 1 if len(below) else 0
+def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
+    """First sample at which blades that turned at the first one have left it, and stay away.
+
+    ``length`` (rad) is that of the contact; blades that stand within its first half are at the turn
+    still.
+    """
+    stop = int(np.argmax(opening > opening[0] + length)) or None
+    away = opening[:stop] - opening[0]
+    there = (away < TURN_SHARE * length) | (standing[:stop] & (away < 0.5 * length))
+    last = np.flatnonzero(there)
+    return int(last[-1]) + 1 if len(last) else 0
 
 
 def free_path(

@@ -21,9 +21,10 @@ FINEST_STEP = 1e-7
 """Encoder step in rad (m) that is assumed where positions show none."""
 LEAST_PLACE_SD_M = 1e-6
 """Error of a place along the cut where the sledge's encoder shows no coarser steps."""
-STILL_S, STILL_STEPS, STILL_RAD_PER_S = 0.02, 2.0, 0.01
+STILL_S, STILL_STEPS, STILL_RAD_PER_S = 0.02, 4.0, 0.01
 """Blades stand while they turn, over such a time, by less than so many steps of the encoder or at
-less than such a rate: a tenth of the slowest stroke's."""
+less than such a rate, a tenth of the slowest stroke's. Slower than four steps in 20 ms they may
+swing back at 30 Hz by less than a step, which nobody sees."""
 RATE_WEIGHTS = np.array([-1.0, 8.0, 0.0, -8.0, 1.0]) / 12.0
 """Of five neighbouring positions, the last one first: exact for a polynomial of fourth degree."""
 HELD = 0.5
