@@ -52,7 +52,7 @@ def test_what_load_and_presliding_cost_is_told(tmp_path):
     told = " ".join(summary.warnings)
     assert "friction grows by 0.2 of the load" in told
     assert "builds up over 0.02 rad" in told
-    assert "0.012 N m too much right after one" in told
+    assert "0.018 N m too much right after one" in told
     assert package.warnings == summary.warnings
 
 

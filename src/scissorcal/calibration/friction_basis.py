@@ -15,10 +15,17 @@ from scissorcal.model.terms import TERMS, Motion, evaluate
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Product = tuple[float, tuple[str, ...]]
+Cell = tuple[tuple[int, ...], tuple[int, ...]]
+"""Nodes of Stribeck's speed and of Dahl's length that parameters lie between, four or one each."""
+
+SCALES = ("stribeck_rate", "presliding_length")
 
 RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
 """Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
 errs by 2e-4 of a level at most."""
+
+MOST_BYTES = 1e8
+"""Memory for what is late at each sample, which is made again when it is wanted again."""
 
 RIGID = 5
 """Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
@@ -57,6 +64,7 @@ class FrictionBasis:
         self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
         self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
         self._coupled: dict[tuple[int, int], Array] = {}
+        self._lateness: dict[int, Array] = {}
 
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
@@ -72,9 +80,16 @@ class FrictionBasis:
         """What Stribeck friction still lacks after a reversal, at a node of either scale."""
         if (rate, length) not in self._coupled:
             bell = np.exp(-((self.windows.rate / self.stribeck.scale_of(rate)) ** 2))
-            late = self._late(self.lag.scale_of(length))
+            late = self._late_at(length)
             self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
         return self._coupled[rate, length]
+
+    def coupled_weights(self, rates: Array, lengths: Array, cell: Cell) -> Array:
+        """Weights (..., pairs) of :func:`coupled_nodes` at two scales (...): linear in either."""
+        by_rate = self.stribeck.linear_over(rates, _inner(cell[0]))
+        by_length = self.lag.linear_over(lengths, _inner(cell[1]))
+        pairs = by_rate[..., :, None] * by_length[..., None, :]
+        return np.asarray(pairs.reshape((*np.shape(rates), -1)))
 
     def coefficients(self, values: Mapping[str, Array]) -> list[Array]:
         """Factors of ``fixed`` (q,), of Stribeck's, the late and the coupled columns.
@@ -140,10 +155,11 @@ class FrictionBasis:
         if np.any(late):
             total += self.lag(float(values["presliding_length"])) @ late
         if np.any(coupled):
-            rate, length = float(values["stribeck_rate"]), float(values["presliding_length"])
-            rates, lengths = self.stribeck.weights(rate), self.lag.weights(length)
-            for (i, by_rate), (j, by_length) in itertools.product(rates, lengths):
-                total += by_rate * by_length * (self.coupled(i, j) @ coupled)
+            rate, length = np.log([float(values[name]) for name in SCALES])
+            cell = self.stribeck.cell_of(rate), self.lag.cell_of(length)
+            weights = self.coupled_weights(np.exp(rate), np.exp(length), cell)
+            for (i, j), weight in zip(coupled_nodes(cell), weights, strict=True):
+                total += weight * (self.coupled(i, j) @ coupled)
         return np.asarray(total)
 
     def _rigid(self) -> list[Array]:
@@ -183,6 +199,14 @@ class FrictionBasis:
     def _lag_at(self, length: float) -> Array:
         late = self._late(length)
         return np.column_stack(self._weigh([late * side for side in self._sides()]))
+
+    def _late_at(self, node: int) -> Array:
+        if node not in self._lateness:
+            made = self._late(self.lag.scale_of(node))
+            if (len(self._lateness) + 1) * made.nbytes > MOST_BYTES:
+                self._lateness.clear()
+            self._lateness[node] = made
+        return self._lateness[node]
 
     def _late(self, length: float) -> Array:
         """What dry friction still lacks after a reversal (m,), relative to its level."""
@@ -230,17 +254,20 @@ class ScaledColumns:
     def __call__(self, scale: float) -> Array:
         """Cubic interpolation (Lagrange) in the logarithm of ``scale``."""
         if self.last is None or self.last[0] != scale:
-            (first, own), *others = self.weights(scale)
-            total = own * self.node(first)
-            for index, weight in others:
+            nodes = self.cell_of(float(np.log(scale)))
+            weights = self.weights_over(np.asarray(scale), nodes).tolist()
+            total = weights[0] * self.node(nodes[0])
+            for index, weight in zip(nodes[1:], weights[1:], strict=True):
                 total += weight * self.node(index)
             self.last = (scale, total)
         return self.last[1]
 
-    def weights(self, scale: float) -> list[tuple[int, float]]:
-        """Nodes around a scale, and what each of them weighs."""
-        nodes = self.cell_of(float(np.log(scale)))
-        return list(zip(nodes, self.weights_over(np.asarray(scale), nodes).tolist(), strict=True))
+    def linear_over(self, scales: Array, nodes: tuple[int, ...]) -> Array:
+        """Weights (..., nodes) of one node or of two, linear in the logarithm of ``scales``."""
+        if len(nodes) == 1:
+            return np.ones((*np.shape(scales), 1))
+        beyond = np.log(scales) / self.spacing - nodes[0]
+        return np.stack((1.0 - beyond, beyond), axis=-1)
 
     def scale_of(self, index: int) -> float:
         """The scale of a node."""
@@ -270,6 +297,19 @@ class ScaledColumns:
         if index not in self.known:
             self.known[index] = self.at(self.scale_of(index))
         return self.known[index]
+
+
+def coupled_nodes(cell: Cell) -> list[tuple[int, int]]:
+    """Pairs of nodes by which a cell's coupled columns are interpolated: the inner ones.
+
+    >>> coupled_nodes(((3, 4, 5, 6), (7,)))
+    [(4, 7), (5, 7)]
+    """
+    return list(itertools.product(_inner(cell[0]), _inner(cell[1])))
+
+
+def _inner(nodes: tuple[int, ...]) -> tuple[int, ...]:
+    return nodes[1:3] if len(nodes) == 4 else nodes
 
 
 def _cubic(t: Array) -> tuple[Array, Array, Array, Array]:

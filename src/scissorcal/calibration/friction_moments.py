@@ -8,18 +8,16 @@ depend on how much was recorded, and leaving strokes out is leaving out their pr
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_basis import FrictionBasis
+from scissorcal.calibration.friction_basis import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.layout import Layout
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Block = tuple[str, int, int]
-Cell = tuple[tuple[int, ...], tuple[int, ...]]
 
 MEASURED: Block = ("measured", 0, 0)
 FIXED: Block = ("fixed", 0, 0)
@@ -83,7 +81,7 @@ class StrokeMoments:
         blocks = [MEASURED, FIXED]
         blocks += [("stribeck", index, 0) for index in cell[0]]
         blocks += [("lag", index, 0) for index in cell[1]]
-        blocks += [("coupled", rate, length) for rate, length in product(*cell)]
+        blocks += [("coupled", rate, length) for rate, length in coupled_nodes(cell)]
         ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
         result = np.empty((*shape, ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
@@ -208,19 +206,18 @@ class ReducedLaw:
         )
         parts = [np.ones((*u.shape[:-1], 1)), fixed]
         basis = self.moments.basis
-        each = [
-            scaled.weights_over(known[..., place], nodes)
-            for place, nodes, scaled in zip(
-                self._scales, cell, (basis.stribeck, basis.lag), strict=True
+        scales = [None if place is None else known[..., place] for place in self._scales]
+        weighed = [
+            (scaled.weights_over(scale, nodes), own)
+            for scale, nodes, scaled, own in zip(
+                scales, cell, (basis.stribeck, basis.lag), (stribeck, late), strict=True
             )
-            if place is not None and nodes
+            if scale is not None and nodes
         ]
-        owns = [own for nodes, own in zip(cell, (stribeck, late), strict=True) if nodes]
-        if len(each) == 2:
-            pairs = each[0][..., :, None] * each[1][..., None, :]
-            each.append(pairs.reshape((*u.shape[:-1], -1)))
-            owns.append(coupled)
-        for weights, own in zip(each, owns, strict=True):
+        rate, length = scales
+        if rate is not None and length is not None:
+            weighed.append((basis.coupled_weights(rate, length, cell), coupled))
+        for weights, own in weighed:
             joined = weights[..., :, None] * own[..., None, :]
             parts.append(joined.reshape((*u.shape[:-1], -1)))
         return np.concatenate(parts, axis=-1)
@@ -229,10 +226,7 @@ class ReducedLaw:
     def _scales(self) -> tuple[int | None, int | None]:
         """Places of Stribeck's speed and Dahl's length among the parameters."""
         names = self.layout.names
-        rate, length = (
-            names.index(name) if name in names else None
-            for name in ("stribeck_rate", "presliding_length")
-        )
+        rate, length = (names.index(name) if name in names else None for name in SCALES)
         return rate, length
 
     @cached_property

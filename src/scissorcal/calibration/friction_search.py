@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_moments import Cell, ReducedLaw
+from scissorcal.calibration.friction_basis import Cell
+from scissorcal.calibration.friction_moments import ReducedLaw
 from scissorcal.inference.optimise import Cluster, Optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked

@@ -83,6 +83,7 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     if sudden:
         length = float(np.asarray(law.presliding_length))
         dry = float(max(np.asarray(law.coulomb_pos), np.asarray(law.coulomb_neg)))
+        dry += float(np.asarray(law.stribeck))
         said.append(
             f"fit.friction, presliding: after a reversal friction builds up over {length:.2g} rad, "
             f"and the package renders it built up at once: {2 * sudden * dry:.2g} N m too much "
