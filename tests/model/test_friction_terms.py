@@ -92,3 +92,19 @@ def test_the_unit_of_a_coefficient_makes_an_effort(name):
 
 def test_a_recipe_may_adopt_every_term_that_is_friction():
     assert set(get_args(FrictionTerm)) == {t.name for t in TERMS.values() if t.adoptable}
+
+
+def test_all_dry_friction_builds_up_after_a_reversal_and_the_viscous_part_is_there_at_once():
+    """A bristle that is not bent yet bears neither Coulomb nor Stribeck friction."""
+    law = FrictionLaw(
+        coulomb_pos=0.010,
+        viscous_pos=0.002,
+        stribeck=0.004,
+        stribeck_rate=0.1,
+        presliding_share=0.8,
+    )
+    dry, viscous = 0.010 + 0.004 * np.exp(-1.0), 0.002 * 0.1
+    for state in (-1.0, 0.0, 1.0):
+        built_up = 0.2 + 0.8 * state
+        expected = built_up * dry + viscous
+        assert friction_torque(law, 0.0, 0.1, 0.0, state) == pytest.approx(expected, rel=1e-12)
