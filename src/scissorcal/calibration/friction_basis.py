@@ -27,6 +27,10 @@ errs by 2e-4 of a level at most."""
 MOST_BYTES = 1e8
 """Memory for what is late at each sample, which is made again when it is wanted again."""
 
+COARSER = 3
+"""Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
+2 % of Stribeck's level at worst, right after a reversal, and by 0.1 % (rms) over empty sweeps."""
+
 RIGID = 5
 """Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
 
@@ -77,17 +81,18 @@ class FrictionBasis:
         return self._total(self.coefficients(values), values)
 
     def coupled(self, rate: int, length: int) -> Array:
-        """What Stribeck friction still lacks after a reversal, at a node of either scale."""
+        """What Stribeck friction still lacks after a reversal, at every third node of a scale."""
         if (rate, length) not in self._coupled:
-            bell = np.exp(-((self.windows.rate / self.stribeck.scale_of(rate)) ** 2))
-            late = self._late_at(length)
+            scale = self.stribeck.scale_of(COARSER * rate)
+            bell = np.exp(-((self.windows.rate / scale) ** 2))
+            late = self._late_at(COARSER * length)
             self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
         return self._coupled[rate, length]
 
     def coupled_weights(self, rates: Array, lengths: Array, cell: Cell) -> Array:
         """Weights (..., pairs) of :func:`coupled_nodes` at two scales (...): linear in either."""
-        by_rate = self.stribeck.linear_over(rates, _inner(cell[0]))
-        by_length = self.lag.linear_over(lengths, _inner(cell[1]))
+        by_rate = self.stribeck.linear_over(rates, _around(cell[0]))
+        by_length = self.lag.linear_over(lengths, _around(cell[1]))
         pairs = by_rate[..., :, None] * by_length[..., None, :]
         return np.asarray(pairs.reshape((*np.shape(rates), -1)))
 
@@ -263,10 +268,10 @@ class ScaledColumns:
         return self.last[1]
 
     def linear_over(self, scales: Array, nodes: tuple[int, ...]) -> Array:
-        """Weights (..., nodes) of one node or of two, linear in the logarithm of ``scales``."""
-        if len(nodes) == 1:
-            return np.ones((*np.shape(scales), 1))
-        beyond = np.log(scales) / self.spacing - nodes[0]
+        """Weights (..., nodes) of two coarser nodes or none, linear in the scales' logarithm."""
+        if not nodes:
+            return np.ones((*np.shape(scales), 0))
+        beyond = np.log(scales) / (COARSER * self.spacing) - nodes[0]
         return np.stack((1.0 - beyond, beyond), axis=-1)
 
     def scale_of(self, index: int) -> float:
@@ -300,16 +305,21 @@ class ScaledColumns:
 
 
 def coupled_nodes(cell: Cell) -> list[tuple[int, int]]:
-    """Pairs of nodes by which a cell's coupled columns are interpolated: the inner ones.
+    """Pairs of coarser nodes by which a cell's coupled columns are interpolated.
 
-    >>> coupled_nodes(((3, 4, 5, 6), (7,)))
-    [(4, 7), (5, 7)]
+    A scan for starts, whose cells have one node of each scale, goes without.
+
+    >>> coupled_nodes(((3, 4, 5, 6), (7, 8, 9, 10)))
+    [(1, 2), (1, 3), (2, 2), (2, 3)]
+    >>> coupled_nodes(((3,), (7,)))
+    []
     """
-    return list(itertools.product(_inner(cell[0]), _inner(cell[1])))
+    return list(itertools.product(_around(cell[0]), _around(cell[1])))
 
 
-def _inner(nodes: tuple[int, ...]) -> tuple[int, ...]:
-    return nodes[1:3] if len(nodes) == 4 else nodes
+def _around(nodes: tuple[int, ...]) -> tuple[int, ...]:
+    """The coarser nodes around the inner ones of a cell, none of a single node."""
+    return (nodes[1] // COARSER, nodes[1] // COARSER + 1) if len(nodes) == 4 else ()
 
 
 def _cubic(t: Array) -> tuple[Array, Array, Array, Array]:
