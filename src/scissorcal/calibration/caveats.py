@@ -75,8 +75,8 @@ def _coarse(fit: FitResult) -> bool:
 def _coarse_words(fit: FitResult) -> str:
     counts = fit.diagnostics["counts_per_sample"]
     return (
-        f"{counts:.2g} encoder counts per sample: on 24 virtual days with so few, 90 % intervals "
-        "held force and exponent in 15 and 16, fracture energy and kappa in 19. Use a finer "
+        f"{counts:.2g} encoder counts per sample: on 40 virtual days with so few, 90 % intervals "
+        "held force and exponent in 31 and 30, fracture energy and kappa in 35 and 34. Use a finer "
         "encoder."
     )
 
@@ -88,9 +88,9 @@ def _long_windows(fit: FitResult) -> bool:
 def _long_windows_words(fit: FitResult) -> str:
     times = float(fit.diagnostics["window_lengthening"])
     return (
-        f"{times:.2g} times longer windows were needed, because the encoder is coarse: on 12 "
-        "virtual days with such windows 90 % intervals held the inertia in 4 and the Stribeck "
-        "level in 3. Use a finer encoder."
+        f"{times:.2g} times longer windows were needed, because the encoder is coarse: on 20 "
+        "virtual days with such windows 90 % intervals held the inertia in 17, the Stribeck level "
+        "in 10 and its speed in 13. Use a finer encoder."
     )
 
 
@@ -115,7 +115,7 @@ def _spline_words(fit: FitResult) -> str:
 
 _ROWS = (
     _Row(_coarse, (*RESPONSE, "fracture_energy", "toughness", "kappa"), _coarse_words),
-    _Row(_long_windows, ("inertia", "stribeck", "presliding_*"), _long_windows_words),
+    _Row(_long_windows, ("stribeck", "stribeck_rate", "presliding_*"), _long_windows_words),
     _Row(_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
     _Row(
         lambda fit: fit.structure.get("response") == "spline",
