@@ -27,9 +27,9 @@ errs by 2e-4 of a level at most."""
 MOST_BYTES = 1e8
 """Memory for what is late at each sample, which is made again when it is wanted again."""
 
-COARSER = 3
+COARSER = 2
 """Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
-2 % of Stribeck's level at worst, right after a reversal, and by 0.1 % (rms) over empty sweeps."""
+2.5 % of what Stribeck friction lacks at worst, and by 0.1 % of its level (rms) over empty sweeps."""
 
 RIGID = 5
 """Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
@@ -81,7 +81,7 @@ class FrictionBasis:
         return self._total(self.coefficients(values), values)
 
     def coupled(self, rate: int, length: int) -> Array:
-        """What Stribeck friction still lacks after a reversal, at every third node of a scale."""
+        """What Stribeck friction still lacks after a reversal, at every other node of a scale."""
         if (rate, length) not in self._coupled:
             scale = self.stribeck.scale_of(COARSER * rate)
             bell = np.exp(-((self.windows.rate / scale) ** 2))
@@ -310,7 +310,7 @@ def coupled_nodes(cell: Cell) -> list[tuple[int, int]]:
     A scan for starts, whose cells have one node of each scale, goes without.
 
     >>> coupled_nodes(((3, 4, 5, 6), (7, 8, 9, 10)))
-    [(1, 2), (1, 3), (2, 2), (2, 3)]
+    [(2, 4), (2, 5), (3, 4), (3, 5)]
     >>> coupled_nodes(((3,), (7,)))
     []
     """

@@ -12,7 +12,8 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.verdicts import Status, Verdict
 
-K_HAT_LIMIT = 0.7
+K_HAT_LIMIT, ADAPTED_LIMIT = 0.7, 0.5
+"""k-hat that the weights of draws may have, and those of draws from an adapted proposal."""
 PRIOR_ONLY = 0.9
 """A posterior at least this share of its prior's width says that the data are silent."""
 FEWEST_INDEPENDENT = 10.0
@@ -97,7 +98,9 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
     if posterior.ensembles:
         # what decides then is in the sentence; k-hat is of a proposal that was not used
         return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
-    return Verdict(scope, "k-hat", status, k, K_HAT_LIMIT, posterior.sentence)
+    adapted = status == "fail" and k is not None and k <= K_HAT_LIMIT
+    limit = ADAPTED_LIMIT if adapted else K_HAT_LIMIT
+    return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
 
 
 def _bounds(scope: str, chosen: Climbed) -> Verdict:

@@ -11,6 +11,7 @@ from scissorcal.calibration.friction_basis import FrictionBasis
 from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
+from scissorcal.model.friction import angle_factor
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 
@@ -93,6 +94,7 @@ def law_and_values(rng) -> tuple[FrictionLaw, dict[str, float]]:
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_basis_is_the_law_at_every_sample_and_weighed(seed):
+    """To 1e-4 of the largest, and 2.5 % of what Stribeck friction lacks after a reversal."""
     rng = np.random.default_rng(seed)
     time = np.arange(3000) / 1000
     opening = 0.5 + 0.3 * np.sin(3 * time) + 0.1 * np.sin(11 * time)
@@ -103,7 +105,10 @@ def test_the_basis_is_the_law_at_every_sample_and_weighed(seed):
     exact = friction_torque(law, windows.opening, windows.rate, windows.load, state)
     basis = FrictionBasis(windows, 0.4, angle=True, terms=("rate^2", "sin(opening)"))
     found = basis({name: np.asarray(value) for name, value in values.items()})
-    assert found == pytest.approx(windows.average(exact), abs=1e-4 * np.abs(exact).max())
+    coupled = values["presliding_share"] * values["stribeck"]
+    coupled *= np.abs(angle_factor(law, windows.opening)).max()
+    allowed = 1e-4 * np.abs(exact).max() + 0.025 * coupled
+    assert found == pytest.approx(windows.average(exact), abs=allowed)
 
 
 def test_windows_that_hold_a_rest_or_a_turn_do_not_count():
