@@ -29,7 +29,7 @@ MOST_BYTES = 1e8
 
 COARSER = 2
 """Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
-2.5 % of what Stribeck friction lacks at worst, and by 0.1 % of its level (rms) over empty sweeps."""
+2.5 % of what Stribeck friction lacks at worst, by 0.1 % of its level (rms) over empty sweeps."""
 
 RIGID = 5
 """Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
