@@ -32,8 +32,9 @@ TURN_RAD = 3e-3
 """A turn that is undone within so much is a tremor."""
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
-LEAST_SEGMENT_COUNTS = 6.0
-"""An elastic segment spans at least so many steps of the encoder."""
+LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
+"""An elastic segment spans at least so many steps of the encoder; so many in a piece that would
+else have too few segments."""
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Running segments hold so many teeth at least: in shorter ones the teeth themselves pass for
 unevenness of a short range, which takes the long range's place and makes intervals too narrow."""
@@ -43,7 +44,7 @@ RUNNING_FROM = 1.6
 """Indentation, in critical ones, a standing crack would have where a running one is trusted."""
 FREE_SHARE = 0.4
 """What a piece has of the way without contact, in lengths of its contact: it tells the offset."""
-TURN_SHARE = 0.03
+TURN_SHARE, STANDING_SHARE = 0.03, 0.25
 FEWEST_SEGMENTS = 5
 LEAST_TORQUE_SDS = 5.0
 LEAST_RANGE_RAD = 1e-3
@@ -305,6 +306,8 @@ class _Builder:
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
         step = max(length / ELASTIC_SEGMENTS, LEAST_SEGMENT_COUNTS * motion.resolution)
+        fewest = abs(float(motion.opening[high] - motion.opening[low])) / (FEWEST_SEGMENTS + 0.5)
+        step = min(step, max(fewest, SHORT_SEGMENT_COUNTS * motion.resolution))
         ends = split(motion.opening, low, high, step)
         if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):
             return
@@ -349,12 +352,12 @@ class _Builder:
 def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
     """First sample at which blades that turned at the first one have left it, and stay away.
 
-    ``length`` (rad) is that of the contact; blades that stand within its first half are at the turn
-    still.
+    ``length`` (rad) is that of the contact; blades that stand within its first quarter are at the
+    turn still.
     """
     stop = int(np.argmax(opening > opening[0] + length)) or None
     away = opening[:stop] - opening[0]
-    there = (away < TURN_SHARE * length) | (standing[:stop] & (away < 0.5 * length))
+    there = (away < TURN_SHARE * length) | (standing[:stop] & (away < STANDING_SHARE * length))
     last = np.flatnonzero(there)
     return int(last[-1]) + 1 if len(last) else 0
 
