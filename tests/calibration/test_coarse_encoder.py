@@ -53,8 +53,7 @@ def test_intervals_of_friction_hold_with_a_fine_encoder():
 
 @pytest.mark.slow
 def test_a_coarse_encoder_shows_cogging_and_leaves_the_inertia_a_little_low():
-    """20,000 counts a turn, four days: cogging is found on three, and the inertia, which
-    docs/uncertainty.md calls poor, is within 10 %: 5 to 8 % low by the law of draft effort."""
+    """20,000 counts a turn, four days: cogging is found on three, the inertia within 10 %."""
     errors, cogging = [], []
     for seed in range(610, 614):
         fit, truth = fitted(coarse(), seed)

@@ -10,10 +10,10 @@ from scissorcal.calibration.ladder import SEARCH_REACH, Climbed
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
+from scissorcal.inference.importance import ADAPTED_LIMIT
+from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
 from scissorcal.verdicts import Status, Verdict
 
-K_HAT_LIMIT, ADAPTED_LIMIT = 0.7, 0.5
-"""k-hat that the weights of draws may have, and those of draws from an adapted proposal."""
 PRIOR_ONLY = 0.9
 """A posterior at least this share of its prior's width says that the data are silent."""
 FEWEST_INDEPENDENT = 10.0

@@ -45,6 +45,8 @@ RUNNING_FROM = 1.6
 FREE_SHARE = 0.4
 """What a piece has of the way without contact, in lengths of its contact: it tells the offset."""
 TURN_SHARE, STANDING_SHARE = 0.03, 0.25
+"""Shares of the contact's length that are left out after a turn: in any case, and where the blades
+stand, whose friction may have either sign."""
 FEWEST_SEGMENTS = 5
 LEAST_TORQUE_SDS = 5.0
 LEAST_RANGE_RAD = 1e-3

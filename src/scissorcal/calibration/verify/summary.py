@@ -26,11 +26,11 @@ from scissorcal.calibration.verify.uniformity import (
     ecdf_p_value,
 )
 from scissorcal.inference import gradient
+from scissorcal.inference.importance import K_HAT_LIMIT
 
 Array = NDArray[np.float64]
 
 COVERAGE_LEVELS = (0.5, 0.9)
-K_HAT_LIMIT = 0.7
 RUNGS = ("draft", "standard", "thorough")
 SLOPE_STEP = 1e-3
 """Step of the effort's derivatives, in standard deviations of the difference of halves."""
