@@ -45,30 +45,31 @@ def _pieces(rng, q):
     whiteners = [_whitener(rng, count) for count in lengths]
     depth = []
     for _, closing, count in PIECES:
-        way = np.linspace(-1.5e-4, 6e-4, 2 * count)
-        depth.append(way if closing else way[::-1])
+        way = np.linspace(-1.5e-4, 6e-4, count + 1)
+        way = way if closing else way[::-1]
+        depth.append(np.stack([way[:-1], way[1:]], axis=1))
     depth = np.concatenate(depth)
     n = len(depth)
     lever = rng.uniform(0.02, 0.05, n)
     side = np.concatenate(
         [np.full(count, -1.0 if closing else 1.0) for _, closing, count in PIECES]
     )
-    held = 0.66 * np.maximum(depth / REFERENCE_M, 0.0) ** 1.6 * lever
+    held = 0.66 * np.maximum(depth / REFERENCE_M, 0.0).mean(axis=1) ** 1.6 * lever
     return {
         "piece_first": _starts(lengths),
         "piece_rest": rest,
         "piece_closing": np.array([closing for _, closing, _ in PIECES], dtype=np.int32),
         "white_first": _starts([len(w) for w in whiteners])[:-1],
         "whitener": np.concatenate(whiteners),
-        "torque": held.reshape(-1, 2).mean(axis=1) + 3e-3 * rng.standard_normal(n // 2),
-        "late": 1e-3 * rng.standard_normal(n // 2),
-        "direction": side * rng.uniform(0.4, 1.0, n // 2),
-        "depth": depth,
-        "depth_dx": -rng.uniform(0.2, 0.4, n),
+        "torque": held + 3e-3 * rng.standard_normal(n),
+        "late": 1e-3 * rng.standard_normal(n),
+        "direction": side * rng.uniform(0.4, 1.0, n),
+        "depth": depth.ravel(),
+        "depth_dx": -rng.uniform(0.2, 0.4, 2 * n),
         "lever": lever,
         "lever_dx": rng.uniform(0.9, 1.2, n),
         "sinking": 5e-3 * rng.standard_normal(n),
-        "depth_de": 0.5 * rng.standard_normal(n * q),
+        "depth_de": 0.5 * rng.standard_normal(2 * n * q),
         "lever_de": 0.3 * rng.standard_normal(n * q),
     }
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.model import Edge, EdgeBelief
+from scissorcal.model import Edge, EdgeBelief, Response
 from tests.calibration.truth import Truth
 
 TRUTH = Truth()
@@ -48,24 +48,63 @@ def test_a_place_has_the_indentation_that_was_asked_for(edge, moving):
 
 
 @pytest.mark.parametrize("edge", [LINE, ARC], ids=["line", "arc"])
-def test_nodes_are_expanded_as_differences_say(edge):
+@pytest.mark.parametrize("moving", [1, 2])
+@pytest.mark.parametrize("exponent", [0.4, 0.8, 1.5, 2.5])
+@pytest.mark.parametrize("sledge", [-0.05, 0.0, 0.05], ids=["back", "still", "ahead"])
+def test_lever_and_mean_force_give_the_mean_torque(edge, moving, exponent, sledge):
+    """Against 20,001 points of a segment, whose sledge moves by ``sledge`` m for each rad.
+
+    Exact where the sledge stands, in contact or with any part of the path in the air; where it
+    moves, the levers of the path in the air count along.
+    """
+    shape = geometry(edge, moving=moving)
+    response = Response("power", 5.0, exponent, shape.reference_m)
+    limit = 1.3e-2 if sledge else 3e-6
+    for deepest in (2e-5, 6e-5, 4e-4):
+        turned = 3e-3
+        contact = float(shape.place(0.3, deepest))
+        opening = np.array([[0.3, 0.3 + turned]])
+        ends = np.array([[contact, contact - sledge * turned]])
+        span = shape.spans(opening, np.array([0.5]), ends)
+        stored = [float(response.energy_at(d)) if d > 0 else 0.0 for d in span.depth[0]]
+        force = (stored[1] - stored[0]) / float(np.diff(span.depth[0])[0])
+        way = np.linspace(0.0, 1.0, 20001)
+        depth, lever = shape.depth_and_lever(
+            edge, 0.3 + turned * way, contact - sledge * turned * way
+        )
+        torque = np.where(depth > 0, response.force_at(np.maximum(depth, 1e-12)), 0.0) * lever
+        assert force * span.lever[0] == pytest.approx(np.trapezoid(torque, way), rel=limit)
+
+
+@pytest.mark.parametrize("edge", [LINE, ARC], ids=["line", "arc"])
+def test_segments_are_expanded_as_differences_say(edge):
     """Places by 0.1 mm, edges by 20 um and 0.5 mrad: errors are of second order."""
     shape = geometry(edge)
-    contact = shape.place(OPENING, 3e-4)
+    opening = np.stack([OPENING, OPENING - 5e-3], axis=1)
+    contact = shape.place(OPENING, 3e-4)[:, None] + np.array([0.0, 1e-4])
     rate = np.full(7, -0.5)
-    nodes = shape.nodes(OPENING, rate, contact)
+    spans = shape.spans(opening, rate, contact)
     moved = 1e-4
-    depth, lever = shape.depth_and_lever(edge, OPENING, contact + moved)
-    assert nodes.depth + nodes.depth_dx * moved == pytest.approx(depth, abs=3e-8)
-    assert nodes.lever + nodes.lever_dx * moved == pytest.approx(lever, abs=1e-7)
+    other = shape.spans(opening, rate, contact + moved)
+    assert spans.depth + spans.depth_dx * moved == pytest.approx(other.depth, abs=3e-8)
+    assert spans.lever + spans.lever_dx * moved == pytest.approx(other.lever, abs=1e-7)
     away = np.array([2e-5, 5e-4])
-    other = shape.belief.with_values(shape.belief.mean + away)
-    depth, lever = shape.depth_and_lever(other, OPENING, contact)
-    assert nodes.depth + nodes.depth_de @ away == pytest.approx(depth, abs=2e-8)
-    assert nodes.lever + nodes.lever_de @ away == pytest.approx(lever, abs=1e-7)
-    later, _ = shape.depth_and_lever(edge, OPENING + 1e-6 * rate, contact)
-    sinking = (later - nodes.depth) / 1e-6
-    assert nodes.sinking == pytest.approx(sinking, rel=1e-3)
+    edge_off = shape.belief.with_values(shape.belief.mean + away)
+    other = geometry(edge_off).spans(opening, rate, contact)
+    assert spans.depth + spans.depth_de @ away == pytest.approx(other.depth, abs=2e-8)
+    assert spans.lever + spans.lever_de @ away == pytest.approx(other.lever, abs=1e-7)
+    middle, where = opening.mean(axis=1), contact.mean(axis=1)
+    depth, _ = shape.depth_and_lever(edge, middle, where)
+    later, _ = shape.depth_and_lever(edge, middle + 1e-6 * rate, where)
+    assert spans.sinking == pytest.approx((later - depth) / 1e-6, rel=1e-3)
+
+
+def test_equation_4_has_the_mean_of_its_levers():
+    shape = geometry(LINE, closure="eq4")
+    opening = np.array([[0.3, 0.31]])
+    contact = np.array([[0.03, 0.031]])
+    _, levers = shape.depth_and_lever(LINE, opening, contact)
+    assert shape.spans(opening, np.zeros(1), contact).lever == pytest.approx(levers.mean())
 
 
 @pytest.mark.parametrize("edge", [LINE, ARC], ids=["line", "arc"])
@@ -87,5 +126,6 @@ def test_running_cracks_are_expanded_as_differences_say(edge):
 
 
 def test_a_belief_without_parameters_has_no_derivatives():
-    nodes = geometry(names=()).nodes(OPENING, np.zeros(7), np.full(7, 0.03))
-    assert nodes.depth_de.size == 0
+    opening = np.stack([OPENING, OPENING + 0.01], axis=1)
+    spans = geometry(names=()).spans(opening, np.zeros(7), np.full((7, 2), 0.03))
+    assert spans.depth_de.size == 0

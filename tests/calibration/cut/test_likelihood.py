@@ -77,12 +77,13 @@ def test_places_of_rests_are_where_the_density_is_highest():
         """Least squares of one rest, from a density whose rests are all known at their places."""
         here = places.copy()
         here[rest] = place
+        moved = _by_segment(data, here - data.rest_place)
         known = replace(
             data,
             rest_known=np.ones(3, dtype=np.int32),
             rest_place=np.zeros(3),
-            depth=data.depth + data.depth_dx * _by_node(data, here - data.rest_place),
-            lever=data.lever + data.lever_dx * _by_node(data, here - data.rest_place),
+            depth=data.depth + data.depth_dx * np.repeat(moved, 2),
+            lever=data.lever + data.lever_dx * moved,
         )
         return cut_log_likelihood(known, given)[0]
 
@@ -157,9 +158,8 @@ def test_no_sheet_and_no_rest_are_allowed():
     assert max(found.values()) < 1e-9
 
 
-def _by_node(data, by_rest):
-    segments = np.repeat(by_rest[data.piece_rest], np.diff(data.piece_first))
-    return np.repeat(segments, 2)
+def _by_segment(data, by_rest):
+    return np.repeat(by_rest[data.piece_rest], np.diff(data.piece_first))
 
 
 def _belief(data, given, rest):

@@ -113,29 +113,28 @@ def _damped(damping: float, sinking: Array) -> Array:
 
 def _held_torque(data: CutFitData, given: CutFitParameters, table: Table, moved: Array):
     """Mean torque (k,) of each elastic segment and its derivative by the crack's place."""
-    q = data.edge_count
-    node_moved = np.repeat(moved, 2)
-    depth = (
-        data.depth
-        + data.depth_dx * node_moved
-        + data.depth_de.reshape(len(data.depth), q) @ given.edge
-    )
-    lever = (
-        data.lever
-        + data.lever_dx * node_moved
-        + data.lever_de.reshape(len(data.lever), q) @ given.edge
-    )
-    pairs = data.depth.reshape(-1, 2)
-    span = np.repeat(0.25 * np.sqrt(3.0) * np.abs(pairs[:, 1] - pairs[:, 0]), 2)
-    share = np.clip((depth + span) / (2.0 * span), 0.0, 1.0)
-    depth = np.where(np.abs(depth) < span, span * share**2, np.maximum(depth, 0.0))
-    force, by_place = np.zeros(len(depth)), np.zeros(len(depth))
-    for i in np.flatnonzero(depth > 1e-12):
-        log_force, power = table.log_force(float(np.log(depth[i])))
-        force[i] = np.exp(log_force) * _damped(given.damping, data.sinking[i])
-        sinking = share[i] * data.depth_dx[i]
-        by_place[i] = force[i] * (power / depth[i] * sinking * lever[i] + data.lever_dx[i])
-    return (force * lever).reshape(-1, 2).mean(axis=1), by_place.reshape(-1, 2).mean(axis=1)
+    q, n = data.edge_count, len(data.lever)
+    by_x, by_edge = data.depth_dx.reshape(n, 2), data.depth_de.reshape(n, 2, q)
+    depth = data.depth.reshape(n, 2) + by_x * moved[:, None] + by_edge @ given.edge
+    lever = data.lever + data.lever_dx * moved + data.lever_de.reshape(n, q) @ given.edge
+    torque, slope = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        way = depth[k, 1] - depth[k, 0]
+        (low, at_low), (high, at_high) = (_stored(table, d) for d in depth[k])
+        force = (high - low) / way
+        rising = (at_high - force) / way * by_x[k, 1] + (force - at_low) / way * by_x[k, 0]
+        factor = _damped(given.damping, data.sinking[k])
+        torque[k] = factor * force * lever[k]
+        slope[k] = factor * (rising * lever[k] + force * data.lever_dx[k])
+    return torque, slope
+
+
+def _stored(table: Table, depth: float) -> tuple[float, float]:
+    """Energy at a depth, and its derivative."""
+    if depth <= 1e-12:
+        return 0.0, 0.0
+    log_energy, growth = table.energy(float(np.log(depth)))
+    return float(np.exp(log_energy)), float(np.exp(log_energy) * growth / depth)
 
 
 def beliefs(data: CutFitData, given: CutFitParameters, table: Table):

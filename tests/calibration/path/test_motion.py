@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from scissorcal.calibration.path import (
+    advance_line,
     material_of,
     mean_advance,
     mean_torque,
@@ -118,6 +119,16 @@ def test_the_mean_advance_is_that_over_the_path():
     moved = np.where(np.arange(len(way)) < len(way) - 300, 0.01, 0.02)
     mean = mean_advance(replace(motion, advance=moved), np.array([100, len(way) - 1]))
     assert mean == pytest.approx([0.01], abs=1e-4)
+
+
+def test_the_advance_at_the_ends_is_on_the_line_along_the_path():
+    """By steps of 10 um, a sledge that goes 0.05 m a rad: within a tenth of a step at the ends."""
+    motion = motion_of(record(sweep(0.6, 0.5, 0.2), spring))
+    advance = 0.03 + np.round(0.05 * (0.6 - motion.opening) / 1e-5) * 1e-5
+    ends = np.array([100, 220, 340])
+    line = advance_line(replace(motion, advance=advance), ends)
+    true = 0.03 + 0.05 * (0.6 - motion.opening[ends])
+    assert line == pytest.approx(np.stack([true[:-1], true[1:]], axis=1), abs=1e-6)
 
 
 def test_cogging_and_offset_are_taken_off():

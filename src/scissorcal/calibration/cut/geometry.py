@@ -18,11 +18,12 @@ EDGE_STEP_SDS = 0.1
 
 
 @dataclass(frozen=True)
-class Nodes:
-    """Indentation and lever at places (k,), and their derivatives by the crack's place and edge.
+class Spans:
+    """Indentation at both ends of segments (k, 2), lever of each (k,), and their derivatives.
 
-    ``depth_de`` and ``lever_de`` (k, q) are by the believed parameters of the edge. ``sinking``
-    (m/s) is how fast the edge sinks in.
+    ``_dx`` are by the crack's place, ``_de`` (k, 2, q) and (k, q) by the believed parameters of the
+    edge. The lever times the response's mean over the depths between the ends is the mean torque.
+    ``sinking`` (k,) in m/s is how fast the edge sinks in.
     """
 
     depth: Array
@@ -99,26 +100,25 @@ class Geometry:
                 break
         return np.asarray(station * cosine - edge.offset_at(station) * sine)
 
-    def nodes(self, opening: Array, rate: Array, contact: Array) -> Nodes:
-        """Expand about contacts (k,), at openings (k,) that change at ``rate`` (k,)."""
-        depth, lever = self.depth_and_lever(self.edge, opening, contact)
-        ahead = self.depth_and_lever(self.edge, opening, contact + STEP_M)
-        behind = self.depth_and_lever(self.edge, opening, contact - STEP_M)
-        by_edge = [
-            self.depth_and_lever(self.edge_off(i, 1), opening, contact) for i in self._believed
+    def spans(self, opening: Array, rate: Array, contact: Array) -> Spans:
+        """Expand segments about contacts (k, 2) at openings (k, 2), gone at ``rate`` (k,)."""
+        depth, lever = self._depths_and_lever(self.edge, opening, contact)
+        ahead = self._depths_and_lever(self.edge, opening, contact + STEP_M)
+        behind = self._depths_and_lever(self.edge, opening, contact - STEP_M)
+        pairs = [
+            [self._depths_and_lever(self.edge_off(i, s), opening, contact) for s in (1, -1)]
+            for i in self._believed
         ]
-        below = [
-            self.depth_and_lever(self.edge_off(i, -1), opening, contact) for i in self._believed
-        ]
-        arm = edge_height(self.edge, contact, opening / self.moving_blades).lever
-        return Nodes(
+        middle = 0.5 * opening.sum(axis=1) / self.moving_blades
+        arm = edge_height(self.edge, 0.5 * contact.sum(axis=1), middle).lever
+        return Spans(
             depth=depth,
             depth_dx=(ahead[0] - behind[0]) / (2 * STEP_M),
             lever=lever,
             lever_dx=(ahead[1] - behind[1]) / (2 * STEP_M),
             sinking=-arm * rate / self.moving_blades,
-            depth_de=self._by_edge([a[0] - b[0] for a, b in zip(by_edge, below, strict=True)]),
-            lever_de=self._by_edge([a[1] - b[1] for a, b in zip(by_edge, below, strict=True)]),
+            depth_de=self._by_edge([a[0] - b[0] for a, b in pairs]),
+            lever_de=self._by_edge([a[1] - b[1] for a, b in pairs]),
         )
 
     def running(self, opening: Array) -> Running:
@@ -150,6 +150,20 @@ class Geometry:
         values = self.belief.mean.copy()
         values[index] += sign * self._edge_steps[index]
         return self.belief.with_values(values)
+
+    def _depths_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
+        """Depths (k, 2) at the ends of segments, and the lever (k,) of each.
+
+        Torque is -dE/d(theta) of the stored energy E = m G(delta), so that mean force times
+        -m d(delta)/d(theta) is the mean torque; the difference is taken with the contact held, at
+        either end. Equation 4 has no energy: the mean of its two levers stands there.
+        """
+        depth, lever = self.depth_and_lever(edge, opening, contact)
+        if self.closure == "eq4":
+            return depth, lever.mean(axis=1)
+        crossed, _ = self.depth_and_lever(edge, opening, contact[:, ::-1])
+        sunk = 0.5 * (depth[:, 1] - crossed[:, 0] + crossed[:, 1] - depth[:, 0])
+        return depth, -self.moving_blades * sunk / np.diff(opening)[:, 0]
 
     @property
     def _believed(self) -> range:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.calibration.path import mean_advance
+from scissorcal.calibration.path import advance_line, mean_advance
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,
@@ -21,7 +21,6 @@ from scissorcal.model import Response
 
 Array = NDArray[np.float64]
 
-GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
 """Knots of the response's table, evenly in the logarithm of the indentation from and to so many
@@ -122,22 +121,13 @@ class CutLikelihood:
     def _elastic(self) -> dict[str, Any]:
         segments, geometry = self.segments, self.geometry
         pieces = segments.pieces
-        ends = [np.stack([p.ends[:-1], p.ends[1:]]) for p in pieces]
-        opening, contact, rate = [], [], []
-        for piece, (low, high) in zip(pieces, ends, strict=True):
-            motion = segments.motions[piece.motion]
-            middle = 0.5 * (motion.opening[high] + motion.opening[low])
-            half = 0.5 * (motion.opening[high] - motion.opening[low])
-            advance = mean_advance(motion, piece.ends)
-            opening.append(middle[:, None] + half[:, None] * GAUSS)
-            place = segments.rests[piece.rest].place
-            contact.append(np.repeat((place - advance)[:, None], 2, axis=1))
-            rate.append(np.repeat((2 * half / ((high - low) * motion.tick_s))[:, None], 2, axis=1))
-        flat = [
-            np.concatenate(rows).ravel() if rows else np.zeros(0)
-            for rows in (opening, rate, contact)
-        ]
-        nodes = geometry.nodes(*flat)
+        opening, contact, rate = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0)]
+        for piece in pieces:
+            motion, ends = segments.motions[piece.motion], piece.ends
+            opening.append(np.stack([motion.opening[ends[:-1]], motion.opening[ends[1:]]], axis=1))
+            contact.append(segments.rests[piece.rest].place - advance_line(motion, ends))
+            rate.append(np.diff(motion.opening[ends]) / (np.diff(ends) * motion.tick_s))
+        spans = geometry.spans(*(np.concatenate(rows) for rows in (opening, rate, contact)))
         whiteners = [_whitener(piece.covariance) for piece in pieces]
         lengths = [len(w) for w in whiteners]
         measured = self._measured(pieces, 0)
@@ -150,13 +140,13 @@ class CutLikelihood:
             "torque": measured,
             "late": _joined([p.late for p in pieces]),
             "direction": _joined([p.direction for p in pieces]),
-            "depth": nodes.depth,
-            "depth_dx": nodes.depth_dx,
-            "lever": nodes.lever,
-            "lever_dx": nodes.lever_dx,
-            "sinking": nodes.sinking,
-            "depth_de": nodes.depth_de.ravel(),
-            "lever_de": nodes.lever_de.ravel(),
+            "depth": spans.depth.ravel(),
+            "depth_dx": spans.depth_dx.ravel(),
+            "lever": spans.lever,
+            "lever_dx": spans.lever_dx,
+            "sinking": spans.sinking,
+            "depth_de": spans.depth_de.ravel(),
+            "lever_de": spans.lever_de.ravel(),
         }
 
     def _rests(self) -> dict[str, Any]:

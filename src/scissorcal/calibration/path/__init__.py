@@ -3,6 +3,7 @@
 from scissorcal.calibration.path.motion import PathMotion, path_motion, turning_points
 from scissorcal.calibration.path.work import (
     Material,
+    advance_line,
     material_of,
     mean_advance,
     mean_torque,
@@ -14,6 +15,7 @@ from scissorcal.calibration.path.work import (
 __all__ = [
     "Material",
     "PathMotion",
+    "advance_line",
     "material_of",
     "mean_advance",
     "mean_torque",

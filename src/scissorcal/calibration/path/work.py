@@ -97,10 +97,26 @@ def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array,
 
 def mean_advance(motion: PathMotion, ends: Integers) -> Array:
     """Mean advance (k,) in m over the path between samples ``ends`` (k + 1,)."""
+    return np.asarray(advance_line(motion, ends).mean(axis=1))
+
+
+def advance_line(motion: PathMotion, ends: Integers) -> Array:
+    """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
+
+    By the straight line over the opening that is nearest to it along the path: single samples
+    carry the steps of the encoder, and what the sledge does while the blades stand is no path.
+    """
     low, high = int(ends[0]), int(ends[-1])
-    step = np.diff(motion.opening[low : high + 1])
-    middle = 0.5 * (motion.advance[low + 1 : high + 1] + motion.advance[low:high])
-    return sums_between(middle * step, ends - low) / np.diff(motion.opening[ends])
+    path = motion.opening[low : high + 1]
+    step, way = np.diff(path), np.diff(motion.opening[ends])
+    advance = 0.5 * (motion.advance[low + 1 : high + 1] + motion.advance[low:high])
+    mean = sums_between(advance * step, ends - low) / way
+    segment = np.repeat(np.arange(len(way)), np.diff(ends))
+    middle = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
+    away = 0.5 * (path[1:] + path[:-1]) - middle[segment]
+    moment = sums_between((advance - mean[segment]) * away * step, ends - low)
+    half = 6.0 * moment / way**2
+    return np.stack([mean - half, mean + half], axis=1)
 
 
 def sums_between(values: Array, ends: Integers) -> Array:

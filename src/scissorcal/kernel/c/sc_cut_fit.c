@@ -5,6 +5,8 @@
 
 static const double TINY = 1e-300;
 static const double LEAST_DEPTH = 1e-12;
+/* Depths that differ by less, as a share, count as one: energies would cancel. */
+static const double LEAST_WAY = 1e-3;
 static const double LEAST_SLOPE = 1e-6;
 /* Longest step of a crack's place towards its highest density. */
 static const double REST_REACH_M = 3e-5;
@@ -31,8 +33,9 @@ void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, dou
         *mean_share = 0.5 * (1.0 + parameters->kappa);
         return;
     }
-    double gained = exp(sc_response_log_energy(table, log_start)) -
-                    exp(sc_response_log_energy(table, log_stop));
+    double slope_there;
+    double gained = exp(sc_response_log_energy(table, log_start, &slope_there)) -
+                    exp(sc_response_log_energy(table, log_stop, &slope_there));
     *mean_share = gained / travel / exp(log_peak);
 }
 
@@ -49,43 +52,54 @@ static double damped(double damping, double sinking)
     return factor > 0.0 ? factor : 0.0;
 }
 
-/* Mean of the positive part of a depth over +-span, and its derivative by the depth. A node stands
- * for half a segment; without this mean the likelihood jumps where a node leaves the material. */
-static double touching(double depth, double span, double *slope)
+/* Energy (J) stored at a depth, and the force (N) there; nothing outside the material. */
+static double stored(const sc_response_table *table, double depth, double *force)
 {
-    *slope = depth > 0.0 ? 1.0 : 0.0;
-    if (depth >= span || depth <= -span) return depth > 0.0 ? depth : 0.0;
-    *slope = 0.5 * (depth + span) / span;
-    return 0.25 * (depth + span) * (depth + span) / span;
+    *force = 0.0;
+    if (depth <= LEAST_DEPTH) return 0.0;
+    double slope, energy = exp(sc_response_log_energy(table, log(depth), &slope));
+    *force = energy * slope / depth;
+    return energy;
 }
 
-/* Torque (N m) of the response averaged over a segment's two nodes, and its derivative by the crack's
- * place, with the crack `moved` from where the nodes were expanded. */
+/* Mean force (N) between two depths: what the energy differs by, over the way. It is exact whatever
+ * part of the segment lies outside the material; depths that hardly differ have the force between
+ * them. `by_place` is its derivative where the depths change by `low_dx` and `high_dx`. */
+static double mean_force(const sc_response_table *table, double low, double high, double low_dx,
+                         double high_dx, double *by_place)
+{
+    double at_low, at_high, way = high - low, middle = 0.5 * (low + high);
+    if (fabs(way) < LEAST_WAY * fabs(middle)) {
+        double slope;
+        *by_place = 0.0;
+        if (middle <= LEAST_DEPTH) return 0.0;
+        double force = exp(sc_response_log_force(table, log(middle), &slope));
+        *by_place = 0.5 * force * slope / middle * (low_dx + high_dx);
+        return force;
+    }
+    double gained = stored(table, high, &at_high) - stored(table, low, &at_low);
+    double mean = gained / way;
+    *by_place = (at_high * high_dx - at_low * low_dx - mean * (high_dx - low_dx)) / way;
+    return mean;
+}
+
+/* Mean torque (N m) of the response over a segment, and its derivative by the crack's place, with the
+ * crack `moved` from where the geometry was expanded. */
 static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p, int32_t segment,
                              double moved, double *by_place)
 {
-    double torque = 0.0;
-    int32_t low = segment * SC_CUT_NODES;
-    /* The nodes stand 1 / sqrt(3) of half a segment from its middle. */
-    double span = 0.25 * sqrt(3.0) * fabs(data->depth[low + 1] - data->depth[low]);
-    *by_place = 0.0;
-    for (int32_t node = low; node < low + SC_CUT_NODES; node++) {
-        const double *de = data->depth_de + (ptrdiff_t)node * data->edge_count;
-        const double *le = data->lever_de + (ptrdiff_t)node * data->edge_count;
-        double inside, depth = touching(data->depth[node] + data->depth_dx[node] * moved +
-                                            departure(de, p->edge, data->edge_count),
-                                        span, &inside);
-        if (depth <= LEAST_DEPTH) continue;
-        double lever = data->lever[node] + data->lever_dx[node] * moved +
-                       departure(le, p->edge, data->edge_count);
-        double power, force = exp(sc_response_log_force(&p->response, log(depth), &power));
-        force *= damped(p->damping, data->sinking[node]);
-        torque += force * lever;
-        *by_place += force * (power / depth * inside * data->depth_dx[node] * lever +
-                              data->lever_dx[node]);
-    }
-    *by_place /= SC_CUT_NODES;
-    return torque / SC_CUT_NODES;
+    double depth[SC_CUT_ENDS];
+    int32_t q = data->edge_count, first = segment * SC_CUT_ENDS;
+    for (int32_t i = 0; i < SC_CUT_ENDS; i++)
+        depth[i] = data->depth[first + i] + data->depth_dx[first + i] * moved +
+                   departure(data->depth_de + (ptrdiff_t)(first + i) * q, p->edge, q);
+    double lever = data->lever[segment] + data->lever_dx[segment] * moved +
+                   departure(data->lever_de + (ptrdiff_t)segment * q, p->edge, q);
+    double slope, force = mean_force(&p->response, depth[0], depth[1], data->depth_dx[first],
+                                     data->depth_dx[first + 1], &slope);
+    double factor = damped(p->damping, data->sinking[segment]);
+    *by_place = factor * (slope * lever + force * data->lever_dx[segment]);
+    return factor * force * lever;
 }
 
 /* A crack at rest: where it is expected, and what its pieces say of a place. */

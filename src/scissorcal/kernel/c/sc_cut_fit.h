@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-enum { SC_CUT_NODES = 2, SC_CUT_REST_STEPS = 30 };
+enum { SC_CUT_ENDS = 2, SC_CUT_REST_STEPS = 30 };
 
 enum { SC_CUT_PRESSED = 0, SC_CUT_SMOOTH = 1, SC_CUT_RIPPLED = 2 };
 
@@ -29,8 +29,9 @@ typedef struct {
  * Elastic pieces: piece i has the segments piece_first[i] to piece_first[i + 1] - 1 and touches the
  * crack of rest piece_rest[i]; its whitener is the inverse Cholesky factor of the covariance of its
  * mean torques, rows of a lower triangle one after the other from white_first[i]. Every segment has
- * SC_CUT_NODES nodes; depth and lever there are expanded in the crack's place about rest_place and
- * in the edge's parameters (edge_count values a node).
+ * depths at its SC_CUT_ENDS ends and one lever, which turns the response's mean over the depths
+ * between them into the mean torque; all are expanded in the crack's place about rest_place and in
+ * the edge's parameters (edge_count values each). sinking (m/s) is one value a segment.
  *
  * Rests: the crack's place where the blades turned, for a depth of reference_depth, its slope, and
  * d(place)/d(edge); a known place (a fresh sheet) has known = 1 and the standard deviation
@@ -117,7 +118,7 @@ typedef struct {
 } sc_cut_parameters;
 
 double sc_response_log_force(const sc_response_table *table, double log_depth, double *slope);
-double sc_response_log_energy(const sc_response_table *table, double log_depth);
+double sc_response_log_energy(const sc_response_table *table, double log_depth, double *slope);
 double sc_response_log_depth(const sc_response_table *table, double log_force);
 
 /* Depth at which a crack starts and at which it stops, the force's mean between them as a share of

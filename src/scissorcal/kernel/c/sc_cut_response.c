@@ -25,6 +25,12 @@ static double hermite(double y0, double y1, double m0, double m1, const cell *c)
            (3.0 * c->t2 - 2.0 * c->t3) * y1 + (c->t3 - c->t2) * m1;
 }
 
+static double hermite_slope(double y0, double y1, double m0, double m1, const cell *c)
+{
+    return (6.0 * c->t2 - 6.0 * c->t) * (y0 - y1) + (3.0 * c->t2 - 4.0 * c->t + 1.0) * m0 +
+           (3.0 * c->t2 - 2.0 * c->t) * m1;
+}
+
 double sc_response_log_force(const sc_response_table *table, double log_depth, double *slope)
 {
     int32_t last = table->size - 1;
@@ -41,9 +47,7 @@ double sc_response_log_force(const sc_response_table *table, double log_depth, d
     int32_t i = locate(table, log_depth, &c);
     double m0 = table->force_slope[i] * table->step, m1 = table->force_slope[i + 1] * table->step;
     double y0 = table->log_force[i], y1 = table->log_force[i + 1];
-    *slope = ((6.0 * c.t2 - 6.0 * c.t) * (y0 - y1) + (3.0 * c.t2 - 4.0 * c.t + 1.0) * m0 +
-              (3.0 * c.t2 - 2.0 * c.t) * m1) /
-             table->step;
+    *slope = hermite_slope(y0, y1, m0, m1, &c) / table->step;
     return hermite(y0, y1, m0, m1, &c);
 }
 
@@ -54,19 +58,25 @@ static double energy_slope(const sc_response_table *table, int32_t i)
     return exp(log_depth + table->log_force[i] - table->log_energy[i]);
 }
 
-double sc_response_log_energy(const sc_response_table *table, double log_depth)
+double sc_response_log_energy(const sc_response_table *table, double log_depth, double *slope)
 {
     int32_t last = table->size - 1;
     double end = table->first + table->step * (double)last;
-    if (log_depth <= table->first)
-        return table->log_energy[0] + energy_slope(table, 0) * (log_depth - table->first);
-    if (log_depth >= end)
-        return table->log_energy[last] + energy_slope(table, last) * (log_depth - end);
+    if (log_depth <= table->first) {
+        *slope = energy_slope(table, 0);
+        return table->log_energy[0] + *slope * (log_depth - table->first);
+    }
+    if (log_depth >= end) {
+        *slope = energy_slope(table, last);
+        return table->log_energy[last] + *slope * (log_depth - end);
+    }
     cell c;
     int32_t i = locate(table, log_depth, &c);
-    return hermite(table->log_energy[i], table->log_energy[i + 1],
-                   energy_slope(table, i) * table->step, energy_slope(table, i + 1) * table->step,
-                   &c);
+    double m0 = energy_slope(table, i) * table->step;
+    double m1 = energy_slope(table, i + 1) * table->step;
+    double y0 = table->log_energy[i], y1 = table->log_energy[i + 1];
+    *slope = hermite_slope(y0, y1, m0, m1, &c) / table->step;
+    return hermite(y0, y1, m0, m1, &c);
 }
 
 double sc_response_log_depth(const sc_response_table *table, double log_force)
