@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import wilcoxon
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.ladder import (
@@ -13,6 +14,7 @@ from scissorcal.calibration.ladder import (
     beaten,
     choose,
     climb,
+    signed_rank_chance,
 )
 from scissorcal.calibration.layout import Layout, Parameter
 from scissorcal.calibration.rung_table import rung_table
@@ -133,6 +135,13 @@ def test_a_single_rung_is_not_compared():
     (row,) = rung_table(climbed, choose(climbed))
     assert row["equivalent"]
     assert np.isnan(row["loo"])
+
+
+@pytest.mark.parametrize("count", [6, 13, 40])
+def test_the_chance_of_signed_ranks_is_scipys(count):
+    gained = np.random.default_rng(count).normal(0.2, 1.0, count)
+    expected = wilcoxon(gained, alternative="greater", method="exact").pvalue
+    assert signed_rank_chance(gained) == pytest.approx(expected, rel=1e-12)
 
 
 def test_one_lucky_stroke_beats_nothing():

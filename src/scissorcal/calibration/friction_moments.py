@@ -23,8 +23,6 @@ MEASURED: Block = ("measured", 0, 0)
 FIXED: Block = ("fixed", 0, 0)
 STEP = 1e-4
 """Step in unconstrained parameters by which coefficients are differentiated."""
-MOST_BYTES = 1e8
-"""Memory for cells, which are made again when they are wanted again."""
 LEAST = 1e-13
 """Share of the measured squares below which what is left is rounding."""
 
@@ -45,7 +43,6 @@ class StrokeMoments:
         self._bounds = list(zip([0, *ends[:-1]], ends, strict=True))
         self._sorted: dict[Block, Array] = {}
         self._products: dict[tuple[Block, Block], Array] = {}
-        self._cells: dict[Cell, Array] = {}
 
     def of(self, measured: Array) -> "StrokeMoments":
         """The same columns with other measurements (n,)."""
@@ -65,23 +62,21 @@ class StrokeMoments:
             )
         return self._products[a, b]
 
-    def cell(self, cell: Cell) -> Array:
-        """Products of measurements, fixed columns and those of a cell's nodes, (strokes, q, q)."""
-        if cell not in self._cells:
-            made = self.assembled(cell, self.products, (len(self.labels),))
-            if (len(self._cells) + 1) * made.nbytes > MOST_BYTES:
-                self._cells.clear()
-            self._cells[cell] = made
-        return self._cells[cell]
+    def squares(self, cell: Cell, factors: Array) -> Array:
+        """Squares that factors (k, q) of a cell's columns leave in each stroke, (k, strokes)."""
+        left = np.zeros((len(self.measured), len(factors)))
+        used = 0
+        for block in _blocks(cell):
+            columns = self._columns(block)
+            left += columns @ factors[:, used : used + columns.shape[1]].T
+            used += columns.shape[1]
+        return np.add.reduceat(left**2, [low for low, _ in self._bounds], axis=0).T
 
     def assembled(
         self, cell: Cell, products: Callable[[Block, Block], Array], shape: tuple[int, ...]
     ) -> Array:
         """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
-        blocks = [MEASURED, FIXED]
-        blocks += [("stribeck", index, 0) for index in cell[0]]
-        blocks += [("lag", index, 0) for index in cell[1]]
-        blocks += [("coupled", rate, length) for rate, length in coupled_nodes(cell)]
+        blocks = _blocks(cell)
         ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
         result = np.empty((*shape, ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
@@ -144,14 +139,16 @@ class ReducedLaw:
         return max(float(factors @ products @ factors), LEAST * float(products[0, 0]))
 
     def by_stroke(self, draws: Array) -> Array:
-        """Log-likelihood of each stroke at each draw (k, p): (k, strokes)."""
+        """Log-likelihood of each stroke at each draw (k, p): (k, strokes).
+
+        By residuals: draws lie in cells of their own, and a cell's products cost as much as the
+        residuals of several draws.
+        """
         squares = np.empty((len(draws), len(self.moments.labels)))
         cells = [self.cell_at(draw) for draw in draws]
         for cell in dict.fromkeys(cells):
             here = [k for k, other in enumerate(cells) if other == cell]
-            factors = self.factors(draws[here], cell)
-            products = self.moments.cell(cell)
-            squares[here] = np.einsum("skq,kq->ks", factors @ products, factors)
+            squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
         size = draws[:, -1:]
         return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.moments.counts * size)
 
@@ -257,3 +254,14 @@ class ReducedLaw:
     @cached_property
     def _cells(self) -> dict[Cell, Array]:
         return {}
+
+
+def _blocks(cell: Cell) -> list[Block]:
+    """Blocks of columns that a cell needs, in the order of a law's factors."""
+    return [
+        MEASURED,
+        FIXED,
+        *(("stribeck", index, 0) for index in cell[0]),
+        *(("lag", index, 0) for index in cell[1]),
+        *(("coupled", rate, length) for rate, length in coupled_nodes(cell)),
+    ]

@@ -6,7 +6,7 @@ from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.infer import infer
 from scissorcal.inference.information import likelihood_information
-from scissorcal.inference.optimise import Cluster, Optimum, find_optimum, scattered_starts
+from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
 from scissorcal.inference.pareto import smooth_weights
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
@@ -35,7 +35,6 @@ __all__ = [
     "log_density",
     "natural_step",
     "robust_covariance_of_scores",
-    "scattered_starts",
     "smooth_weights",
     "tails_of",
 ]

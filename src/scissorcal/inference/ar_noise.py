@@ -62,15 +62,11 @@ class ArNoise:
         values = np.zeros(max(lags, 1))
         values[0] = self.marginal_sd**2
         if self.order:
-            from scipy.signal import lfilter, lfiltic
-
             begun = self._stationary()[0, : min(self.order, len(values))]
             values[: len(begun)] = begun
-            if len(values) > self.order:
-                a = np.concatenate([[1.0], -np.asarray(self.coefficients)])
-                state = lfiltic([1.0], a, begun[::-1])
-                rest = np.zeros(len(values) - self.order)
-                values[self.order :] = lfilter([1.0], a, rest, zi=state)[0]
+            back = np.asarray(self.coefficients)[::-1]
+            for lag in range(self.order, len(values)):
+                values[lag] = back @ values[lag - self.order : lag]
         return values[:lags]
 
     def _stationary(self) -> Array:

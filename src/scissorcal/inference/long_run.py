@@ -107,7 +107,7 @@ def _excess(slopes: Array, pull: Array, blocks: Labels, noise: ArNoise) -> tuple
     blocks share its information, less one for the fit. Slopes are taken in units of their own size:
     in mixed units rounding would decide. A parameter that hardly moves the mean has no say.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     size = np.sqrt(np.mean(slopes**2, axis=0))
     telling = np.flatnonzero(size > WELL_ABOVE_ROUNDING * size.max(initial=0.0))
@@ -130,7 +130,7 @@ def _excess(slopes: Array, pull: Array, blocks: Labels, noise: ArNoise) -> tuple
         if spare <= 1.0:
             continue
         factor = factor * (spare + 1.0) / spare
-        if factor > 1.0 and float(chi2.sf(factor * spare, spare)) < CHANCE / len(unit):
+        if factor > 1.0 and float(chdtrc(spare, factor * spare)) < CHANCE / len(unit):
             away = root @ direction
             grown[np.ix_(telling, telling)] += (factor - 1.0) * np.outer(away * unit, away * unit)
             largest = max(largest, float(factor))

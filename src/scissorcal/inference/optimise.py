@@ -145,20 +145,6 @@ def find_optimum(
     )
 
 
-def scattered_starts(problem: Problem, count: int) -> Array:
-    """The problem's starts and ``count`` more around the first one, (k + count, p).
-
-    They are spread as a normal of the prior's width by a Sobol sequence, the same every time, for
-    posteriors whose optimum hides behind a plateau or a lower one.
-    """
-    from scipy.stats import norm, qmc
-
-    size = problem.starts.shape[1]
-    uniform = qmc.Sobol(size, scramble=False).random_base2(int(np.ceil(np.log2(count + 1))))
-    away = norm.ppf(uniform[1 : count + 1]) * problem.prior_sd
-    return np.vstack([problem.starts, _inside(problem, problem.starts[0] + away)])
-
-
 def move_optimum(optimum: Optimum, point: Array, value: float) -> Optimum:
     """The same optimum after polishing: its best cluster moves along."""
     first = replace(optimum.optima[0], point=point, value=value) if optimum.optima else None

@@ -131,6 +131,18 @@ def test_the_advance_at_the_ends_is_on_the_line_along_the_path():
     assert line == pytest.approx(np.stack([true[:-1], true[1:]], axis=1), abs=1e-6)
 
 
+def test_a_sledge_that_goes_back_while_the_blades_stand_is_no_path():
+    """30 mm in 0.3 s before the blades turn, and then 0.05 m a rad: the line is that of the way."""
+    motion = motion_of(record(np.concatenate([np.full(300, 0.6), sweep(0.6, 0.5, 0.2)]), spring))
+    back = np.linspace(0.03, 0.0, 300)
+    away = 0.6 - motion.opening
+    advance = np.where(np.arange(len(away)) < 300, np.resize(back, len(away)), 0.0) + 0.05 * away
+    ends = np.array([0, 320, 420])
+    line = advance_line(replace(motion, advance=advance), ends)
+    true = 0.05 * away[ends]
+    assert line == pytest.approx(np.stack([true[:-1], true[1:]], axis=1), abs=5e-6)
+
+
 def test_cogging_and_offset_are_taken_off():
     """A motor that adds a periodic torque that its measured drive does not show."""
     made = record(swing(), lambda q: spring(q) + 0.004 * np.cos(40.0 * q) - 0.002)

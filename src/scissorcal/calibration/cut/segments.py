@@ -313,10 +313,11 @@ class _Builder:
         ends = split(motion.opening, low, high, step)
         if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):
             return
-        torque, late = mean_torque(motion, self.materials[index].work, ends)
+        material = self.materials[index]
+        torque, late = mean_torque(motion, material.work, ends)
         covariance = torque_covariance(motion, ends, self.noise, self.offset_sd)
         rest = len(self.rests) - 1
-        direction = mean_direction(motion, self.materials[index], ends)
+        direction = mean_direction(motion, material, ends)
         self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
 
     def _stretch(self, run: Run, low: int) -> None:

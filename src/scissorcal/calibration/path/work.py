@@ -104,19 +104,25 @@ def advance_line(motion: PathMotion, ends: Integers) -> Array:
     """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
 
     By the straight line over the opening that is nearest to it along the path: single samples
-    carry the steps of the encoder, and what the sledge does while the blades stand is no path.
+    carry the steps of the encoder. What the sledge does while the blades stand is no path.
     """
     low, high = int(ends[0]), int(ends[-1])
-    path = motion.opening[low : high + 1]
-    step, way = np.diff(path), np.diff(motion.opening[ends])
+    path, still = motion.opening[low : high + 1], motion.standing[low : high + 1]
+    inside, segment = ends - low, np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+    way = np.diff(motion.opening[ends])
+    step = np.diff(path)
+    gone = sums_between(np.where(still[1:] & still[:-1], 0.0, step), inside)
+    moving = np.abs(gone) > 0.5 * np.abs(way)
+    weight = np.where(moving[segment] & still[1:] & still[:-1], 0.0, step)
+    whole = sums_between(weight, inside)
+    middle = 0.5 * (path[1:] + path[:-1])
     advance = 0.5 * (motion.advance[low + 1 : high + 1] + motion.advance[low:high])
-    mean = sums_between(advance * step, ends - low) / way
-    segment = np.repeat(np.arange(len(way)), np.diff(ends))
-    middle = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
-    away = 0.5 * (path[1:] + path[:-1]) - middle[segment]
-    moment = sums_between((advance - mean[segment]) * away * step, ends - low)
-    half = 6.0 * moment / way**2
-    return np.stack([mean - half, mean + half], axis=1)
+    centre, mean = (sums_between(x * weight, inside) / whole for x in (middle, advance))
+    away = middle - centre[segment]
+    spread = sums_between(away**2 * weight, inside)
+    slope = sums_between((advance - mean[segment]) * away * weight, inside) / spread
+    first, last = motion.opening[ends[:-1]] - centre, motion.opening[ends[1:]] - centre
+    return np.stack([mean + slope * first, mean + slope * last], axis=1)
 
 
 def sums_between(values: Array, ends: Integers) -> Array:
