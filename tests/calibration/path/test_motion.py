@@ -131,6 +131,14 @@ def test_the_advance_at_the_ends_is_on_the_line_along_the_path():
     assert line == pytest.approx(np.stack([true[:-1], true[1:]], axis=1), abs=1e-6)
 
 
+def test_segments_of_one_step_have_the_advance_of_its_ends():
+    motion = motion_of(record(sweep(0.6, 0.5, 0.2), spring))
+    advance = 0.03 + 0.05 * (0.6 - motion.opening)
+    ends = np.arange(200, 206)
+    line = advance_line(replace(motion, advance=advance), ends)
+    assert line == pytest.approx(np.stack([advance[ends[:-1]], advance[ends[1:]]], axis=1))
+
+
 def test_a_sledge_that_goes_back_while_the_blades_stand_is_no_path():
     """30 mm in 0.3 s before the blades turn, and then 0.05 m a rad: the line is that of the way."""
     motion = motion_of(record(np.concatenate([np.full(300, 0.6), sweep(0.6, 0.5, 0.2)]), spring))

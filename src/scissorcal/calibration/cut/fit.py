@@ -20,6 +20,7 @@ from scissorcal.calibration.cut.between import between_notes, compare_cuts
 from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
 from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.guess import NoUnloadingError
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.lack_of_fit import budget_of
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
@@ -223,7 +224,7 @@ def _scouted(
     richest = max(("none", "smooth", "rippled").index(law.fracture) for law in laws)
     try:
         return scout(motions, known, recipe, geometry, ("none", "smooth", "rippled")[richest])
-    except ValueError as error:
+    except NoUnloadingError as error:
         raise InputError(
             f"{_names(recordings)}: no stroke shows the blades letting go of the material again, "
             "so its response cannot be told from friction. Check that rig.edge and the sheet's "

@@ -105,6 +105,10 @@ class Span(Protocol):
     def high(self) -> int: ...
 
 
+class NoUnloadingError(ValueError):
+    """No stroke shows the blades letting go of the material, so that nothing tells its response."""
+
+
 def first_guess(
     motions: tuple[PathMotion, ...],
     materials: tuple[Material, ...],
@@ -119,12 +123,12 @@ def first_guess(
 
     Where the blades release the sheet is seen without any model, and gives each crack's place;
     force and exponent follow by least squares with those places free. Where nothing is cut the
-    place is the sheet's edge. Raises ValueError where no unloading was seen.
+    place is the sheet's edge. Raises NoUnloadingError where none was seen.
     """
     pulls = [_unloading(motions, materials, run, geometry, cuts) for run in runs]
     seen = [pull for pull in pulls if pull is not None]
     if not seen:
-        raise ValueError("no unloading was seen")
+        raise NoUnloadingError("no unloading was seen")
     force, exponent = _power_law(seen, geometry, cuts, median_exponent, log_sd_exponent)
     response = Response("power", force, exponent, geometry.reference_m)
     if not cuts:

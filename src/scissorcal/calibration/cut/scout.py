@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.experiment import CutExperiment, starting_point
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.guess import Guess, first_guess
+from scissorcal.calibration.cut.guess import Guess, NoUnloadingError, first_guess
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood, LineDatum
@@ -63,7 +63,7 @@ def scout(
 ) -> Scouted:
     """Fit a power law twice, cutting the recordings anew by its result, and look for the teeth.
 
-    Raises ValueError where no unloading was seen.
+    Raises NoUnloadingError where none was seen.
     """
     materials = tuple(known.material(motion) for motion in motions)
     exponent = recipe.fit.cut.response_exponent
@@ -85,7 +85,7 @@ def scout(
                 motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
             )
             if not segments.pieces:
-                raise ValueError("no unloading was seen")
+                raise NoUnloadingError("no unloading was seen")
             design = make_experiment(segments, geometry, recipe, law, known, values)
             optimum = find_optimum(design.rung(design.observed).problem(design.series))
             evaluations += optimum.evaluations

@@ -107,20 +107,20 @@ def advance_line(motion: PathMotion, ends: Integers) -> Array:
     carry the steps of the encoder. What the sledge does while the blades stand is no path.
     """
     low, high = int(ends[0]), int(ends[-1])
-    path, still = motion.opening[low : high + 1], motion.standing[low : high + 1]
+    path, place = motion.opening[low : high + 1], motion.advance[low : high + 1]
+    step, gone = np.diff(path), np.diff(place)
     inside, segment = ends - low, np.repeat(np.arange(len(ends) - 1), np.diff(ends))
-    way = np.diff(motion.opening[ends])
-    step = np.diff(path)
-    gone = sums_between(np.where(still[1:] & still[:-1], 0.0, step), inside)
-    moving = np.abs(gone) > 0.5 * np.abs(way)
-    weight = np.where(moving[segment] & still[1:] & still[:-1], 0.0, step)
+    still = motion.standing[low:high] & motion.standing[low + 1 : high + 1]
+    turned = sums_between(np.where(still, 0.0, step), inside)
+    moving = np.abs(turned) > 0.5 * np.abs(sums_between(step, inside))
+    weight = np.where(moving[segment] & still, 0.0, step)
     whole = sums_between(weight, inside)
-    middle = 0.5 * (path[1:] + path[:-1])
-    advance = 0.5 * (motion.advance[low + 1 : high + 1] + motion.advance[low:high])
+    middle, advance = 0.5 * (path[1:] + path[:-1]), 0.5 * (place[1:] + place[:-1])
     centre, mean = (sums_between(x * weight, inside) / whole for x in (middle, advance))
-    away = middle - centre[segment]
-    spread = sums_between(away**2 * weight, inside)
-    slope = sums_between((advance - mean[segment]) * away * weight, inside) / spread
+    away, beyond = middle - centre[segment], advance - mean[segment]
+    # Between two samples both go on straight: a twelfth of a step's product is theirs.
+    spread = sums_between((away**2 + step**2 / 12.0) * weight, inside)
+    slope = sums_between((beyond * away + gone * step / 12.0) * weight, inside) / spread
     first, last = motion.opening[ends[:-1]] - centre, motion.opening[ends[1:]] - centre
     return np.stack([mean + slope * first, mean + slope * last], axis=1)
 
