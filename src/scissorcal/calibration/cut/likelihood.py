@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.calibration.path import advance_line, mean_advance
+from scissorcal.calibration.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,
@@ -176,8 +176,7 @@ class CutLikelihood:
             place.append(
                 geometry.place(middle, geometry.reference_m) + mean_advance(motion, run.ends)
             )
-            energy = (motion.inertia * motion.rate[run.ends] * motion.rate_sd) ** 2
-            energy = energy + run.tooth_sd**2
+            energy = kinetic_variance(motion, run.ends) + run.tooth_sd**2
             start.append(energy[:-1])
             end.append(energy[1:])
         openings = _joined(opening)

@@ -4,6 +4,7 @@ from scissorcal.calibration.path.motion import PathMotion, path_motion, turning_
 from scissorcal.calibration.path.work import (
     Material,
     advance_line,
+    kinetic_variance,
     material_of,
     mean_advance,
     mean_torque,
@@ -16,6 +17,7 @@ __all__ = [
     "Material",
     "PathMotion",
     "advance_line",
+    "kinetic_variance",
     "material_of",
     "mean_advance",
     "mean_torque",

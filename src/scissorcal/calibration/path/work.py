@@ -130,6 +130,13 @@ def sums_between(values: Array, ends: Integers) -> Array:
     return np.asarray(np.add.reduceat(values[: ends[-1]], ends[:-1]))
 
 
+def kinetic_variance(motion: PathMotion, ends: Integers) -> Array:
+    """Variance (k,) in J^2 of the kinetic energy at samples ``ends`` (k,), by the rate's error."""
+    sd = motion.rate_sd[ends]
+    by_rate = (motion.inertia * motion.rate[ends] * sd) ** 2
+    return np.asarray(by_rate + (0.5 * motion.inertia * sd**2) ** 2)
+
+
 def torque_covariance(
     motion: PathMotion, ends: Integers, noise: TorqueNoise, offset_sd: float
 ) -> Array:
@@ -149,8 +156,7 @@ def torque_covariance(
     memory = np.exp(-np.abs(times[:, None] - times[None, :]) / noise.slow_time_s)
     gamma = noise.slow_Nm**2 * memory + noise.white_Nm**2 * np.eye(high - low)
     covariance = rows @ gamma @ rows.T
-    energy = (motion.inertia * motion.rate[ends] * motion.rate_sd) ** 2
-    energy = energy + (0.5 * motion.inertia * motion.rate_sd**2) ** 2
+    energy = kinetic_variance(motion, ends)
     difference = np.eye(count, count + 1, 1) - np.eye(count, count + 1)
     covariance += (difference * energy) @ difference.T
     path = np.diff(motion.opening[ends])
