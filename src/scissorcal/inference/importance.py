@@ -26,7 +26,8 @@ GOOD_K = 0.5
 GOOD_MIXTURE_K = 0.3
 """k-hat at which a mixture is not improved further."""
 
-COMPONENTS = 8
+ROUNDS = 4
+COMPONENTS = 3
 DEFENSIVE = 0.1
 WIDER = 1.5
 """Factor on the width of a mixture's components, so that its reach grows from round to round."""
@@ -37,7 +38,7 @@ class Sampled:
     """Draws (n, p) with smoothed normalised weights (n,), tail index and effective sample size.
 
     ``limit`` is the k-hat below which the weights can be trusted, ``log_ratio`` (n,) the logarithm
-    of the weights as they were drawn.
+    of the weights as they were drawn, ``proposal`` what the draws came from.
     """
 
     draws: Array
@@ -47,6 +48,7 @@ class Sampled:
     evaluations: int
     limit: float = K_HAT_LIMIT
     log_ratio: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    proposal: Mixture | None = field(default=None, repr=False)
 
     @property
     def trusted(self) -> bool:
@@ -79,7 +81,7 @@ def sample_by_importance(
     covariance is learnt from few effective draws at first: four and one for every four of them if
     not given.
     """
-    rounds = 4 + proposal.centres.shape[1] // 4 if rounds is None else rounds
+    rounds = ROUNDS if rounds is None else rounds
     log_posteriors = many or _one_by_one(log_posterior)
     first = _once(log_posteriors, proposal, count, rng)
     if rounds < 2:
@@ -89,6 +91,7 @@ def sample_by_importance(
         first = _weigh(
             np.concatenate([first.draws, more.draws]),
             np.concatenate([first.log_ratio, more.log_ratio]),
+            proposal,
         )
     if first.k_hat <= GOOD_K:
         return first
@@ -140,20 +143,23 @@ def _adapted(
 ) -> Sampled:
     """Fit and draw in turn, then judge the best proposal by draws it was not made from.
 
+    Each fit is to the draws of all rounds so far, weighed as draws of one mixture of all their
+    proposals (Cornuet et al. 2012, doi:10.1111/j.1467-9469.2011.00756.x).
     The lowest of several k-hats is too low by its very choice, and a proposal that was fitted to
     draws looks better on them than it is; so what was adapted is drawn from afresh, twice as often.
     """
     sampled, lowest, used = first, np.inf, first.evaluations
     chosen = refit(first)
-    proposal = chosen
+    proposal, seen = chosen, [first]
     for _ in range(rounds):
         sampled = _once(log_posteriors, proposal, count, rng)
+        seen.append(sampled)
         used += count
         if sampled.k_hat < lowest:
             lowest, chosen = sampled.k_hat, proposal
         if sampled.k_hat <= good:
             break
-        proposal = refit(sampled)
+        proposal = refit(_pooled(seen))
     fresh = _once(log_posteriors, chosen, 2 * count, rng)
     return replace(fresh, evaluations=used + 2 * count, limit=ADAPTED_LIMIT)
 
@@ -164,17 +170,29 @@ def _one_by_one(log_posterior: Callable[[Array], float]) -> Many:
 
 def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Generator) -> Sampled:
     draws = proposal.draw(count, rng)
-    return _weigh(draws, log_posteriors(draws) - proposal.log_density(draws))
+    return _weigh(draws, log_posteriors(draws) - proposal.log_density(draws), proposal)
 
 
-def _weigh(draws: Array, log_ratio: Array) -> Sampled:
+def _pooled(seen: list[Sampled]) -> Sampled:
+    """All draws, weighed as if each had come from the mixture of all proposals by their shares."""
+    known = [(one, one.proposal) for one in seen if one.proposal is not None]
+    draws = np.concatenate([one.draws for one, _ in known])
+    heights = [one.log_ratio + own.log_density(one.draws) for one, own in known]
+    densities = [np.log(len(one.draws)) + own.log_density(draws) for one, own in known]
+    joined = np.logaddexp.reduce(densities, axis=0) - np.log(len(draws))
+    return _weigh(draws, np.concatenate(heights) - joined)
+
+
+def _weigh(draws: Array, log_ratio: Array, proposal: Mixture | None = None) -> Sampled:
     usable = np.isfinite(log_ratio)
     if usable.sum() < 50:
         even = np.full(len(draws), 1 / len(draws))
-        return Sampled(draws, even, np.inf, 0.0, len(draws), log_ratio=log_ratio)
+        return Sampled(draws, even, np.inf, 0.0, len(draws), log_ratio=log_ratio, proposal=proposal)
     smoothed, k_hat = smooth_weights(log_ratio[usable])
     weights = np.zeros(len(draws))
     weights[usable] = np.exp(smoothed - smoothed.max())
     weights /= weights.sum()
     effective = float(1.0 / np.sum(weights**2))
-    return Sampled(draws, weights, float(k_hat), effective, len(draws), log_ratio=log_ratio)
+    return Sampled(
+        draws, weights, float(k_hat), effective, len(draws), log_ratio=log_ratio, proposal=proposal
+    )

@@ -213,10 +213,10 @@ class _Run:
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
-            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // (2 * self.count) - 2)
+            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
                 sampled = sample_by_mixture(
-                    target, sampled, self.proposal, 2 * self.count, self.rng, rounds, many
+                    target, sampled, self.proposal, self.count, self.rng, rounds, many
                 )
                 said += f", {sampled.k_hat:.2f} with an adapted mixture"
         if sampled.trusted or not escalate:
