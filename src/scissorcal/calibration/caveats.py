@@ -75,8 +75,8 @@ def _coarse(fit: FitResult) -> bool:
 def _coarse_words(fit: FitResult) -> str:
     counts = fit.diagnostics["counts_per_sample"]
     return (
-        f"{counts:.2g} encoder counts per sample: on 40 virtual days with so few, 90 % intervals "
-        "held force and exponent in 31 and 30, fracture energy and kappa in 35 and 34. Use a finer "
+        f"{counts:.2g} encoder counts per sample: on 31 virtual days with so few, 90 % intervals "
+        "held force and exponent in 27 each, fracture energy and kappa in 28 and 29. Use a finer "
         "encoder."
     )
 
