@@ -2,7 +2,8 @@
 
 At given scales a law is linear in its columns, so that a stroke's squares are a quadratic form in
 their coefficients. The products are made once; from then on what an evaluation costs does not
-depend on how much was recorded, and leaving strokes out is leaving out their products.
+depend on how much was recorded, and leaving strokes out is leaving out their products. Many draws
+at once are scored stroke by stroke by their residuals.
 """
 
 from collections.abc import Callable
@@ -23,6 +24,8 @@ MEASURED: Block = ("measured", 0, 0)
 FIXED: Block = ("fixed", 0, 0)
 STEP = 1e-4
 """Step in unconstrained parameters by which coefficients are differentiated."""
+DRAWS_AT_ONCE = 32
+"""Draws whose residuals are in memory together."""
 LEAST = 1e-13
 """Share of the measured squares below which what is left is rounding."""
 
@@ -147,8 +150,10 @@ class ReducedLaw:
         squares = np.empty((len(draws), len(self.moments.labels)))
         cells = [self.cell_at(draw) for draw in draws]
         for cell in dict.fromkeys(cells):
-            here = [k for k, other in enumerate(cells) if other == cell]
-            squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
+            every = [k for k, other in enumerate(cells) if other == cell]
+            for first in range(0, len(every), DRAWS_AT_ONCE):
+                here = every[first : first + DRAWS_AT_ONCE]
+                squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
         size = draws[:, -1:]
         return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.moments.counts * size)
 

@@ -6,7 +6,7 @@ import json
 from scissorcal.model import EdgeBelief
 from scissorcal.recording.recording import Recording
 
-ALGORITHM = 6
+ALGORITHM = 7
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 

@@ -377,7 +377,7 @@ def signed_rank_chance(gained: Array) -> float:
     zero or alike. (scipy.stats has it too; importing that costs half a second.)
 
     >>> signed_rank_chance(np.array([0.3, 0.1, -0.2, 0.5]))
-    0.125
+    0.1875
     """
     ranks = np.argsort(np.argsort(np.abs(gained))) + 1
     chances = np.ones(1)

@@ -77,9 +77,8 @@ def sample_by_importance(
     optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat lies between
     0.5 and 0.7 as many draws are added first: of 2,000 draws k-hat has an error of 0.1. Where it
     still exceeds 0.5 the proposal is moved to the mean and covariance of the weighted draws,
-    ``rounds`` times at most, and kept where that served. Many parameters take more rounds, since a
-    covariance is learnt from few effective draws at first: four and one for every four of them if
-    not given.
+    ``rounds`` times at most (four if not given), and kept where that served. Each fit is to the
+    draws of all rounds so far.
     """
     rounds = ROUNDS if rounds is None else rounds
     log_posteriors = many or _one_by_one(log_posterior)
@@ -118,7 +117,7 @@ def sample_by_mixture(
     """Sample a posterior that one Student-t does not fit, from a mixture of several.
 
     Begins from weighted draws that failed their check. In each round a mixture is fitted to the
-    weighted draws (population Monte Carlo, Cappé et al. 2008, doi:10.1007/s11222-008-9059-x) and
+    weighted draws of all rounds so far (Cappé et al. 2008, doi:10.1007/s11222-008-9059-x) and
     made wider; a tenth of the draws keeps coming from ``proposal``, also made wider, so that no
     region is lost for good.
     """
@@ -151,15 +150,15 @@ def _adapted(
     sampled, lowest, used = first, np.inf, first.evaluations
     chosen = refit(first)
     proposal, seen = chosen, [first]
-    for _ in range(rounds):
+    for left in range(rounds - 1, -1, -1):
         sampled = _once(log_posteriors, proposal, count, rng)
         seen.append(sampled)
         used += count
         if sampled.k_hat < lowest:
             lowest, chosen = sampled.k_hat, proposal
-        if sampled.k_hat <= good:
+        if sampled.k_hat <= good or left == 0:
             break
-        proposal = refit(_pooled(seen))
+        proposal = refit(pooled(seen))
     fresh = _once(log_posteriors, chosen, 2 * count, rng)
     return replace(fresh, evaluations=used + 2 * count, limit=ADAPTED_LIMIT)
 
@@ -173,9 +172,11 @@ def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Ge
     return _weigh(draws, log_posteriors(draws) - proposal.log_density(draws), proposal)
 
 
-def _pooled(seen: list[Sampled]) -> Sampled:
+def pooled(seen: list[Sampled]) -> Sampled:
     """All draws, weighed as if each had come from the mixture of all proposals by their shares."""
     known = [(one, one.proposal) for one in seen if one.proposal is not None]
+    if len(known) < len(seen):
+        raise ValueError("draws are pooled by their proposals, and some have none")
     draws = np.concatenate([one.draws for one, _ in known])
     heights = [one.log_ratio + own.log_density(one.draws) for one, own in known]
     densities = [np.log(len(one.draws)) + own.log_density(draws) for one, own in known]

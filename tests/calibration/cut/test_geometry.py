@@ -55,7 +55,7 @@ def test_lever_and_mean_force_give_the_mean_torque(edge, moving, exponent, sledg
     """Against 20,001 points of a segment, whose sledge moves by ``sledge`` m for each rad.
 
     Exact where the sledge stands, in contact or with any part of the path in the air; where it
-    moves, the levers of the path in the air count along.
+    moves, the levers of the path in the air are included in the mean.
     """
     shape = geometry(edge, moving=moving)
     response = Response("power", 5.0, exponent, shape.reference_m)

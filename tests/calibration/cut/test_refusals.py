@@ -43,6 +43,16 @@ def test_blades_that_never_let_go_are_refused(friction):
     assert "let every stroke open the blades wide" in str(refused.value)
 
 
+def test_other_errors_are_not_told_as_a_lack_of_unloading(friction, monkeypatch):
+    def broken(*_):
+        raise ValueError("something else")
+
+    monkeypatch.setattr("scissorcal.calibration.cut.fit.scout", broken)
+    rng = np.random.default_rng(15)
+    with pytest.raises(ValueError, match="something else"):
+        fit_cut((cut(way(HIGH, LOW)).made.recording,), paper(), friction, effort="draft", rng=rng)
+
+
 def test_a_recipe_says_which_laws_are_compared():
     def names(**cut):
         return [law.name for law in allowed_laws(paper(**{"response": "power", **cut}))]

@@ -119,11 +119,17 @@ def _held_torque(data: CutFitData, given: CutFitParameters, table: Table, moved:
     lever = data.lever + data.lever_dx * moved + data.lever_de.reshape(n, q) @ given.edge
     torque, slope = np.zeros(n), np.zeros(n)
     for k in range(n):
-        way = depth[k, 1] - depth[k, 0]
+        way, middle = depth[k, 1] - depth[k, 0], depth[k].mean()
+        factor = _damped(given.damping, data.sinking[k])
+        if abs(way) <= 1e-3 * abs(middle):
+            held = np.exp(table.log_force(float(np.log(middle)))[0]) if middle > 1e-12 else 0.0
+            stiff = held * table.log_force(float(np.log(middle)))[1] / middle if held else 0.0
+            torque[k] = factor * held * lever[k]
+            slope[k] = factor * (stiff * by_x[k].mean() * lever[k] + held * data.lever_dx[k])
+            continue
         (low, at_low), (high, at_high) = (_stored(table, d) for d in depth[k])
         force = (high - low) / way
         rising = (at_high - force) / way * by_x[k, 1] + (force - at_low) / way * by_x[k, 0]
-        factor = _damped(given.damping, data.sinking[k])
         torque[k] = factor * force * lever[k]
         slope[k] = factor * (rising * lever[k] + force * data.lever_dx[k])
     return torque, slope

