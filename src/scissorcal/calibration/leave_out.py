@@ -55,13 +55,13 @@ def leave_strokes_out(
     Single bins are never left out: a neighbour gives them away (doi:10.1007/s11222-016-9696-4 for
     the method, Buerkner, Gabry and Vehtari 2020, doi:10.1080/00949655.2020.1783262 for blocks).
     ``share`` is the share of bins that are independent, and the likelihood is taken to that power,
-    so that the posterior is as wide as correlated bins make it. Draws are points of an even lattice,
-    mapped to a Student-t about ``point`` with the curvature of the tempered posterior; weights correct for
-    both the approximation and the stroke that is missing, and their k-hat judges both. Where the
-    curvature describes the posterior badly, draws are taken again from the moments that they find.
-    ``information`` and ``prior_precision`` have shape (p, p); ``labelled`` masks the bins (n,) of
-    each stroke. ``by_stroke`` gives the log-likelihood (k, strokes) of each stroke at draws (k, p),
-    where that is cheaper than by bins.
+    so that the posterior is as wide as correlated bins make it. Draws are points of an even
+    lattice, mapped to a Student-t about ``point`` with the curvature of the tempered posterior;
+    weights correct for both the approximation and the stroke that is missing, and their k-hat
+    judges both. Where the curvature describes the posterior badly, draws are taken again from the
+    moments that they find. ``information`` and ``prior_precision`` have shape (p, p); ``labelled``
+    masks the bins (n,) of each stroke. ``by_stroke`` gives the log-likelihood (k, strokes) of each
+    stroke at draws (k, p), where that is cheaper than by bins.
     """
     from scipy.special import logsumexp
 
