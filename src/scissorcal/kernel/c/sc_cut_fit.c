@@ -4,9 +4,6 @@
 #include <stddef.h>
 
 static const double TINY = 1e-300;
-static const double LEAST_DEPTH = 1e-12;
-/* Depths that differ by less, as a share, count as one: energies would cancel. */
-static const double LEAST_WAY = 1e-3;
 static const double LEAST_SLOPE = 1e-6;
 /* Longest step of a crack's place towards its highest density. */
 static const double REST_REACH_M = 3e-5;
@@ -52,37 +49,6 @@ static double damped(double damping, double sinking)
     return factor > 0.0 ? factor : 0.0;
 }
 
-/* Energy (J) stored at a depth, and the force (N) there; nothing outside the material. */
-static double stored(const sc_response_table *table, double depth, double *force)
-{
-    *force = 0.0;
-    if (depth <= LEAST_DEPTH) return 0.0;
-    double slope, energy = exp(sc_response_log_energy(table, log(depth), &slope));
-    *force = energy * slope / depth;
-    return energy;
-}
-
-/* Mean force (N) between two depths: what the energy differs by, over the way. It is exact whatever
- * part of the segment lies outside the material; depths that hardly differ have the force between
- * them. `by_place` is its derivative where the depths change by `low_dx` and `high_dx`. */
-static double mean_force(const sc_response_table *table, double low, double high, double low_dx,
-                         double high_dx, double *by_place)
-{
-    double at_low, at_high, way = high - low, middle = 0.5 * (low + high);
-    if (fabs(way) <= LEAST_WAY * fabs(middle)) {
-        double slope;
-        *by_place = 0.0;
-        if (middle <= LEAST_DEPTH) return 0.0;
-        double force = exp(sc_response_log_force(table, log(middle), &slope));
-        *by_place = 0.5 * force * slope / middle * (low_dx + high_dx);
-        return force;
-    }
-    double gained = stored(table, high, &at_high) - stored(table, low, &at_low);
-    double mean = gained / way;
-    *by_place = (at_high * high_dx - at_low * low_dx - mean * (high_dx - low_dx)) / way;
-    return mean;
-}
-
 /* Mean torque (N m) of the response over a segment, and its derivative by the crack's place, with the
  * crack `moved` from where the geometry was expanded. */
 static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p, int32_t segment,
@@ -95,7 +61,7 @@ static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p
                    departure(data->depth_de + (ptrdiff_t)(first + i) * q, p->edge, q);
     double lever = data->lever[segment] + data->lever_dx[segment] * moved +
                    departure(data->lever_de + (ptrdiff_t)segment * q, p->edge, q);
-    double slope, force = mean_force(&p->response, depth[0], depth[1], data->depth_dx[first],
+    double slope, force = sc_response_mean_force(&p->response, depth[0], depth[1], data->depth_dx[first],
                                      data->depth_dx[first + 1], &slope);
     double factor = damped(p->damping, data->sinking[segment]);
     *by_place = factor * (slope * lever + force * data->lever_dx[segment]);

@@ -121,6 +121,12 @@ double sc_response_log_force(const sc_response_table *table, double log_depth, d
 double sc_response_log_energy(const sc_response_table *table, double log_depth, double *slope);
 double sc_response_log_depth(const sc_response_table *table, double log_force);
 
+/* Mean force (N) between two depths: what the energy differs by, over the way. It is exact whatever
+ * part of the segment lies outside the material; depths that hardly differ have the force between
+ * them. `by_place` is its derivative where the depths change by `low_dx` and `high_dx`. */
+double sc_response_mean_force(const sc_response_table *table, double low, double high,
+                              double low_dx, double high_dx, double *by_place);
+
 /* Depth at which a crack starts and at which it stops, the force's mean between them as a share of
  * its peak, where the edge has the slope `slope`. */
 void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, double slope,

@@ -3,6 +3,10 @@
 
 #include <math.h>
 
+static const double LEAST_DEPTH = 1e-12;
+/* Depths that differ by less, as a share, count as one: energies would cancel. */
+static const double LEAST_WAY = 1e-3;
+
 typedef struct {
     double t, t2, t3;
 } cell;
@@ -104,4 +108,32 @@ double sc_response_log_depth(const sc_response_table *table, double log_force)
         if (fabs(step) < 1e-14) break;
     }
     return place;
+}
+
+/* Energy (J) stored at a depth, and the force (N) there; nothing outside the material. */
+static double stored(const sc_response_table *table, double depth, double *force)
+{
+    *force = 0.0;
+    if (depth <= LEAST_DEPTH) return 0.0;
+    double slope, energy = exp(sc_response_log_energy(table, log(depth), &slope));
+    *force = energy * slope / depth;
+    return energy;
+}
+
+double sc_response_mean_force(const sc_response_table *table, double low, double high, double low_dx,
+                         double high_dx, double *by_place)
+{
+    double at_low, at_high, way = high - low, middle = 0.5 * (low + high);
+    if (fabs(way) <= LEAST_WAY * fabs(middle)) {
+        double slope;
+        *by_place = 0.0;
+        if (middle <= LEAST_DEPTH) return 0.0;
+        double force = exp(sc_response_log_force(table, log(middle), &slope));
+        *by_place = 0.5 * force * slope / middle * (low_dx + high_dx);
+        return force;
+    }
+    double gained = stored(table, high, &at_high) - stored(table, low, &at_low);
+    double mean = gained / way;
+    *by_place = (at_high * high_dx - at_low * low_dx - mean * (high_dx - low_dx)) / way;
+    return mean;
 }
