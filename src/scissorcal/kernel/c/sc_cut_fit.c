@@ -61,8 +61,9 @@ static double elastic_torque(const sc_cut_data *data, const sc_cut_parameters *p
                    departure(data->depth_de + (ptrdiff_t)(first + i) * q, p->edge, q);
     double lever = data->lever[segment] + data->lever_dx[segment] * moved +
                    departure(data->lever_de + (ptrdiff_t)segment * q, p->edge, q);
-    double slope, force = sc_response_mean_force(&p->response, depth[0], depth[1], data->depth_dx[first],
-                                     data->depth_dx[first + 1], &slope);
+    double slope;
+    double force = sc_response_mean_force(&p->response, depth[0], depth[1], data->depth_dx[first],
+                                          data->depth_dx[first + 1], &slope);
     double factor = damped(p->damping, data->sinking[segment]);
     *by_place = factor * (slope * lever + force * data->lever_dx[segment]);
     return factor * force * lever;

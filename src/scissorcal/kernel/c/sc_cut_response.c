@@ -120,8 +120,8 @@ static double stored(const sc_response_table *table, double depth, double *force
     return energy;
 }
 
-double sc_response_mean_force(const sc_response_table *table, double low, double high, double low_dx,
-                         double high_dx, double *by_place)
+double sc_response_mean_force(const sc_response_table *table, double low, double high,
+                              double low_dx, double high_dx, double *by_place)
 {
     double at_low, at_high, way = high - low, middle = 0.5 * (low + high);
     if (fabs(way) <= LEAST_WAY * fabs(middle)) {
