@@ -19,11 +19,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from scissorcal.calibration.blade import BladeFit, fit_blade
+from scissorcal.calibration.edge.fit import BladeFit, fit_blade
 from scissorcal.errors import InputError
-from scissorcal.vision.blade_photo import BladePhoto, photograph_blade
-from scissorcal.vision.boards import BLADE_MAT, MAT_PIVOT_M
-from scissorcal.vision.camera import Camera
+from scissorcal.vision.blade.photo import BladePhoto, photograph_blade
+from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
@@ -37,6 +36,7 @@ from scissorcal.vision.sim import (
     render,
     target_layers,
 )
+from scissorcal.vision.targets.boards import BLADE_MAT, MAT_PIVOT_M
 
 CAMERA_SD = np.array([2.0, 2.0, 2.0, 2.0, 2e-3, 4e-3, 1e-4, 1e-4, 0.0])
 """How well a camera of 2000 pixels is known: focal lengths and centre in pixels, distortion."""

@@ -19,14 +19,14 @@ from typing import Any
 import cv2
 import numpy as np
 
-from scissorcal.calibration.plate import PlatePhoto, fit_plate
+from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
 from scissorcal.errors import ScissorcalError
-from scissorcal.vision.boards import PLATE_BOARD, PLATE_STRIP, MarkedBoard, dictionary
-from scissorcal.vision.camera import Camera
-from scissorcal.vision.detect import find_board
+from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Layer, Lens, as_jpeg, random_looks, render, target_layers
 from scissorcal.vision.sim import Pose as Stand
+from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, MarkedBoard, dictionary
+from scissorcal.vision.targets.detect import find_board
 
 CAMERA_SD = np.array([1.2, 1.2, 1.2, 1.2, 2e-3, 4e-3, 1e-4, 1e-4, 0.0])
 """How well a camera of 1280 pixels is known: focal lengths and centre in pixels, distortion."""

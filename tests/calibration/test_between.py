@@ -17,7 +17,7 @@ from scissorcal.calibration.verify import (
 )
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
-from tests.calibration.test_friction import emps
+from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import Truth, friction_recording
 
 SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="symmetric", critic=False)

@@ -9,7 +9,7 @@ from scissorcal.calibration import FittedParameter
 from scissorcal.calibration.caveats import FEW_COUNTS, caveats_by_parameter, caveats_of
 from scissorcal.cli.fit import _parameter_facts, _text
 from scissorcal.report.sections.parameters import tabulate_parameters
-from scissorcal.workday.fits import FitOutcome
+from scissorcal.workday.runs.fit import FitOutcome
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 GOOD = {"counts_per_sample": 8.0, "teeth_line": True}

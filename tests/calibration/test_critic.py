@@ -7,13 +7,13 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 from scissorcal.calibration import fit_friction
+from scissorcal.calibration.candidates import climb
 from scissorcal.calibration.critic import FEWEST_STROKES, RECURS, criticise
-from scissorcal.calibration.friction import friction_experiment
-from scissorcal.calibration.ladder import climb
+from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.model.terms import TERMS, Motion
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
-from tests.calibration.test_friction import emps
+from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")

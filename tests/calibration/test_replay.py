@@ -9,7 +9,7 @@ from scissorcal.calibration import fit_friction, load_fit, save_fit
 from scissorcal.calibration.replay import compare_with_replay, replay_from_stroke
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
-from tests.calibration.test_trust import fitted, motion
+from tests.calibration.test_checks import fitted, motion
 from tests.calibration.truth import Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import wilcoxon
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.ladder import (
+from scissorcal.calibration.candidates import (
     Climbed,
     Likelihood,
     Rung,
@@ -16,7 +16,7 @@ from scissorcal.calibration.ladder import (
     climb,
     signed_rank_chance,
 )
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.rung_table import rung_table
 from scissorcal.calibration.selection import selection_sentence
 from scissorcal.calibration.signals.filtering import Bins

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.stated_prior import StatedPrior
 
 NAMES = ("response_force", "response_exponent", "noise_scale", "kappa")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scissorcal.vision.boards import BLADE_MAT, CAMERA_BOARD
 from scissorcal.vision.sim import Lens, Looks, Pose, as_jpeg, render, target_layers
+from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
 from tests.cli.conftest import Cli
 
 EYE = Lens(620.0, (324.0, 236.0), 640, 480, (-0.1, 0.02, 0.0, 0.0, 0.0))

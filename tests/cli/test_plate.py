@@ -9,17 +9,17 @@ import pytest
 
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.pose import Pose as Found
-from scissorcal.vision.pose import difference
+from scissorcal.vision.geometry.pose import Pose as Found
+from scissorcal.vision.geometry.pose import difference
 from scissorcal.vision.sim import Pose, chained
-from scissorcal.workday.sim_photographs import sim_lens
-from scissorcal.workday.sim_plate import (
+from scissorcal.workday.demo.sim_photographs import sim_lens
+from scissorcal.workday.demo.sim_plate import (
     render_card_photographs,
     render_frames,
     render_plate_photographs,
     sim_plate_scene,
 )
-from scissorcal.workday.tracks import read_track
+from scissorcal.workday.runs.track import read_track
 from tests.cli.conftest import Cli
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.recording import export_table, read_recording
-from scissorcal.workday.fits import fit_workspace
+from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_friction
 

@@ -18,7 +18,7 @@ from scissorcal.device.capture import (
 from scissorcal.device.coverage import CoverageGrid
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.motion import open_motion
+from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan

@@ -13,7 +13,7 @@ import pytest
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer, servo_config
 from scissorcal.device.coverage import friction_coverage
 from scissorcal.device.link import open_link
-from scissorcal.device.motion import open_motion
+from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.port_motion import PortMotion
 from scissorcal.device.recorder import Recorder

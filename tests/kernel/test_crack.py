@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.simulation import Sheet, Unevenness, crack_law, material_torque
+from scissorcal.calibration.verify.simulation import Sheet, Unevenness, crack_law, material_torque
 from scissorcal.kernel import CrackPath, walk_crack
 from scissorcal.model import Cutting, Edge, Response, cut_torque
 from tests.kernel import golden_crack

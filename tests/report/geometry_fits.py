@@ -6,21 +6,21 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scissorcal.calibration.blade_points import FoundNick
-from scissorcal.calibration.blade_result import (
+from scissorcal.calibration.camera.result import CameraFit, CrossValidation, PixelMap, ViewError
+from scissorcal.calibration.edge.cells import FoundNick
+from scissorcal.calibration.edge.result import (
     Band,
     BladeFit,
     BladeResult,
     PhotographRow,
     RungRow,
 )
-from scissorcal.calibration.camera_result import CameraFit, CrossValidation, PixelMap, ViewError
-from scissorcal.calibration.plate_result import Halves, PlateFit, PlateView
+from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.model import Edge, EdgeBelief
 from scissorcal.report import Geometry
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.camera import Camera
-from scissorcal.vision.pose import Pose
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.pose import Pose
 
 CAMERA_SD = np.array([0.5, 0.5, 0.4, 0.4, 1e-3, 3e-3, 1e-4, 1e-4, 0.0])
 

@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.blade_result import SeenOpening
+from scissorcal.calibration.edge.result import SeenOpening
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.recipe.requirements import GeometryKind

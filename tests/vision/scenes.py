@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.boards import Board
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Lens, Looks, Pose, render, target_layers
+from scissorcal.vision.targets.boards import Board
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.vision.camera import Camera
 from scissorcal.vision.camera_files import Style, read_camera_file, write_camera_file
+from scissorcal.vision.geometry.camera import Camera
 
 BEND = (0.1, -0.2, 0.001, 0.002, 0.3)
 CAMERA = Camera(500.25, 501.5, 320.125, 240.5, BEND, 640, 480)

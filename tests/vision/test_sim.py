@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scissorcal.vision.boards import BLADE_MAT, CAMERA_BOARD
-from scissorcal.vision.camera import Camera
+from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.sim import (
     BladeShape,
     Layer,
@@ -21,6 +20,7 @@ from scissorcal.vision.sim import (
     target_layers,
 )
 from scissorcal.vision.sim.coverage import coverage
+from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
 
 SHARP = Looks(exposure=0.9, softness_px=0.0)
 LENS = Lens(1500.0, (639.5, 479.5), 1280, 960, (-0.08, 0.03, 5e-4, -3e-4, 0.0))

@@ -5,19 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.calibration.blade_storage import save_blade
-from scissorcal.calibration.camera_storage import save_camera
-from scissorcal.calibration.plate_storage import save_plate
+from scissorcal.calibration.camera.store import save_camera
+from scissorcal.calibration.edge.store import save_blade
+from scissorcal.calibration.plate.store import save_plate
 from scissorcal.errors import MissingError
-from scissorcal.workday.blades import blade_inputs_hash, blade_path
-from scissorcal.workday.cameras import camera_path
 from scissorcal.workday.geometry import fit_state
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
 from scissorcal.workday.plan import make_plan
-from scissorcal.workday.plates import plate_inputs_hash, plate_path
 from scissorcal.workday.reported_geometry import report_geometry
-from scissorcal.workday.reports import reported_fits, why_stale, write_workspace_report
-from scissorcal.workday.reviews import review_state, sign_report
+from scissorcal.workday.runs.blade import blade_inputs_hash, blade_path
+from scissorcal.workday.runs.camera import camera_path
+from scissorcal.workday.runs.plate import plate_inputs_hash, plate_path
+from scissorcal.workday.runs.report import reported_fits, why_stale, write_workspace_report
+from scissorcal.workday.runs.sign import review_state, sign_report
 from scissorcal.workday.workspace import Workspace
 from tests.report.geometry_fits import blade_result, imported_camera, plate_fit
 from tests.workday.made import RECIPE, quick_workspace

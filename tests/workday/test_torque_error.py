@@ -10,7 +10,7 @@ from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import builtin_recipe
-from scissorcal.workday.demo import torque_error
+from scissorcal.workday.demo.day import torque_error
 
 
 class _Exact:

@@ -6,14 +6,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.candidates import Climbed
+from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.critic import Critique, criticise
-from scissorcal.calibration.ladder import Climbed
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.rung_table import rung_table
 from scissorcal.calibration.selection import selection_sentence
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.calibration.trust import trust_verdicts
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion
 from scissorcal.recording.recording import Joint, Recording

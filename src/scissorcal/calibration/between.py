@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.experiment import Experiment
-from scissorcal.calibration.friction_experiment import FrictionExperiment
-from scissorcal.calibration.friction_moments import ReducedLaw
-from scissorcal.calibration.friction_search import ReducedProblem, ascend, search
-from scissorcal.calibration.layout import Layout
-from scissorcal.calibration.trust import HELD_OUT_LIMIT
+from scissorcal.calibration.checks import HELD_OUT_LIMIT
+from scissorcal.calibration.fit_model import Experiment
+from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.friction.moments import ReducedLaw
+from scissorcal.calibration.friction.search import ReducedProblem, ascend, search
+from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups
 from scissorcal.recording.recording import Recording

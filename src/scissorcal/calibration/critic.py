@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.ladder import Climbed, beaten, split_strokes
+from scissorcal.calibration.candidates import Climbed, beaten, split_strokes
 from scissorcal.calibration.result import Proposal
 from scissorcal.inference import gradient, ljung_box
 from scissorcal.model.terms import TERMS, Motion, Term, evaluate

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.ladder import Climbed
+from scissorcal.calibration.candidates import Climbed
 from scissorcal.calibration.result import ReplayComparison, ReplayRow
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import find_optimum

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.ladder import Climbed, best_of
+from scissorcal.calibration.candidates import Climbed, best_of
 
 Array = NDArray[np.float64]
 

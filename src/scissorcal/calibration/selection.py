@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.ladder import (
+from scissorcal.calibration.candidates import (
     POSITIVE_EVIDENCE,
     RELIABLE_STROKES,
     Climbed,
     best_of,
 )
-from scissorcal.calibration.leave_out import RELIABLE
+from scissorcal.calibration.psis_loo import RELIABLE
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recording.recording import Joint
 

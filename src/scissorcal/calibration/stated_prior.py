@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.parameters import Layout
 
 Array = NDArray[np.float64]
 AnyLayout = TypeVar("AnyLayout", bound=Layout)

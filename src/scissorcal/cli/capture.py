@@ -13,7 +13,7 @@ from scissorcal.errors import ScissorcalError
 
 if TYPE_CHECKING:
     from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.workday.captures import Captured
+    from scissorcal.workday.runs.capture import Captured
     from scissorcal.workday.workspace import Workspace
 
 _COMMANDS = {
@@ -85,7 +85,7 @@ def _capture(
     kind: "CaptureKind", device: str, *, hand: bool, yes: bool, seed: int, folder: Path | None
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
-    from scissorcal.workday.captures import capture_into
+    from scissorcal.workday.runs.capture import capture_into
 
     workspace = open_workspace(folder)
     before = set(workspace.recordings(kind))

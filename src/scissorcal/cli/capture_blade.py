@@ -63,8 +63,8 @@ def blade(
       blade-01.jpg: 74.98 mm long, 362 points, borders 0.9 px soft
       ...
     """
-    from scissorcal.workday.blades import capture_blade
     from scissorcal.workday.photographs import BladeSetup
+    from scissorcal.workday.runs.blade import capture_blade
 
     _refuse_contradictions(images, source, both, no_mat, scale, length_mm, pivot)
     workspace = open_workspace(folder)
@@ -77,7 +77,7 @@ def blade(
         pivot_px=pivot,
     )
     if source == "sim":
-        from scissorcal.workday.sim_photographs import render_blade_photographs
+        from scissorcal.workday.demo.sim_photographs import render_blade_photographs
 
         with tempfile.TemporaryDirectory() as scratch:
             made = render_blade_photographs(workspace.recipe(), Path(scratch), seed, both=both)

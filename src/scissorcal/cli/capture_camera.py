@@ -12,7 +12,7 @@ from scissorcal.cli.options import images_option, seed_option, workspace_option
 from scissorcal.cli.output import Answer, command, note
 
 if TYPE_CHECKING:
-    from scissorcal.vision.boards import Board
+    from scissorcal.vision.targets.boards import Board
 
 
 @click.command("camera")
@@ -65,9 +65,9 @@ def camera(
         places 6 of 9, sizes 1 of 3, slants 1 of 5; wanted: upper left, left, lower left, ...
       ...
     """
-    from scissorcal.vision.board_words import board_from_words
     from scissorcal.vision.live import pick_frames
-    from scissorcal.workday.cameras import capture_camera
+    from scissorcal.vision.targets.board_words import board_from_words
+    from scissorcal.workday.runs.camera import capture_camera
 
     if bool(images) == bool(source):
         raise click.UsageError("Give photographs with --image, or a camera or video with --camera.")
@@ -101,8 +101,8 @@ def camera(
 
 
 def _rendered(board: "Board", folder: Path, seed: int, views: int) -> Sequence[Path]:
-    from scissorcal.vision.boards import Chessboard
-    from scissorcal.workday.sim_photographs import render_board_photographs
+    from scissorcal.vision.targets.boards import Chessboard
+    from scissorcal.workday.demo.sim_photographs import render_board_photographs
 
     if isinstance(board, Chessboard):
         raise click.UsageError("Only printed boards with markers are rendered: leave --board out.")

@@ -12,7 +12,7 @@ from scissorcal.cli.options import images_option, seed_option, workspace_option
 from scissorcal.cli.output import Answer, command, note
 
 if TYPE_CHECKING:
-    from scissorcal.workday.plates import PlateCapture
+    from scissorcal.workday.runs.plate import PlateCapture
     from scissorcal.workday.workspace import Workspace
 
 
@@ -63,7 +63,7 @@ def plate(
       plate-01.jpg: 24 of 24 corners of the plate board, 62 px a side
       ...
     """
-    from scissorcal.workday.plates import capture_plate, read_stances
+    from scissorcal.workday.runs.plate import capture_plate, read_stances
 
     if bool(images) == bool(source):
         raise click.UsageError("Give photographs with --image, or a camera or video with --camera.")
@@ -96,10 +96,10 @@ def plate(
 def _from_camera(
     workspace: "Workspace", source: str, views: int, seed: int, *, card: bool
 ) -> "PlateCapture":
-    from scissorcal.vision.boards import PLATE_BOARD, PLATE_STRIP
     from scissorcal.vision.live import pick_at_rest
-    from scissorcal.workday.plates import capture_plate
-    from scissorcal.workday.sim_plate import render_card_photographs, render_plate_photographs
+    from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
+    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
+    from scissorcal.workday.runs.plate import capture_plate
 
     with tempfile.TemporaryDirectory() as scratch:
         if card:

@@ -10,7 +10,7 @@ from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.workday.demo import DemoResult
+    from scissorcal.workday.demo.day import DemoResult
 
 _ANSWERS = {True: "yes", False: "no", None: "-"}
 
@@ -53,7 +53,7 @@ def demo(
       ...
     """
     from scissorcal.recipe.library import recipe_path
-    from scissorcal.workday.demo import run_demo
+    from scissorcal.workday.demo.day import run_demo
     from scissorcal.workday.workspace import demo_folder
 
     recipe_path(recipe)

@@ -52,7 +52,7 @@ def export(
 def _export_camera(
     fit: Path, file: Path, style: Literal["opencv", "ros"], overwrite: bool
 ) -> Answer:
-    from scissorcal.calibration.camera_storage import load_camera
+    from scissorcal.calibration.camera.store import load_camera
     from scissorcal.errors import InputError
     from scissorcal.vision.camera_files import write_camera_file
 

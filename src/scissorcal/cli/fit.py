@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from scissorcal.calibration import FittedParameter
-    from scissorcal.workday.fits import FitOutcome
+    from scissorcal.workday.runs.fit import FitOutcome
 
 GRACE_S = 180.0
 """A fit that stops at its limit still measures curvature and scores; it is ended by force later."""
@@ -133,7 +133,7 @@ def _fits(
     force: bool,
     limit_s: float,
 ) -> Answer:
-    from scissorcal.workday.fits import fit_workspace
+    from scissorcal.workday.runs.fit import fit_workspace
 
     ends_s = time.monotonic() + limit_s
     with progress(limit_s, grace_s=GRACE_S) as tell:

@@ -8,8 +8,8 @@ from scissorcal.cli.output import Answer, table
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.blade_result import BladeFit
-    from scissorcal.workday.blades import BladeOutcome
+    from scissorcal.calibration.edge.result import BladeFit
+    from scissorcal.workday.runs.blade import BladeOutcome
 
 
 def fit_blade(
@@ -21,8 +21,8 @@ def fit_blade(
     limit_s: float | None = None,
 ) -> Answer:
     """Fit a workspace's blade, where its photographs changed, and say what its edge is."""
-    from scissorcal.calibration.blade_result import blade_facts
-    from scissorcal.workday.blades import fit_workspace_blade
+    from scissorcal.calibration.edge.result import blade_facts
+    from scissorcal.workday.runs.blade import fit_workspace_blade
 
     with progress(limit_s) as tell:
         outcome = fit_workspace_blade(

@@ -8,8 +8,8 @@ from scissorcal.cli.output import Answer, table
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.camera_result import CameraFit
-    from scissorcal.workday.cameras import CameraOutcome
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.workday.runs.camera import CameraOutcome
 
 _WORST = 3
 
@@ -18,7 +18,7 @@ def fit_camera(
     folder: Path | None, *, seed: int, force: bool, limit_s: float | None = None
 ) -> Answer:
     """Fit a workspace's camera, where its photographs changed, and say how well it is known."""
-    from scissorcal.workday.cameras import fit_workspace_camera
+    from scissorcal.workday.runs.camera import fit_workspace_camera
 
     workspace = open_workspace(folder)
     with progress(limit_s) as tell:
@@ -31,7 +31,7 @@ def camera_table(fit: "CameraFit") -> str:
     """Set out a camera's parameters for people."""
     import numpy as np
 
-    from scissorcal.vision.camera import PARAMETERS
+    from scissorcal.vision.geometry.camera import PARAMETERS
 
     camera = fit.camera
     values = (camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5])

@@ -7,13 +7,13 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.output import Answer, table
 
 if TYPE_CHECKING:
-    from scissorcal.vision.pose import Pose
-    from scissorcal.workday.plates import PlateOutcome
+    from scissorcal.vision.geometry.pose import Pose
+    from scissorcal.workday.runs.plate import PlateOutcome
 
 
 def fit_plate(folder: Path | None, *, force: bool) -> Answer:
     """Fit a workspace's plate, where its photographs changed, and say where it stands."""
-    from scissorcal.workday.plates import fit_workspace_plate
+    from scissorcal.workday.runs.plate import fit_workspace_plate
 
     outcome = fit_workspace_plate(open_workspace(folder), force=force)
     files = () if outcome.cached else (outcome.path, *outcome.pictures)

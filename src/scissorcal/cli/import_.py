@@ -123,7 +123,7 @@ def import_(
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:
     from scissorcal.cli.fit_camera import camera_table
-    from scissorcal.workday.cameras import import_camera
+    from scissorcal.workday.runs.camera import import_camera
 
     workspace = open_workspace(folder)
     fit, read, path = import_camera(workspace, file)

@@ -45,7 +45,7 @@ def build(force: bool, seed: int, folder: Path | None) -> Answer:
       package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
       ...
     """
-    from scissorcal.workday.packages import build_workspace_package
+    from scissorcal.workday.runs.package import build_workspace_package
 
     workspace = open_workspace(folder)
     built = build_workspace_package(workspace, seed=seed, force=force)

@@ -11,7 +11,7 @@ from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.workday.predictions import PredictionOutcome
+    from scissorcal.workday.runs.predict import PredictionOutcome
 
 
 @click.command("predict")
@@ -59,7 +59,7 @@ def predict(
       measured: 93.1% of 4316 samples in the band, rms error 0.00121 N m
       torque.svg
     """
-    from scissorcal.workday.predictions import predict_workspace
+    from scissorcal.workday.runs.predict import predict_workspace
 
     with progress() as tell:
         outcome = predict_workspace(

@@ -12,7 +12,7 @@ from scissorcal.cli.options import device_option, seed_option, workspace_option,
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
-    from scissorcal.workday.renders import Rendered
+    from scissorcal.workday.runs.render import Rendered
 
 
 @click.command("render")
@@ -69,7 +69,7 @@ def render(
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.render import VirtualStrokes
-    from scissorcal.workday.renders import (
+    from scissorcal.workday.runs.render import (
         package_has_fallen_behind,
         package_warnings,
         render_workspace,

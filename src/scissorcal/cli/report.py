@@ -43,12 +43,12 @@ def report(anew: bool, folder: Path | None) -> Answer:
       report/report.html and report/report.json show 2 fits
       ...
     """
-    from scissorcal.workday.reports import (
+    from scissorcal.workday.runs.report import (
         read_workspace_report,
         reported_fits,
         write_workspace_report,
     )
-    from scissorcal.workday.reviews import standing_review
+    from scissorcal.workday.runs.sign import standing_review
 
     workspace = open_workspace(folder)
     review = None if anew else standing_review(workspace)
@@ -92,7 +92,7 @@ def compare(first: Path, second: Path, output: Path) -> Answer:
       No parameter differs by more than 3 standard deviations. Rendered torque differs by at ...
       comparison/comparison.html and comparison/comparison.json show it
     """
-    from scissorcal.workday.comparisons import compare_runs
+    from scissorcal.workday.runs.compare import compare_runs
 
     done = compare_runs(first, second, output)
     found = done.comparison
@@ -138,7 +138,7 @@ def sign(
       report/signature.json: accepted by A. Lovelace on 2025-01-31: edge was reground
       next: scissorcal package build
     """
-    from scissorcal.workday.reviews import sign_report
+    from scissorcal.workday.runs.sign import sign_report
 
     workspace = open_workspace(folder)
     review = sign_report(workspace, name, decision, note)

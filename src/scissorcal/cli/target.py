@@ -8,7 +8,7 @@ import click
 from scissorcal.cli.output import Answer, command
 
 if TYPE_CHECKING:
-    from scissorcal.vision.target import Paper, Sheet, SheetName
+    from scissorcal.vision.targets.sheet import Paper, Sheet, SheetName
 
 
 @click.command("target")
@@ -38,8 +38,8 @@ def target(
       target-blade-A4.pdf, target-blade-A4.png: blade mat (markers 40-69)
       Print at 100 % (actual size); the rulers must be 200.0 mm across and 150.0 mm down.
     """
-    from scissorcal.vision.target import RULERS_MM, target_sheet
-    from scissorcal.vision.target_files import write_target
+    from scissorcal.vision.targets.sheet import RULERS_MM, target_sheet
+    from scissorcal.vision.targets.sheet_files import write_target
 
     names: tuple[SheetName, ...] = ("camera", "blade", "plate") if what == "all" else (what,)
     written: list[Path] = []

@@ -110,7 +110,7 @@ def verify(
     Width is the factor by which intervals are too narrow (above 1) or too wide, shift how far they
     lie beside the truth, p the probability of such ranks where they are right.
     """
-    from scissorcal.workday.verify import VerifySettings, verify_workspace
+    from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 
     if workers is not None and cluster is not None:
         raise click.UsageError("A cluster has workers of its own: give --workers or --cluster.")

@@ -12,7 +12,8 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_strokes, hand_travel
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
-from scissorcal.device.motion import Motion, MotionReport, Samples, open_motion
+from scissorcal.device.motion import Motion, MotionReport, Samples
+from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
 from scissorcal.kernel import Identity, ServoConfig

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import scissorcal
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.plate_result import PlateFit
+from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package.archive import archive_bytes, member_of, write_archive
 from scissorcal.package.average import AverageTorque

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.recording.tables import Column, Table, Wanted
+from scissorcal.recording.table import Column, Table, Wanted
 
 
 def read_mat(path: Path, wanted: Wanted) -> Table:

@@ -9,7 +9,7 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.units import conversion, parse_unit, split_unit
 from scissorcal.recording.layout import unit_of
 from scissorcal.recording.recording import Joint
-from scissorcal.recording.tables import Table
+from scissorcal.recording.table import Table
 
 COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
 

@@ -1,56 +1,18 @@
-"""Tables that others wrote, as columns of numbers: one type for CSV, Parquet and MATLAB files."""
+"""Read the wanted columns of a table: text, Parquet or MATLAB, by the file's ending."""
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-
-Array = NDArray[np.float64]
-Wanted = Mapping[str, str | int]
-"""Channel to column: the column's heading, or its number from 0."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column with its heading as it stands in the file, shape (N,), not yet converted."""
-
-    heading: str
-    values: Array
-
-
-@dataclass(frozen=True)
-class Table:
-    """The wanted columns of a file by channel, all of one length, and the file's single numbers.
-
-    ``lines`` has the line number of each row where the file is text, shape (N,).
-    """
-
-    path: Path
-    columns: Mapping[str, Column]
-    scalars: Mapping[str, float] = field(default_factory=dict)
-    lines: NDArray[np.int64] | None = None
-
-    @property
-    def length(self) -> int:
-        return max((len(column.values) for column in self.columns.values()), default=0)
-
-    def place(self, row: int, channel: str | None = None) -> str:
-        """Name a row (from 0), and a channel's column, as a person finds them in the file."""
-        where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
-        column = f", column {self.columns[channel].heading!r}" if channel else ""
-        return f"{self.path}, {where}{column}"
+from scissorcal.recording.table import Table, Wanted
 
 
 def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
     """Read the wanted columns of a table; the file's ending says what it is.
 
     ``.mat`` is MATLAB, ``.parquet`` and ``.pq`` are Parquet, everything else is text with one
-    row a line. Every number is finite. Raises InputError naming file, place and mend.
+    row a line. Every number is finite. Raises InputError naming file, place and remedy.
     """
     if not path.is_file():
         raise InputError(f"{path} is no file. Check the name and the folder.")
@@ -62,7 +24,9 @@ def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Tabl
 
         table = read_mat(path, wanted)
     elif suffix in (".parquet", ".pq"):
-        table = _read_parquet(path, wanted)
+        from scissorcal.recording.parquetfile import read_parquet
+
+        table = read_parquet(path, wanted)
     else:
         from scissorcal.recording.textfile import read_text
 
@@ -70,70 +34,6 @@ def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Tabl
     _check_lengths(table)
     _check_finite(table)
     return table
-
-
-def find_column(path: Path, headings: Sequence[str], column: str | int, channel: str) -> int:
-    """Return the number of the column that is meant: by heading, heading without unit, or number.
-
-    >>> find_column(Path("log.csv"), ["t [s]", "Torque [Nm]"], "torque", "motor_torque")
-    1
-    """
-    if isinstance(column, str):
-        for simplify in (str.strip, _plain, _without_unit):
-            wanted = simplify(column)
-            found = [i for i, heading in enumerate(headings) if simplify(heading) == wanted]
-            if len(found) > 1:
-                raise InputError(
-                    f"{path} has {len(found)} columns called {column!r}. Name the one for "
-                    f"{channel} by its number, from 0: {', '.join(map(str, found))}."
-                )
-            if found:
-                return found[0]
-    if isinstance(column, int) or column.strip().isdecimal():
-        if 0 <= int(column) < len(headings):
-            return int(column)
-        raise InputError(
-            f"{path} has no column {column} for {channel}: its columns are numbered 0 to "
-            f"{len(headings) - 1}."
-        )
-    listed = ", ".join(repr(heading) for heading in headings[:30])
-    raise InputError(
-        f"{path} has no column {column!r} for {channel}. Name one of these, or its number from 0: "
-        f"{listed}."
-    )
-
-
-def _read_parquet(path: Path, wanted: Wanted) -> Table:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        file = pq.ParquetFile(path)
-        headings = file.schema_arrow.names
-        chosen = {
-            channel: find_column(path, headings, column, channel)
-            for channel, column in wanted.items()
-        }
-        data = file.read(columns=sorted({headings[number] for number in chosen.values()}))
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it anew, or "
-            "export it as CSV."
-        ) from error
-    columns = {}
-    for channel, number in chosen.items():
-        heading = headings[number]
-        column = data.column(heading)
-        if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
-            heading = f"{heading} [{column.type.unit}]"
-            column = column.cast(pa.int64())
-        elif not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
-            raise InputError(
-                f"{path}, column {heading!r} holds {column.type}, not numbers. Convert it, or "
-                f"name another column for {channel}."
-            )
-        columns[channel] = Column(heading, column.cast(pa.float64(), safe=False).to_numpy())
-    return Table(path, columns)
 
 
 def _check_lengths(table: Table) -> None:
@@ -165,11 +65,3 @@ def _check_finite(table: Table) -> None:
             f"{table.place(bad[channel], channel)}: {value} is no measurement ({count} such cells "
             "in all). Remove those rows, or repair them where the log was made."
         )
-
-
-def _plain(heading: str) -> str:
-    return " ".join(heading.split()).casefold()
-
-
-def _without_unit(heading: str) -> str:
-    return _plain(re.sub(r"[\[(][^\])]*[\])]\s*$", "", heading))

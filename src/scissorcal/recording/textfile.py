@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.recording.tables import Column, Table, Wanted, find_column
+from scissorcal.recording.table import Column, Table, Wanted, find_column
 
 COMMENT_MARKS = ("%", "#")
 DELIMITERS = (",", ";", "\t", "|", None)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scissorcal.device.capture import identity_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import Motion, Samples, open_motion
+from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.open_motion import open_motion
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
 from scissorcal.package import ModelPackage

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
-from scissorcal.calibration.blade_result import BladeResult
-from scissorcal.calibration.camera_result import CameraFit
-from scissorcal.calibration.plate_result import PlateFit
+from scissorcal.calibration.camera.result import CameraFit
+from scissorcal.calibration.edge.result import BladeResult
+from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.numbers import Scalar, scalar

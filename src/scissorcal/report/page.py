@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from scissorcal.calibration.checks import PRIOR_ONLY
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report import numbers
 from scissorcal.report.document import FitMaterial, FitSection, ReportDocument

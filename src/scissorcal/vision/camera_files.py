@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.vision.camera import Camera
+from scissorcal.vision.geometry.camera import Camera
 
 Style = Literal["opencv", "ros"]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.boards import Board
-from scissorcal.vision.detect import Detection
+from scissorcal.vision.targets.boards import Board
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 

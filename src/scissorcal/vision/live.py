@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.vision.boards import Board
-from scissorcal.vision.detect import Detection, find_board
 from scissorcal.vision.photo import Photo
+from scissorcal.vision.targets.boards import Board
+from scissorcal.vision.targets.detect import Detection, find_board
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.detect import Detection
 from scissorcal.vision.photo import Photo, Picture
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.vision.board_pose import BoardPose, Corners, locate_board
-from scissorcal.vision.boards import PRINT_SCALE_SD, MarkedBoard
-from scissorcal.vision.camera import Camera
+from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
+from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.live import Frame, look
+from scissorcal.vision.targets.boards import PRINT_SCALE_SD, MarkedBoard
 
 ODDS = 20.0
 """Below these odds against the second pose that a plane allows, a picture is ambiguous."""

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Literal
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.verdicts import Verdict, failed
-from scissorcal.workday.blades import blade_inputs_hash, blade_path, fit_workspace_blade
-from scissorcal.workday.cameras import camera_inputs_hash, camera_path, fit_workspace_camera
 from scissorcal.workday.photographs import photo_captures
-from scissorcal.workday.plates import fit_workspace_plate, plate_inputs_hash, plate_path
+from scissorcal.workday.runs.blade import blade_inputs_hash, blade_path, fit_workspace_blade
+from scissorcal.workday.runs.camera import camera_inputs_hash, camera_path, fit_workspace_camera
+from scissorcal.workday.runs.plate import fit_workspace_plate, plate_inputs_hash, plate_path
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
-    from scissorcal.calibration.plate_result import PlateFit
+    from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.inference import Effort
     from scissorcal.model import EdgeBelief
     from scissorcal.recipe.schema import Recipe
@@ -76,7 +76,7 @@ def edge_belief(workspace: Workspace, recipe: "Recipe") -> "EdgeBelief | None":
     Raises MissingError where the recipe asks for photographs and they are not fitted, or have
     changed since, InputError where their shape has no scale.
     """
-    from scissorcal.calibration.blade_storage import load_blade
+    from scissorcal.calibration.edge.store import load_blade
 
     if not requirements(recipe).needs_geometry("blade"):
         return None
@@ -91,7 +91,7 @@ def edge_belief(workspace: Workspace, recipe: "Recipe") -> "EdgeBelief | None":
 
 def edge_verdicts(workspace: Workspace, recipe: "Recipe") -> tuple[Verdict, ...]:
     """Verdicts on the fit that the edge is taken from; none where it is the recipe's own."""
-    from scissorcal.calibration.blade_storage import load_blade
+    from scissorcal.calibration.edge.store import load_blade
 
     if not requirements(recipe).needs_geometry("blade"):
         return ()
@@ -103,7 +103,7 @@ def scene_plate(workspace: Workspace, recipe: "Recipe") -> "PlateFit | None":
 
     Raises MissingError where it does, and the fit is missing or has fallen behind.
     """
-    from scissorcal.calibration.plate_storage import load_plate
+    from scissorcal.calibration.plate.store import load_plate
 
     if not requirements(recipe).needs_geometry("plate"):
         return None
@@ -175,9 +175,9 @@ _PATHS: dict[GeometryKind, Callable[[Workspace], Path]] = {
 
 def _stored(what: GeometryKind, path: Path) -> tuple[str, tuple[Verdict, ...], bool]:
     """Inputs hash and verdicts of a stored fit, and whether it was brought in from a file."""
-    from scissorcal.calibration.blade_storage import load_blade
-    from scissorcal.calibration.camera_storage import load_camera
-    from scissorcal.calibration.plate_storage import load_plate
+    from scissorcal.calibration.camera.store import load_camera
+    from scissorcal.calibration.edge.store import load_blade
+    from scissorcal.calibration.plate.store import load_plate
 
     if what == "camera":
         camera = load_camera(path)

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scissorcal.errors import InputError
-from scissorcal.vision.boards import CharucoBoard, Chessboard, MarkerBoard
+from scissorcal.vision.targets.boards import CharucoBoard, Chessboard, MarkerBoard
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.vision.detect import Detection
     from scissorcal.vision.photo import Photo
+    from scissorcal.vision.targets.detect import Detection
 
 PhotoKind = Literal["camera", "blade", "plate", "rig"]
 INDEX_FILE = "capture.json"
@@ -166,7 +166,7 @@ def detection_of(capture: PhotoCapture, photograph: Photograph) -> "Detection":
     """What was found in a stored photograph. Raises InputError where its capture has no board."""
     import numpy as np
 
-    from scissorcal.vision.detect import Detection
+    from scissorcal.vision.targets.detect import Detection
 
     board = capture.index.board
     if board is None:

@@ -13,11 +13,11 @@ from scissorcal.recipe.requirements import (
 )
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
-from scissorcal.workday.fits import is_current, is_verified
 from scissorcal.workday.geometry import expected_package_hash
 from scissorcal.workday.recordings import UnreadableError, usable_recordings
-from scissorcal.workday.reports import why_stale
-from scissorcal.workday.reviews import review_state
+from scissorcal.workday.runs.fit import is_current, is_verified
+from scissorcal.workday.runs.report import why_stale
+from scissorcal.workday.runs.sign import review_state
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:

@@ -26,9 +26,9 @@ def report_geometry(workspace: Workspace, recipe: "Recipe") -> "Geometry":
 
     One that is missing, damaged or has fallen behind is named with the command that makes it.
     """
-    from scissorcal.calibration.blade_storage import load_blade
-    from scissorcal.calibration.camera_storage import load_camera
-    from scissorcal.calibration.plate_storage import load_plate
+    from scissorcal.calibration.camera.store import load_camera
+    from scissorcal.calibration.edge.store import load_blade
+    from scissorcal.calibration.plate.store import load_plate
     from scissorcal.report import Geometry
 
     files: dict[GeometryKind, Path] = {}

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.path import Material, PathMotion, material_of, path_motion
-from scissorcal.calibration.torque_noise import TorqueNoise
+from scissorcal.calibration.cut.path import Material, PathMotion, material_of, path_motion
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import (
     Cutting,
     Edge,
@@ -20,7 +20,7 @@ from scissorcal.model import (
 )
 from scissorcal.model.cutting import torque_at
 from scissorcal.recording.recording import Stroke
-from tests.calibration.path.made import COULOMB, INERTIA, RATE_HZ, Made, record
+from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, Made, record
 from tests.calibration.truth import Truth, sweep
 
 Array = NDArray[np.float64]

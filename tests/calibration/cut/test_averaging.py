@@ -14,7 +14,7 @@ from scissorcal.calibration.cut.averaging import (
     log_evidence,
 )
 from scissorcal.calibration.cut.laws import CutLaw
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem
 

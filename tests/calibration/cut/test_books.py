@@ -11,11 +11,11 @@ import pytest
 
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.path import mean_torque, path_motion
 from scissorcal.calibration.cut.scout import belief_geometry
 from scissorcal.calibration.cut.segments import cut_into_segments
 from scissorcal.calibration.cut.structure import edge_of
-from scissorcal.calibration.path import mean_torque, path_motion
-from scissorcal.calibration.torque_noise import TorqueNoise
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, Response
 from tests.second_rig import (
     capture_cut,

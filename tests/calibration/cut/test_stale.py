@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
+from scissorcal.calibration.cut.path import material_of, path_motion
 from scissorcal.calibration.cut.stale import SheetStrokes, count_empty, stale_verdict
-from scissorcal.calibration.path import material_of, path_motion
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import FRICTION, HIGH, LOW, cut, way
+from tests.calibration.cut.path.made import INERTIA
 from tests.calibration.cut.recipes import friction_of, paper
-from tests.calibration.path.made import INERTIA
 from tests.calibration.truth import Truth, make_recording, sweep
 
 PLACES = (-0.018, 0.012, 0.042)

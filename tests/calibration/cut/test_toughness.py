@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.storage import load_fit, save_fit
+from scissorcal.calibration.store import load_fit, save_fit
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, recipe
 

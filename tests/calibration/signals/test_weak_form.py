@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.friction_basis import FrictionBasis
+from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state

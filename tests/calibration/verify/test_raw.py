@@ -8,14 +8,7 @@ import pytest
 from scissorcal.calibration import FitResult, cut_experiment, fit_cut, fit_friction
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import edge_of
-from scissorcal.calibration.friction import friction_experiment
-from scissorcal.calibration.simulation import (
-    CutTruth,
-    DriveTruth,
-    Unevenness,
-    motion_of,
-    simulate_cut,
-)
+from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify import (
     assess,
     cut_simulator,
@@ -23,6 +16,13 @@ from scissorcal.calibration.verify import (
     make_study,
     run,
     tasks_of,
+)
+from scissorcal.calibration.verify.simulation import (
+    CutTruth,
+    DriveTruth,
+    Unevenness,
+    motion_of,
+    simulate_cut,
 )
 from scissorcal.model import Cutting, Response
 from scissorcal.recipe.schema import Recipe

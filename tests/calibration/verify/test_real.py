@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.friction import friction_experiment
+from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify import assess, friction_simulator, make_study, run, tasks_of
 from scissorcal.recipe.schema import FitFriction
-from tests.calibration.test_friction import emps
+from tests.calibration.friction.test_fit import emps
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.ladder import Likelihood, Rung
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.candidates import Likelihood, Rung
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
@@ -43,7 +43,7 @@ class Naive(Rung):
 
 @dataclass(frozen=True)
 class Linear:
-    """Picklable, as :class:`scissorcal.calibration.experiment.Experiment` asks."""
+    """Picklable, as :class:`scissorcal.calibration.fit_model.Experiment` asks."""
 
     observed: Array
     naive: bool = False

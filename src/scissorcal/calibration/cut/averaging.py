@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.candidates import Climbed
 from scissorcal.calibration.cut.lack_of_fit import Budget
-from scissorcal.calibration.ladder import Climbed
+from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.inference import Posterior
 
 Array = NDArray[np.float64]

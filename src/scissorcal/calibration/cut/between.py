@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.between import BetweenRecordings, FitsApart, gather_recordings
-from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.inference import Posterior, find_optimum, infer
 from scissorcal.recording.recording import Recording
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.lack_of_fit import Budget
+from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.scout import Scouted
 from scissorcal.calibration.cut.stale import count_empty, stale_verdict
 from scissorcal.calibration.cut.teeth import COHERENT

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import widened
+from scissorcal.calibration.candidates import Climbed, choose, climb
 from scissorcal.calibration.cut.averaging import (
     Candidate,
     Inferred,
@@ -18,12 +19,13 @@ from scissorcal.calibration.cut.averaging import (
 )
 from scissorcal.calibration.cut.between import between_notes, compare_cuts
 from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
-from scissorcal.calibration.cut.experiment import CutExperiment
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import NoUnloadingError
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.lack_of_fit import budget_of
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
+from scissorcal.calibration.cut.model import CutExperiment
+from scissorcal.calibration.cut.path import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
     Scouted,
     belief_geometry,
@@ -36,8 +38,6 @@ from scissorcal.calibration.cut.unknowns import SCENE_OF_BOUNDS, with_unknowns
 from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
-from scissorcal.calibration.ladder import Climbed, choose, climb
-from scissorcal.calibration.path import PathMotion, path_motion
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.stated_prior import StatedPrior

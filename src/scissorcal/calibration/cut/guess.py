@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.path import Material, PathMotion, mean_torque
+from scissorcal.calibration.cut.path import Material, PathMotion, mean_torque
 from scissorcal.model import Response
 
 Array = NDArray[np.float64]

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction_experiment import friction_law
-from scissorcal.calibration.path import (
+from scissorcal.calibration.cut.path import (
     Material,
     PathMotion,
     material_of,
     torque_noise_of,
 )
+from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.experiment import CutExperiment
+from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.inference.curvature import gradient, natural_step
 
 Array = NDArray[np.float64]

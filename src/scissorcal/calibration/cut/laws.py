@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.calibration.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,

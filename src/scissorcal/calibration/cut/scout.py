@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.experiment import CutExperiment, starting_point
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess, NoUnloadingError, first_guess
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood, LineDatum
+from scissorcal.calibration.cut.model import CutExperiment, starting_point
+from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments, find_runs
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
-from scissorcal.calibration.path import Material, PathMotion
 from scissorcal.inference import Optimum, find_optimum
 from scissorcal.model import EdgeBelief, Response
 from scissorcal.recipe.schema import Recipe

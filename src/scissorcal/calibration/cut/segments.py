@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.cut.swings import swings_unseen
-from scissorcal.calibration.path import (
+from scissorcal.calibration.cut.path import (
     Material,
     PathMotion,
     mean_torque,
@@ -22,7 +21,8 @@ from scissorcal.calibration.path import (
     torque_covariance,
     turning_points,
 )
-from scissorcal.calibration.torque_noise import TorqueNoise
+from scissorcal.calibration.cut.swings import swings_unseen
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.segments import find_runs
-from scissorcal.calibration.path import Material, PathMotion
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.path import PathMotion
+from scissorcal.calibration.cut.path import PathMotion
 
 Integers = NDArray[np.int64]
 

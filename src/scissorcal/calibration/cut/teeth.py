@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.path import Material
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
-from scissorcal.calibration.path import Material
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

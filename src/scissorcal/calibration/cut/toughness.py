@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scissorcal.calibration.layout import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.schema import Recipe
 

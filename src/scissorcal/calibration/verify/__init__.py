@@ -19,7 +19,7 @@ from scissorcal.calibration.verify.simulator import (
     cut_simulator,
     friction_simulator,
 )
-from scissorcal.calibration.verify.storage import load_verify, save_verify
+from scissorcal.calibration.verify.store import load_verify, save_verify
 from scissorcal.calibration.verify.study import Study, Task, run
 
 __all__ = [

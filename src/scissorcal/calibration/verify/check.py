@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.generating import generating_prior
 from scissorcal.calibration.verify.halves import StrokeFacts, split_strokes
-from scissorcal.calibration.verify.judgement import FALSE_ALARM, RANKS_SHARE, judge
 from scissorcal.calibration.verify.result import FORMAT, Check, PriorKind, VerifyResult
 from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.calibration.verify.study import Record, Study, Task, unconstrained_draws
@@ -18,6 +17,7 @@ from scissorcal.calibration.verify.summary import (
     summarise_sensitivity,
     summarise_simulated,
 )
+from scissorcal.calibration.verify.verdicts import FALSE_ALARM, RANKS_SHARE, judge
 
 Array = NDArray[np.float64]
 

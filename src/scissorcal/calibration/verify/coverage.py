@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from scissorcal.calibration.verify.uniformity import acceptance
+from scissorcal.calibration.verify.rank_tests import acceptance
 
 
 @dataclass(frozen=True)

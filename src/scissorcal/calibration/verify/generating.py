@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.calibration.verify.result import PriorKind
 

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
-from scissorcal.calibration.friction import fit_friction
-from scissorcal.calibration.layout import Layout
-from scissorcal.calibration.path import torque_noise_of
+from scissorcal.calibration.cut.path import torque_noise_of
+from scissorcal.calibration.friction.fit import fit_friction
+from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.simulation import (
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.calibration.verify.simulation import (
     Motion,
     cut_truth,
     friction_truth,
@@ -21,8 +23,6 @@ from scissorcal.calibration.simulation import (
     simulate_cut,
     simulate_friction,
 )
-from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.calibration.torque_noise import TorqueNoise
 from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording

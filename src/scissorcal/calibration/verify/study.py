@@ -9,13 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.experiment import Experiment
+from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.verify.generating import Generating, refit_prior, unbroken
 from scissorcal.calibration.verify.halves import Split
-from scissorcal.calibration.verify.power import power_sensitivity
+from scissorcal.calibration.verify.prior_sensitivity import power_sensitivity
+from scissorcal.calibration.verify.rank_tests import rank_among
 from scissorcal.calibration.verify.simulator import Simulator
-from scissorcal.calibration.verify.uniformity import rank_among
 from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.inference import Posterior, infer, ljung_box
 

@@ -5,9 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.layout import Layout
+from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.verify.halves import HalfFit, compare, effort_difference
-from scissorcal.calibration.verify.power import SENSITIVE, diagnose
+from scissorcal.calibration.verify.prior_sensitivity import SENSITIVE, diagnose
+from scissorcal.calibration.verify.rank_tests import (
+    acceptance,
+    chi_square_p_value,
+    ecdf_band,
+    ecdf_p_value,
+)
 from scissorcal.calibration.verify.result import (
     Calibration,
     Coverage,
@@ -19,12 +25,6 @@ from scissorcal.calibration.verify.result import (
     SensitivityRow,
 )
 from scissorcal.calibration.verify.study import LEVELS, Record, Study
-from scissorcal.calibration.verify.uniformity import (
-    acceptance,
-    chi_square_p_value,
-    ecdf_band,
-    ecdf_p_value,
-)
 from scissorcal.inference import gradient
 from scissorcal.inference.importance import K_HAT_LIMIT
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.calibration.blade_result import Band, BladeFit, BladeResult
+from scissorcal.calibration.edge.result import Band, BladeFit, BladeResult
 from scissorcal.report.numbers import Number, finite, finite_each
 
 

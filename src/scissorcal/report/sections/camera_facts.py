@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.calibration.camera_result import CameraFit
+from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.report.numbers import Number, finite, finite_each
-from scissorcal.vision.camera import PARAMETERS
+from scissorcal.vision.geometry.camera import PARAMETERS
 
 MEANINGS = (
     ("focal length, across", "px"),

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from scissorcal.calibration.checks import K_HAT_LIMIT
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.trust import K_HAT_LIMIT
 from scissorcal.report.numbers import Scalar, scalar
 
 MEANINGS = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.path import path_motion
+from scissorcal.calibration.cut.path import path_motion
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import (

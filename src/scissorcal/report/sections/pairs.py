@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scissorcal.calibration.checks import PRIOR_ONLY
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite, finite_each, short, significant, unit_text
 from scissorcal.report.panel import Panel, Row, Table, absent, columns
 from scissorcal.report.reduce import Array, thinned

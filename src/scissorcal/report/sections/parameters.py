@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scissorcal.calibration.caveats import caveats_by_parameter
+from scissorcal.calibration.checks import PRIOR_ONLY
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.trust import PRIOR_ONLY
 from scissorcal.report.numbers import Number, finite
 
 Word = Literal["identified", "prior only", "measured before", "not available"]

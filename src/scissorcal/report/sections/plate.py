@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.calibration.plate_result import PlateFit
+from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.report.numbers import (
     Number,
     decimals_for,
@@ -21,7 +21,7 @@ from scissorcal.report.numbers import (
 )
 from scissorcal.report.panel import Panel, Row, Table, columns
 from scissorcal.report.pictures import Picture, PictureFile
-from scissorcal.vision.pose import Pose, difference
+from scissorcal.vision.geometry.pose import Pose, difference
 
 ANCHOR = "plate"
 MOVED = 3.0

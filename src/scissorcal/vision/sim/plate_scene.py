@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.boards import RIG_MARKERS, MarkedBoard
 from scissorcal.vision.sim.lens import Pose
 from scissorcal.vision.sim.photograph import Layer
 from scissorcal.vision.sim.targets import target_layers
+from scissorcal.vision.targets.boards import RIG_MARKERS, MarkedBoard
 
 Array = NDArray[np.float64]
 

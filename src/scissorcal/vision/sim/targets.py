@@ -5,9 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.boards import Board, CharucoBoard, Chessboard, MarkerBoard, dictionary
 from scissorcal.vision.sim.lens import Pose
 from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.targets.boards import (
+    Board,
+    CharucoBoard,
+    Chessboard,
+    MarkerBoard,
+    dictionary,
+)
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""The camera: bundle adjustment over a board's corners, its uncertainty, the fit."""

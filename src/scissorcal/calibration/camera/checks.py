@@ -1,0 +1,160 @@
+"""What a camera's fit is judged by, and what is refused before it is one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, first_pose
+from scissorcal.calibration.camera.result import CrossValidation, PixelMap, ViewError
+from scissorcal.errors import VerdictError
+from scissorcal.verdicts import Verdict
+from scissorcal.vision.geometry.camera import Camera
+
+Array = NDArray[np.float64]
+
+FEWEST_VIEWS = 3
+FEWEST_CORNERS = 200
+LEAST_SHARE = 0.5
+MOST_FOCAL_SHARE = 0.005
+MOST_SD_PX = 0.5
+LEAST_P = 0.01
+
+OUTLYING = 2.5
+"""A photograph whose rms is so many times the middle one's is named."""
+
+_PARALLEL_DEG = 6.0
+_UNDETERMINED = 0.05
+_SCOPE = "fit.camera"
+
+
+def refuse_parallel(views: Sequence[SeenBoard], start: Array) -> None:
+    """Raise VerdictError where all boards stand at one slant: that leaves the focal length open.
+
+    A plane fixes the focal length by how its parallel lines meet, and all parallel planes meet in
+    the same places (Zhang 2000, doi:10.1109/34.888718). The slants are found under a guessed
+    camera, which is good enough to tell parallel ones.
+    """
+    normals = _normals(np.array([first_pose(view, start) for view in views]))
+    widest = _widest_deg(normals)
+    if widest < _PARALLEL_DEG:
+        raise VerdictError(_parallel(widest))
+
+
+def refuse_undetermined(bundle: Bundle, width: int, height: int) -> None:
+    """Raise VerdictError where a fit came out with a focal length that it does not know."""
+    fx, fy, cx, cy = bundle.camera[:4]
+    widest = _widest_deg(_normals(bundle.poses))
+    inverse = np.linalg.pinv(bundle.information.sum(axis=0) + bundle.prior, hermitian=True)
+    sd = float(np.sqrt(max(inverse[0, 0], 0.0))) * bundle.sd_px
+    aside = max(abs(cx / width - 0.5), abs(cy / height - 0.5))
+    if widest < _PARALLEL_DEG or not sd < _UNDETERMINED * fx or aside > 1.0 or min(fx, fy) <= 0.0:
+        raise VerdictError(_parallel(widest))
+
+
+def camera_verdicts(
+    camera: Camera,
+    views: Sequence[ViewError],
+    share: float,
+    places: PixelMap,
+    cross: CrossValidation | None,
+) -> tuple[Verdict, ...]:
+    """Judge a fitted camera: focal length, views, corners, coverage, projection, two halves."""
+    return (
+        _focal(camera),
+        _outlying(views),
+        _corners(views),
+        _coverage(share),
+        _projection(places),
+        _halves(cross),
+    )
+
+
+def _focal(camera: Camera) -> Verdict:
+    assert camera.covariance is not None
+    sd = float(np.sqrt(camera.covariance[0, 0])) / camera.fx
+    good = sd <= MOST_FOCAL_SHARE
+    mend = "" if good else " Add photographs with the board tilted by 20 to 45 deg, every way."
+    why = f"The focal length, {camera.fx:.1f} px, is known to {100 * sd:.2f} %.{mend}"
+    return _verdict("focal length", good, sd, MOST_FOCAL_SHARE, why)
+
+
+def _outlying(views: Sequence[ViewError]) -> Verdict:
+    worst = max(views, key=lambda view: view.rms_px)
+    middle = float(np.median([view.rms_px for view in views]))
+    ratio = worst.rms_px / middle
+    named = [view.name for view in views if view.outlying]
+    facts = f"The worst photograph, {worst.name}, fits to {worst.rms_px:.2f} px, the middle one to"
+    if named:
+        why = (
+            f"{facts} {middle:.2f} px. Look at the overlay of {', '.join(named)}: retake it, or "
+            "remove it from its capture's folder."
+        )
+    else:
+        why = f"{facts} {middle:.2f} px."
+    return _verdict("views", not named, ratio, OUTLYING, why)
+
+
+def _corners(views: Sequence[ViewError]) -> Verdict:
+    count = sum(view.corners for view in views)
+    good = count >= FEWEST_CORNERS
+    why = f"{count} corners were seen in {len(views)} photographs"
+    why += "." if good else f"; {FEWEST_CORNERS} are wanted: add photographs."
+    return _verdict("corners", good, float(count), float(FEWEST_CORNERS), why)
+
+
+def _coverage(share: float) -> Verdict:
+    good = share >= LEAST_SHARE
+    why = f"Corners were seen over {100 * share:.0f} % of the picture"
+    why += "." if good else ": bring the board into its corners too, and nearer."
+    return _verdict("coverage", good, share, LEAST_SHARE, why)
+
+
+def _projection(places: PixelMap) -> Verdict:
+    inside = places.sd_px[places.inside]
+    worst = float(np.nanmax(inside)) if inside.size else float("nan")
+    outside = float(np.nanmax(places.sd_px))
+    good = worst <= MOST_SD_PX
+    why = (
+        f"A projected point is known to {worst:.2f} px (sd) at worst where corners were seen, to "
+        f"{outside:.2f} px at worst in the whole picture."
+    )
+    return _verdict("projection", good, worst, MOST_SD_PX, why)
+
+
+def _halves(cross: CrossValidation | None) -> Verdict:
+    check = "two halves"
+    if cross is None:
+        why = "Six photographs at least are needed to fit two halves apart."
+        return Verdict(_SCOPE, check, "not_evaluated", None, None, why)
+    good = cross.p_value >= LEAST_P
+    why = (
+        f"Two halves of the photographs differ by {cross.rms_px:.2f} px (rms) where corners were "
+        f"seen; their covariances let expect {cross.claimed_px:.2f} px (p = {cross.p_value:.3f})."
+    )
+    if not good:
+        why += " The board may be bent, or the lens moved (focus, zoom) between photographs."
+    return _verdict(check, good, cross.p_value, LEAST_P, why)
+
+
+def _verdict(check: str, good: bool, value: float, threshold: float, why: str) -> Verdict:
+    return Verdict(_SCOPE, check, "pass" if good else "fail", value, threshold, why)
+
+
+def _normals(poses: Array) -> Array:
+    import cv2
+
+    return np.array([cv2.Rodrigues(pose[:3])[0][:, 2] for pose in poses])
+
+
+def _widest_deg(normals: Array) -> float:
+    cosines = np.clip(np.abs(normals @ normals.T), 0.0, 1.0)
+    return float(np.degrees(np.arccos(cosines.min())))
+
+
+def _parallel(widest_deg: float) -> str:
+    return (
+        f"The focal length is not determined: in all photographs the board stands at one slant "
+        f"(within {widest_deg:.0f} deg). Nothing was saved. Add photographs with the board tilted "
+        "by 20 to 45 deg to the left, to the right, up and down."
+    )

@@ -1,0 +1,180 @@
+"""Fit a camera to photographs of a flat board."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, fit_bundle
+from scissorcal.calibration.camera.candidates import RUNGS, Rung, climb
+from scissorcal.calibration.camera.checks import (
+    FEWEST_VIEWS,
+    OUTLYING,
+    camera_verdicts,
+    refuse_parallel,
+    refuse_undetermined,
+)
+from scissorcal.calibration.camera.result import CameraFit, ViewError
+from scissorcal.calibration.camera.uncertainty import (
+    camera_covariance,
+    camera_of,
+    halves,
+    pixel_map,
+)
+from scissorcal.errors import MissingError
+from scissorcal.vision.targets.detect import Detection
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+ALGORITHM = 1
+"""Raised whenever a fit of the same photographs would give other numbers."""
+
+_DRAWS = 500
+
+
+@dataclass(frozen=True)
+class CameraPhoto:
+    """A board as one photograph of ``width`` by ``height`` pixels shows it."""
+
+    name: str
+    width: int
+    height: int
+    detection: Detection
+
+
+def fit_camera(
+    photos: Sequence[CameraPhoto],
+    *,
+    rng: np.random.Generator,
+    inputs_hash: str = "",
+    progress: Progress | None = None,
+) -> CameraFit:
+    """Fit focal length, centre and distortion, and say how well they are known.
+
+    Corner errors follow a Student-t, so that a bad corner does little harm. The distortion model is
+    the cheapest that cannot be told from the best on photographs left out. The covariance counts
+    that the corners of one photograph err together. Photographs that fit far worse than the others
+    are named, none is dropped.
+
+    Raises MissingError with fewer than three photographs, VerdictError where they do not determine
+    the focal length: all taken with the board at one slant.
+    """
+    tell = progress or (lambda _share, _sentence: None)
+    if len(photos) < FEWEST_VIEWS:
+        raise MissingError(_too_few(len(photos)))
+    width, height = photos[0].width, photos[0].height
+    views = [seen_board(photo.name, photo.detection) for photo in photos]
+    start = guess(width, height)
+    refuse_parallel(views, start)
+    tell(0.0, "camera: first fit")
+    first = fit_bundle(views, RUNGS[0][1], np.append(start, [0.0, 0.0]))
+    refuse_undetermined(first, width, height)
+    rungs = climb(views, first.shared, tell)
+    (chosen,) = (rung for rung in rungs if rung.chosen)
+    bundle = chosen.bundle
+    refuse_undetermined(bundle, width, height)
+    spread = camera_covariance(bundle)
+    camera = camera_of(bundle.camera, width, height, spread.covariance)
+    region, share = seen_region([view.pixels for view in views], width, height)
+    tell(0.85, "camera: two halves apart")
+    places, cross = pixel_map(camera, spread, halves(views, bundle), region)
+    rows = _views(photos, bundle)
+    return CameraFit(
+        camera=camera,
+        origin="fitted",
+        board=photos[0].detection.board.name,
+        rung=chosen.name,
+        rungs=tuple(_row(rung) for rung in rungs),
+        draws=rng.multivariate_normal(bundle.camera, spread.covariance, _DRAWS, method="eigh"),
+        views=rows,
+        bulge_mm=(float(1e3 * bundle.shared[-2]), float(1e3 * bundle.shared[-1])),
+        noise_px=bundle.sd_px,
+        stretch=spread.stretch,
+        region=region,
+        region_share=share,
+        pixel_map=places,
+        cross=cross,
+        verdicts=camera_verdicts(camera, rows, share, places, cross),
+        inputs_hash=inputs_hash,
+        sources=tuple(photo.name for photo in photos),
+    )
+
+
+def seen_board(name: str, detection: Detection) -> SeenBoard:
+    """Give a detection as the bundle's arrays."""
+    board = detection.board
+    return SeenBoard(name, detection.points, detection.pixels, (board.width_m, board.height_m))
+
+
+def guess(width: int, height: int) -> Array:
+    """Nine parameters of a camera of middling field of view, to start from."""
+    focal = 1.1 * max(width, height)
+    middle = (0.5 * (width - 1), 0.5 * (height - 1))
+    return np.array([focal, focal, *middle, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def seen_region(pixels: Sequence[Array], width: int, height: int) -> tuple[Array, float]:
+    """Convex outline (k, 2) of all corners, and its share of the picture."""
+    import cv2
+
+    points = np.concatenate(list(pixels)).astype(np.float32)
+    outline = np.asarray(cv2.convexHull(points), dtype=np.float64).reshape(-1, 2)
+    area = float(cv2.contourArea(outline.astype(np.float32)))
+    return outline, area / (width * height)
+
+
+def tilt_of(pose: Array) -> float:
+    """Angle (rad) between a board and the picture's plane, from its pose (6,)."""
+    import cv2
+
+    turn, _ = cv2.Rodrigues(pose[:3])
+    return float(np.arccos(np.clip(abs(turn[2, 2]), 0.0, 1.0)))
+
+
+def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ...]:
+    rms = bundle.rms_px
+    middle = float(np.median(rms))
+    rows = []
+    for photo, pose, residual, error in zip(
+        photos, bundle.poses, bundle.residuals, rms, strict=True
+    ):
+        rows.append(
+            ViewError(
+                name=photo.name,
+                corners=len(residual),
+                rms_px=float(error),
+                worst_px=float(np.linalg.norm(residual, axis=1).max()),
+                square_px=photo.detection.square_px,
+                distance_m=float(np.linalg.norm(pose[3:])),
+                tilt_deg=float(np.degrees(tilt_of(pose))),
+                outlying=bool(error > OUTLYING * middle),
+                pose=tuple(float(value) for value in pose),
+            )
+        )
+    return tuple(rows)
+
+
+def _row(rung: Rung) -> dict[str, object]:
+    return {
+        "name": rung.name,
+        "free": len(rung.bundle.structure.names),
+        "unseen_px": rung.unseen_px,
+        "behind": float(rung.behind.mean()),
+        "behind_se": float(rung.behind.std(ddof=1) / np.sqrt(len(rung.behind))),
+        "equivalent": rung.equivalent,
+        "chosen": rung.chosen,
+    }
+
+
+def _too_few(count: int) -> str:
+    if count == 0:
+        reason = "There is no photograph of a board"
+    else:
+        had = "One photograph alone" if count == 1 else "Two photographs"
+        reason = f"{had} cannot fit a camera"
+    return (
+        f"{reason}: take 15 with 'scissorcal capture camera --image board-*.jpg', with the board "
+        f"near and far, in every corner and tilted every way; {FEWEST_VIEWS} are the least."
+    )

@@ -1,0 +1,261 @@
+"""Verdicts on a fit: may its numbers be used, and if not, what to measure next."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.candidates import SEARCH_REACH, Climbed
+from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.inference import Posterior, SearchStatus
+from scissorcal.inference.importance import ADAPTED_LIMIT
+from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
+from scissorcal.verdicts import Status, Verdict
+
+PRIOR_ONLY = 0.9
+"""A posterior at least this share of its prior's width says that the data are silent."""
+FEWEST_INDEPENDENT = 10.0
+"""Independent observations wanted per parameter."""
+HELD_OUT_LIMIT = 0.2
+"""Error on unseen strokes, as a share of what all strokes measured, that a law may have."""
+OTHER_SPEED = 1.5
+"""Ratio between the fastest and the slowest motion from which speeds count as varied."""
+OTHER_CONTACT_M = 2e-3
+
+Array = NDArray[np.float64]
+
+
+def trust_verdicts(
+    what: str,
+    effort: str,
+    chosen: Climbed,
+    posterior: Posterior,
+    diagnostics: Mapping[str, Any],
+    held_out: tuple[StrokeError, ...],
+    nuisance: tuple[str, ...],
+    bins: Bins,
+    contact: Array,
+) -> tuple[Verdict, ...]:
+    """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
+    scope = f"fit.{what}"
+    nuisance = (*nuisance, *(p.name for p in chosen.rung.layout.parameters if p.believed))
+    return (
+        _finite(scope, chosen, posterior, diagnostics),
+        _search(scope, posterior, nuisance),
+        _importance(scope, effort, posterior),
+        _bounds(scope, chosen),
+        _identified(scope, chosen, posterior, nuisance),
+        _null(scope, posterior, nuisance),
+        _independent(scope, chosen, diagnostics, held_out),
+        _explained(scope, diagnostics),
+        _varied(scope, what, chosen, bins, contact),
+        _unseen(scope, held_out),
+    )
+
+
+def _finite(
+    scope: str, chosen: Climbed, posterior: Posterior, diagnostics: Mapping[str, Any]
+) -> Verdict:
+    wanted = ("residual_rms", "relative_error", "r_squared", "independent_share")
+    broken = [name for name in wanted if not np.isfinite(diagnostics[name])]
+    bad = ~np.all(np.isfinite(posterior.draws), axis=0) | ~np.isfinite(posterior.optimum.point)
+    broken += [name for name, no in zip(chosen.rung.layout.names, bad, strict=True) if no]
+    if broken:
+        why = (
+            f"{', '.join(broken)} did not come out as a number: check the recording for gaps, "
+            "constant channels and absurd values."
+        )
+        return Verdict(scope, "finite", "fail", float(len(broken)), 0.0, why)
+    return Verdict(scope, "finite", "pass", 0.0, 0.0, "Every number of the fit is finite.")
+
+
+def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+    """Judge the search by the law's own parameters.
+
+    A nuisance to which the data do not respond stays at its prior, whose width is then in the
+    draws: that is no lack of an optimum.
+    """
+    ended = posterior.optimum
+    silent = ended.status in (SearchStatus.AT_START, SearchStatus.PLATEAU)
+    if silent and ended.concerns and set(ended.concerns) <= set(nuisance):
+        why = (
+            f"The search settled for every parameter that is reported. {', '.join(ended.concerns)} "
+            "stayed where the prior is, and the intervals have the prior's width for it."
+        )
+        return Verdict(scope, "optimum", "pass", float(ended.agreeing), 1.0, why)
+    status: Status = "pass" if ended.success else "fail"
+    return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
+
+
+def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
+    k = posterior.k_hat if np.isfinite(posterior.k_hat) else None
+    if effort == "draft":
+        why = "Draft effort does not check the posterior's shape; use --effort standard."
+        return Verdict(scope, "k-hat", "not_evaluated", None, K_HAT_LIMIT, why)
+    status: Status = "pass" if posterior.status.trusted else "fail"
+    if posterior.ensembles:
+        # what decides then is in the sentence; k-hat is of a proposal that was not used
+        return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
+    adapted = status == "fail" and k is not None and k <= K_HAT_LIMIT
+    limit = ADAPTED_LIMIT if adapted else K_HAT_LIMIT
+    return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
+
+
+def _bounds(scope: str, chosen: Climbed) -> Verdict:
+    layout, point = chosen.rung.layout, chosen.optimum.point
+    reach = np.abs(point - layout.mean) / layout.sd
+    at = [name for name, r in zip(layout.names, reach, strict=True) if r > 0.98 * SEARCH_REACH]
+    if at:
+        why = (
+            f"{', '.join(at)} ended at the edge of the search, so no value was found: "
+            "check the units and signs of the recording."
+        )
+        return Verdict(scope, "bounds", "fail", float(reach.max()), SEARCH_REACH, why)
+    why = "No parameter ended at the edge of the search."
+    return Verdict(scope, "bounds", "pass", float(reach.max()), SEARCH_REACH, why)
+
+
+def _identified(
+    scope: str, chosen: Climbed, posterior: Posterior, nuisance: tuple[str, ...]
+) -> Verdict:
+    layout = chosen.rung.layout
+    ratios = {
+        name: float(posterior.draws[:, i].std(ddof=1) / layout.sd[i])
+        for i, name in enumerate(layout.names)
+        if name not in nuisance
+    }
+    worst = max(ratios, key=lambda name: ratios[name])
+    silent = [name for name, ratio in ratios.items() if ratio > PRIOR_ONLY]
+    if silent:
+        why = (
+            f"The data say nothing about {', '.join(silent)}; the values shown are the prior's. "
+            "Record strokes that excite them, or choose a rung without them."
+        )
+        return Verdict(scope, "identifiability", "fail", ratios[worst], PRIOR_ONLY, why)
+    why = f"Every parameter is narrower than its prior; {worst} is the least certain one."
+    return Verdict(scope, "identifiability", "pass", ratios[worst], PRIOR_ONLY, why)
+
+
+def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+    """Directions that data leave to the prior; those with nuisance parameters in them may be.
+
+    What is reported of a law's parameter then still has the width that the nuisance gives it.
+    """
+
+    def names(direction: str) -> set[str]:
+        return {part.partition(" (")[0] for part in direction.split(" + ")}
+
+    silent = [direction for direction in posterior.null if not names(direction) & set(nuisance)]
+    if silent:
+        why = (
+            f"The data leave {'; '.join(silent)} to the prior: parameters named together cannot be "
+            "told apart. Record motion in which they act differently, or choose a simpler rung."
+        )
+        return Verdict(scope, "null-directions", "fail", float(len(silent)), 0.0, why)
+    mixed = [direction for direction in posterior.null if names(direction) - set(nuisance)]
+    why = "The data speak in every direction of the law's parameters."
+    if mixed:
+        why = f"Only together with what describes the noise is anything left open: {mixed[0]}."
+    return Verdict(scope, "null-directions", "pass", 0.0, 0.0, why)
+
+
+def _varied(scope: str, what: str, chosen: Climbed, bins: Bins, contact: Array) -> Verdict:
+    """Whether strokes differ in what the law is to be used over: speed, and where it is met."""
+    labels = np.unique(chosen.strokes)
+    if len(labels) < 2:
+        why = (
+            "There is one stroke only, so nothing says that another would agree: record several, "
+            "in both directions and at several speeds."
+        )
+        return Verdict(scope, "strokes", "fail", float(len(labels)), 2.0, why)
+    medians = np.array([np.median(bins.rate[chosen.strokes == label]) for label in labels])
+    ratio, fast = _spread(-medians[medians < 0])
+    if what == "friction":
+        quarters = np.quantile(np.abs(bins.rate), [0.25, 0.75])
+        ratio, fast = max(_spread(np.abs(medians)), _spread(quarters))
+    met = contact[np.isfinite(contact)]
+    reach = float(np.ptp(np.quantile(met, [0.05, 0.95]))) if len(met) else float("nan")
+    same = [] if ratio >= OTHER_SPEED else [f"speed (all near {fast:.2g})"]
+    if what == "cut" and not reach >= OTHER_CONTACT_M:
+        same.append("where the material is met along the blades")
+    if not same:
+        why = f"Strokes differ in what matters: speeds by a factor of {ratio:.3g}."
+        return Verdict(scope, "strokes", "pass", ratio, OTHER_SPEED, why)
+    status: Status = "fail" if what == "friction" or len(same) == 2 else "not_evaluated"
+    why = (
+        f"Strokes are alike in {' and '.join(same)}, so the fit says nothing of others: record "
+        "some that differ in it."
+    )
+    return Verdict(scope, "strokes", status, ratio, OTHER_SPEED, why)
+
+
+def _spread(speeds: Array) -> tuple[float, float]:
+    """Ratio of the fastest to the slowest of speeds (k,), and the fastest; 1 and 0 for none."""
+    if len(speeds) == 0 or speeds.min() <= 0:
+        return 1.0, float(speeds.max(initial=0.0))
+    return float(speeds.max() / speeds.min()), float(speeds.max())
+
+
+def _independent(
+    scope: str,
+    chosen: Climbed,
+    diagnostics: Mapping[str, Any],
+    held_out: tuple[StrokeError, ...],
+) -> Verdict:
+    """Say how many independent observations there are; few of them reject no fit that predicts."""
+    count = diagnostics["observations"] * diagnostics["independent_share"]
+    per = float(count / len(chosen.optimum.point))
+    why = (
+        f"Residuals are autocorrelated: {diagnostics['observations']} bins are worth "
+        f"{count:.0f} independent ones; intervals were widened by up to "
+        f"{diagnostics['largest_inflation']:.1f} for it."
+    )
+    if scope == "fit.cut":
+        why = (
+            f"{diagnostics['observations']} segments of the path leave residuals that are worth "
+            f"{count:.0f} independent ones; the likelihood takes them as its noise has them."
+        )
+    if per >= FEWEST_INDEPENDENT:
+        return Verdict(scope, "whiteness", "pass", per, FEWEST_INDEPENDENT, why)
+    unseen = _median_error(held_out)
+    if unseen is not None and unseen < HELD_OUT_LIMIT:
+        why += (
+            f" That is few for this many parameters, yet unseen strokes are predicted to "
+            f"{unseen:.1%}, so the fit stands: longer or more varied motion would narrow its "
+            "intervals."
+        )
+        return Verdict(scope, "whiteness", "not_evaluated", per, FEWEST_INDEPENDENT, why)
+    why += " That is too few for this many parameters: record longer or more varied motion."
+    return Verdict(scope, "whiteness", "fail", per, FEWEST_INDEPENDENT, why)
+
+
+def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
+    """Median error on unseen strokes; None where none could be held out."""
+    if len(held_out) < 2:
+        return None
+    return float(np.median([error.relative_rms for error in held_out]))
+
+
+def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
+    r2 = diagnostics["r_squared"]
+    if r2 > 0:
+        why = f"The law explains {r2:.1%} of the variance of what was measured."
+        return Verdict(scope, "r-squared", "pass", r2, 0.0, why)
+    why = "The law is worse than a constant; check signs and units, and what was recorded."
+    return Verdict(scope, "r-squared", "fail", r2, 0.0, why)
+
+
+def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
+    median = _median_error(held_out)
+    if median is None:
+        why = "Only one stroke was recorded, so none can be held out: record several."
+        return Verdict(scope, "held-out", "not_evaluated", None, HELD_OUT_LIMIT, why)
+    worst = max(held_out, key=lambda error: error.relative_rms)
+    why = (
+        f"On strokes it had not seen the law is off by {median:.1%} (median, rms); "
+        f"worst is stroke {worst.stroke} with {worst.relative_rms:.1%}."
+    )
+    status: Status = "pass" if median < HELD_OUT_LIMIT else "fail"
+    return Verdict(scope, "held-out", status, median, HELD_OUT_LIMIT, why)

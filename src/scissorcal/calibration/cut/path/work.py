@@ -1,0 +1,168 @@
+"""Work of the material between openings, and how well it is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.path.motion import PathMotion
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.model import FrictionLaw, friction_torque, presliding_state
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+DEFAULT_SLOW_TIME_S = 0.012
+
+
+def torque_noise_of(diagnostics: Mapping[str, Any]) -> TorqueNoise:
+    """The noise that a friction fit measured; its residual as white noise where it did not."""
+    if "noise_white_Nm" in diagnostics:
+        return TorqueNoise(
+            float(diagnostics["noise_white_Nm"]),
+            float(diagnostics["noise_slow_Nm"]),
+            float(diagnostics["noise_slow_time_s"]),
+        )
+    rms = float(diagnostics["residual_rms"])
+    return TorqueNoise(rms, rms, DEFAULT_SLOW_TIME_S)
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the material does to the opening at each sample (n,).
+
+    ``work`` (J) is what it did so far, ``torque`` (N m) what it does now: the former is summed and
+    exact, the latter carries the noise of an acceleration. Where blades stand, friction acts
+    against what they creep by on the whole: what a smoothed position trembles by is noise, and the
+    friction on it would add up. ``direction`` (n - 1,) is how dry
+    friction acts between samples, from -1 (closing) to 1, less where it has not built up.
+    """
+
+    work: Array
+    torque: Array
+    direction: Array
+
+
+def material_of(
+    motion: PathMotion,
+    friction: FrictionLaw,
+    offset: float,
+    cogging: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Material:
+    """Work and torque of the material along a motion.
+
+    W = I omega^2 / 2 + sum of (F + offset - cog - drive) d(theta), so that between two samples the
+    material's mean torque over the path is the difference of W over that of the opening. No
+    acceleration enters, and it does not matter how fast the path was gone. ``cogging`` is
+    (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
+    """
+    path = motion.opening
+    step = np.diff(path)
+    middle = 0.5 * (path[1:] + path[:-1])
+    state, direction = None, np.sign(step)
+    if np.any(friction.presliding_share):
+        built = presliding_state(path, float(friction.presliding_length))
+        state = 0.5 * (built[1:] + built[:-1])
+        direction = direction + float(friction.presliding_share) * (state - direction)
+    law = friction_torque(friction, middle, _turning_rate(motion, step), 0.0, state)
+    gone = (law + offset - motion.drive[:-1]) * step
+    work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
+    cosine, sine, number = cogging
+    if number:
+        work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
+    torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
+    torque[:-1] += law + offset
+    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+
+
+def _turning_rate(motion: PathMotion, step: Array) -> Array:
+    """Rate (n - 1,) between samples; its mean for as long as the blades stand."""
+    rate = step / motion.tick_s
+    still = np.concatenate([[False], motion.standing[1:] & motion.standing[:-1], [False]])
+    starts, ends = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2).T
+    for low, high in zip(starts.tolist(), ends.tolist(), strict=True):
+        rate[low:high] = rate[low:high].mean()
+    return np.asarray(rate)
+
+
+def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:
+    """Mean torque (k,) between samples ``ends`` (k + 1,), and what one tick of delay adds to it."""
+    path = np.diff(motion.opening[ends])
+    span = slice(int(ends[0]), int(ends[-1]))
+    late = motion.drive_step[span] * np.diff(motion.opening[span.start : span.stop + 1])
+    return np.diff(work[ends]) / path, sums_between(late, ends - ends[0]) / path
+
+
+def mean_advance(motion: PathMotion, ends: Integers) -> Array:
+    """Mean advance (k,) in m over the path between samples ``ends`` (k + 1,)."""
+    return np.asarray(advance_line(motion, ends).mean(axis=1))
+
+
+def advance_line(motion: PathMotion, ends: Integers) -> Array:
+    """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
+
+    By the straight line over the opening that is nearest to it along the path, within what the
+    sledge did: single samples carry the steps of the encoder. What the sledge does while the
+    blades stand is no path.
+    """
+    low, high = int(ends[0]), int(ends[-1])
+    path, place = motion.opening[low : high + 1], motion.advance[low : high + 1]
+    step, gone = np.diff(path), np.diff(place)
+    inside, segment = ends - low, np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+    still = motion.standing[low:high] & motion.standing[low + 1 : high + 1]
+    way, turned = sums_between(step, inside), sums_between(np.where(still, 0.0, step), inside)
+    moving = turned * way > 0.5 * way**2
+    weight = np.where(moving[segment] & still, 0.0, np.abs(step))
+    whole = sums_between(weight, inside)
+    middle, advance = 0.5 * (path[1:] + path[:-1]), 0.5 * (place[1:] + place[:-1])
+    centre, mean = (sums_between(x * weight, inside) / whole for x in (middle, advance))
+    away, beyond = middle - centre[segment], advance - mean[segment]
+    # Between two samples both go on straight: a twelfth of a step's product is theirs.
+    spread = sums_between((away**2 + step**2 / 12.0) * weight, inside)
+    slope = sums_between((beyond * away + gone * step / 12.0) * weight, inside) / spread
+    first, last = motion.opening[ends[:-1]] - centre, motion.opening[ends[1:]] - centre
+    line = np.stack([mean + slope * first, mean + slope * last], axis=1)
+    half_step = np.sqrt(3.0) * motion.advance_sd
+    least = np.minimum(np.minimum.reduceat(place[:-1], inside[:-1]), place[inside[1:]])
+    most = np.maximum(np.maximum.reduceat(place[:-1], inside[:-1]), place[inside[1:]])
+    return np.clip(line, least[:, None] - half_step, most[:, None] + half_step)
+
+
+def sums_between(values: Array, ends: Integers) -> Array:
+    """Sums (k,) of values from each of the samples ``ends`` (k + 1,) up to the next."""
+    return np.asarray(np.add.reduceat(values[: ends[-1]], ends[:-1]))
+
+
+def kinetic_variance(motion: PathMotion, ends: Integers) -> Array:
+    """Variance (k,) in J^2 of the kinetic energy at samples ``ends`` (k,), by the rate's error."""
+    sd = motion.rate_sd[ends]
+    by_rate = (motion.inertia * motion.rate[ends] * sd) ** 2
+    return np.asarray(by_rate + (0.5 * motion.inertia * sd**2) ** 2)
+
+
+def torque_covariance(
+    motion: PathMotion, ends: Integers, noise: TorqueNoise, offset_sd: float
+) -> Array:
+    """Covariance (k, k) of the mean torques between samples ``ends`` (k + 1,).
+
+    The drive's noise summed along the path, the rate's error in the kinetic energy at both ends of
+    a segment (shared by neighbours), and an offset that all segments have in common.
+    """
+    low, high = int(ends[0]), int(ends[-1])
+    count = len(ends) - 1
+    step = np.diff(motion.opening[low : high + 1])
+    rows = np.zeros((count, high - low))
+    for k in range(count):
+        inside = slice(int(ends[k]) - low, int(ends[k + 1]) - low)
+        rows[k, inside] = step[inside]
+    times = np.arange(high - low) * motion.tick_s
+    memory = np.exp(-np.abs(times[:, None] - times[None, :]) / noise.slow_time_s)
+    gamma = noise.slow_Nm**2 * memory + noise.white_Nm**2 * np.eye(high - low)
+    covariance = rows @ gamma @ rows.T
+    energy = kinetic_variance(motion, ends)
+    difference = np.eye(count, count + 1, 1) - np.eye(count, count + 1)
+    covariance += (difference * energy) @ difference.T
+    path = np.diff(motion.opening[ends])
+    return np.asarray(covariance / np.outer(path, path) + offset_sd**2)

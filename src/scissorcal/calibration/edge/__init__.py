@@ -1,0 +1,1 @@
+"""The blade's edge: photographed points in cells, candidate families, the fit."""

@@ -1,0 +1,194 @@
+"""The edge's ladder: line, arc, cubic, smoothing spline, compared by their evidence."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.edge.cells import EdgeCells
+from scissorcal.calibration.edge.model import (
+    FAMILIES,
+    CellData,
+    EdgeEvidence,
+    Family,
+    basis_of,
+    search,
+)
+from scissorcal.inference import Effort, SamplingStatus, infer
+from scissorcal.model import Edge, EdgeBelief
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
+
+REFUTED = 5.0
+"""Evidence (natural logarithm) against a richer polynomial from which on it is left out.
+
+An edge that is said to be straight has intervals that say so too; odds of 150 to 1 are asked."""
+
+SPLINE_GAIN = 2.0
+"""Evidence by which a spline, with its many parameters, must beat every polynomial."""
+
+MOST_EVALUATIONS: dict[Effort, int] = {"draft": 0, "standard": 20_000, "thorough": 200_000}
+"""Evaluations of the likelihood that sampling the sizes of the errors may take."""
+
+_COUNT = {"draft": 200, "standard": 300, "thorough": 600}
+
+
+@dataclass(frozen=True)
+class EdgeScore:
+    """One family compared with the others, its errors' sizes at their optimum.
+
+    ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` and
+    ``roughness_length_m`` tell what is left of the edge beyond its family, ``noise_factor`` how
+    much noisier points are than the picture's light says, ``between_m`` how much photographs
+    disagree.
+    """
+
+    family: Family
+    evidence: float
+    noise_factor: float
+    roughness_m: float
+    roughness_length_m: float
+    between_m: float
+
+
+@dataclass(frozen=True)
+class EdgeLadder:
+    """All families compared, and the ``chosen`` one (an index) fitted to all photographs.
+
+    ``belief`` is the edge with its covariance, ``draws`` (n, k) are of its parameters, ``residual``
+    (n,) is of all cells in the order of the photographs. ``status`` and ``sentence`` are the
+    sampler's, ``evaluations`` counts those of the likelihood over all families.
+    """
+
+    scores: tuple[EdgeScore, ...]
+    chosen: int
+    belief: EdgeBelief
+    draws: Array
+    residual: Array
+    status: SamplingStatus
+    sentence: str
+    evaluations: int
+
+    @property
+    def best(self) -> EdgeScore:
+        return self.scores[self.chosen]
+
+
+def climb_edge_ladder(
+    photographs: tuple[EdgeCells, ...],
+    length_m: float,
+    effort: Effort,
+    rng: np.random.Generator,
+    families: tuple[Family, ...] = FAMILIES,
+    progress: Progress | None = None,
+) -> EdgeLadder:
+    """Compare families of edges by their evidence, and fit the chosen one.
+
+    Cells are normal about the edge with five kinds of error: their own noise; roughness of the
+    edge, which neighbours share and every photograph sees; what neighbours of one photograph share
+    (its compression, its light); what moves a whole photograph (its pivot, centreline, mapping);
+    and what is alike in all of them (the print, the camera, its tone curve). All that is linear is
+    integrated in closed form. The sizes of the errors are inferred with it: in every family by
+    their optimum, in the chosen one at the ``effort`` asked for. Evaluations have a limit
+    (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
+    """
+    tell = progress or (lambda done, sentence: None)
+    data = CellData(photographs, length_m)
+    found, evidences = [], []
+    for number, family in enumerate(families):
+        tell(0.4 * number / len(families), f"comparing edges: {family}")
+        evidences.append(EdgeEvidence(data, basis_of(data, family)))
+        found.append(search(evidences[-1]))
+    scores = tuple(
+        _score(data, family, one.optimum.point, one.evidence)
+        for family, one in zip(families, found, strict=True)
+    )
+    chosen = _chosen(scores)
+    evidence = evidences[chosen]
+    posterior = infer(
+        evidence.problem(),
+        effort,
+        rng,
+        count=_COUNT[effort],
+        optimum=found[chosen].optimum,
+        progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
+        budget=MOST_EVALUATIONS[effort] or None,
+    )
+    draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
+    residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
+    belief, natural = _belief(data, families[chosen], draws)
+    others = sum(one.evaluations for index, one in enumerate(found) if index != chosen)
+    tell(1.0, f"edge fitted: {families[chosen]}")
+    return EdgeLadder(
+        scores,
+        chosen,
+        belief,
+        natural,
+        residual,
+        posterior.status,
+        posterior.sentence,
+        posterior.evaluations + others,
+    )
+
+
+def _score(data: CellData, family: Family, point: Array, evidence: float) -> EdgeScore:
+    sizes = np.exp(point)
+    between = float(sizes[4]) if data.several else 0.0
+    noise, rough, length = (float(size) for size in sizes[:3])
+    return EdgeScore(family, evidence, noise, rough, length, between)
+
+
+def _chosen(scores: tuple[EdgeScore, ...]) -> int:
+    """The spline if it is clearly best, else the richest polynomial that is not refuted."""
+    simple = [i for i, score in enumerate(scores) if score.family != "spline"]
+    best = max(range(len(scores)), key=lambda i: scores[i].evidence)
+    if not simple:
+        return best
+    top = max(scores[i].evidence for i in simple)
+    if scores[best].family == "spline" and scores[best].evidence > top + SPLINE_GAIN:
+        return best
+    return max(i for i in simple if scores[i].evidence > top - REFUTED)
+
+
+def _draw(evidence: EdgeEvidence, u: Array, rng: np.random.Generator) -> Array:
+    """The edge's parameters given the sizes of the errors: a draw from their exact posterior."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    covariance, prior = evidence.covariances(u)
+    factor = cho_factor(covariance, lower=True)
+    columns = evidence.basis.columns
+    scale = np.sqrt(np.diag(prior))
+    information = columns.T @ cho_solve(factor, columns) * np.outer(scale, scale)
+    information += np.linalg.pinv(prior / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    pull = columns.T @ cho_solve(factor, evidence.data.offset) * scale
+    levels, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    levels = np.maximum(levels, 1e-12 * levels.max())
+    mean = vectors @ ((vectors.T @ pull) / levels)
+    return np.asarray(
+        scale * (mean + vectors @ (rng.standard_normal(len(levels)) / np.sqrt(levels)))
+    )
+
+
+def _belief(data: CellData, family: Family, draws: Array) -> tuple[EdgeBelief, Array]:
+    """The draws in the edge's own parameters, and the normal belief that they amount to."""
+    natural = draws.copy()
+    if family == "spline":
+        names = tuple(f"spline_m_{index}" for index in range(draws.shape[1]))
+    else:
+        names = POLYNOMIAL[: draws.shape[1]]
+        natural[:, 1] = np.arctan(draws[:, 1])
+    blank = Edge(
+        family,
+        0.0,
+        0.0,
+        data.length,
+        spline_m=(0.0,) * draws.shape[1] if family == "spline" else (),
+        spline_start_m=data.start if family == "spline" else 0.0,
+    )
+    covariance = np.atleast_2d(np.cov(natural, rowvar=False))
+    edge = EdgeBelief(blank, names, covariance).with_values(natural.mean(axis=0))
+    return EdgeBelief(edge, names, covariance), natural

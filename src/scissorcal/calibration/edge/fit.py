@@ -1,0 +1,303 @@
+"""A blade's edge from photographs: a posterior of e(s), alpha(s) and the height over the scene."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.edge.candidates import (
+    MOST_EVALUATIONS,
+    EdgeLadder,
+    Progress,
+    climb_edge_ladder,
+)
+from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow, RungRow
+from scissorcal.errors import InputError
+from scissorcal.inference import Effort, SamplingStatus
+from scissorcal.model import EdgeBelief, draw_edges, edge_height
+from scissorcal.recipe.schema import Recipe
+from scissorcal.verdicts import Status, Verdict
+from scissorcal.vision.blade.measure import BladeMeasurement
+
+Array = NDArray[np.float64]
+
+SCOPE = "fit.blade"
+ALGORITHM = 3
+"""Raised whenever a fit of the same photographs would give other numbers."""
+
+PLACES = 41
+MOST_SPOILT = 0.15
+MOST_DISAGREEMENT = 3.5
+MOST_APART = 0.005
+"""Shares of the blade's length by which photographs of one blade may differ."""
+
+UNTRUSTED = (
+    SamplingStatus.HEAVY_WEIGHTS,
+    SamplingStatus.DISAGREEING,
+    SamplingStatus.BUDGET_USED_UP,
+    SamplingStatus.STUCK,
+)
+HEIGHT_DRAWS = 400
+
+
+def fit_blade(
+    measured: Sequence[BladeMeasurement],
+    recipe: Recipe | None,
+    *,
+    effort: Effort = "standard",
+    rng: np.random.Generator,
+    name: str = "blade",
+    length_m: float | None = None,
+    progress: Progress | None = None,
+) -> BladeFit:
+    """Fit one blade's edge to its measurements, one for each photograph.
+
+    ``length_m`` is the blade's known length, which gives shapes without a scale their size. Raises
+    InputError without any measurement, or where photographs with and without a scale are mixed.
+    """
+    if not measured:
+        raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
+    sized = tuple(_sized(one, length_m) for one in measured)
+    if len({one.metric for one in sized}) > 1:
+        raise InputError(
+            "Photographs with and without a scale cannot be fitted together: give --length-mm, or "
+            "leave one kind out."
+        )
+    metric = sized[0].metric
+    lengths = np.array([one.length for one in sized])
+    length = float(np.median(lengths))
+    cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
+    best = climb_edge_ladder(cells, length, effort, rng, progress=progress)
+    first = min(float(c.station[0]) for c in cells)
+    last = max(float(c.station[-1]) for c in cells)
+    station = np.linspace(first, last, PLACES)
+    edges = best.belief.with_values(best.draws)
+    rows = _rows(sized, cells, best)
+    opening, contact, height = _height(best.belief, recipe, rng) if metric else _no_height()
+    pivot = [
+        float(np.sqrt(np.mean(np.sum(np.square(one.modes[:, _columns(one, "pivot")]), axis=1))))
+        for one in sized
+    ]
+    fit = BladeFit(
+        name,
+        best.belief,
+        best.draws,
+        _rung_rows(best),
+        station,
+        _band(edges.offset_at(station)),
+        _band(np.arctan(edges.slope_at(station))),
+        merged_nicks(cells),
+        rows,
+        float(lengths.std(ddof=1)) if len(lengths) > 1 else 0.0,
+        float(np.median(pivot)),
+        metric,
+        opening,
+        contact,
+        height,
+        (),
+        _notes(sized, best, metric),
+    )
+    return replace(fit, verdicts=_verdicts(fit, best, effort))
+
+
+def _rung_rows(ladder: EdgeLadder) -> tuple[RungRow, ...]:
+    return tuple(
+        RungRow(
+            rung.family,
+            rung.evidence,
+            index == ladder.chosen,
+            rung.noise_factor,
+            rung.roughness_m,
+            rung.roughness_length_m,
+            rung.between_m,
+        )
+        for index, rung in enumerate(ladder.scores)
+    )
+
+
+def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
+    """Nicks as all photographs show them: one row each, those of one place averaged."""
+    every = sorted((n for cells in photographs for n in cells.nicks), key=lambda n: n.station_m)
+    groups: list[list[FoundNick]] = []
+    for nick in every:
+        last = groups[-1][-1] if groups else None
+        near = last is not None and nick.station_m - last.station_m < 0.5 * (
+            nick.width_m + last.width_m
+        )
+        if near:
+            groups[-1].append(nick)
+        else:
+            groups.append([nick])
+    return tuple(
+        FoundNick(
+            float(np.mean([n.station_m for n in group])),
+            float(np.mean([n.width_m for n in group])),
+            float(np.mean([n.depth_m for n in group])),
+            ", ".join(dict.fromkeys(n.source for n in group)),
+        )
+        for group in groups
+    )
+
+
+def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
+    """The measurement in metres, or in blade lengths where nobody knows its size."""
+    if one.metric:
+        return one
+    factor = (length_m or 1.0) / one.length
+    return replace(
+        one,
+        station=one.station * factor,
+        offset=one.offset * factor,
+        sd=one.sd * factor,
+        modes=one.modes * factor,
+        length=one.length * factor,
+        hole_radius=one.hole_radius * factor,
+        metric=length_m is not None,
+    )
+
+
+def _columns(one: BladeMeasurement, name: str) -> list[int]:
+    return [index for index, known in enumerate(one.mode_names) if known == name]
+
+
+def _band(draws: Array) -> Band:
+    low, high = np.quantile(draws, [0.05, 0.95], axis=0)
+    return Band(draws.mean(axis=0), draws.std(axis=0, ddof=1), low, high)
+
+
+def _height(
+    belief: EdgeBelief, recipe: Recipe | None, rng: np.random.Generator
+) -> tuple[Array, Array, Band | None]:
+    """phi over the scene's openings and contacts."""
+    if recipe is None:
+        return _no_height()
+    opening = np.radians(np.linspace(*recipe.scene.opening_deg, 7))
+    contact = 1e-3 * np.linspace(*recipe.scene.contact_mm, 9)
+    edges = draw_edges(belief, rng, HEIGHT_DRAWS)
+    x, theta = np.meshgrid(contact, opening)
+    view = edge_height(edges, x.ravel(), theta.ravel() / recipe.rig.moving_blades)
+    shape = (-1, len(opening), len(contact))
+    return opening, contact, _band(view.height.reshape(shape))
+
+
+def _no_height() -> tuple[Array, Array, Band | None]:
+    return np.empty(0), np.empty(0), None
+
+
+def _rows(
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeLadder
+) -> tuple[PhotographRow, ...]:
+    rows = []
+    begin = 0
+    for one, own in zip(measured, cells, strict=True):
+        count = len(own.station)
+        residual = best.residual[begin : begin + count]
+        begin += count
+        own_modes = [
+            k for k, name in enumerate(own.mode_names) if name not in ("tone", "shared mapping")
+        ]
+        spread = float(np.sqrt(np.mean(np.sum(own.modes[:, own_modes] ** 2, axis=1))))
+        rows.append(
+            PhotographRow(
+                one.source,
+                len(one.station),
+                one.edge.blur_px,
+                one.edge.good_share,
+                own.spoilt,
+                one.length,
+                float(residual.mean()),
+                float(np.hypot(spread, best.best.between_m)),
+                one.uncertainty,
+                tuple(own.station.tolist()),
+                tuple(residual.tolist()),
+            )
+        )
+    return tuple(rows)
+
+
+def _verdicts(fit: BladeFit, best: EdgeLadder, effort: Effort) -> tuple[Verdict, ...]:
+    scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
+    spoilt = max(row.spoilt_share for row in fit.photographs)
+    worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
+    checks = [
+        _verdict(
+            scope,
+            "clear edge",
+            spoilt,
+            MOST_SPOILT,
+            f"In {worst} {100 * spoilt:.1f} % of the edge's points belong neither to a smooth edge "
+            f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
+        )
+    ]
+    checks.append(_agreement(fit, scope))
+    if best.status in UNTRUSTED:
+        checks.append(
+            Verdict(
+                scope,
+                "sizes of the errors",
+                "fail",
+                None,
+                None,
+                f"{best.sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
+                f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
+            )
+        )
+    return tuple(checks)
+
+
+def _agreement(fit: BladeFit, scope: str) -> Verdict:
+    """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
+    check = "photographs agree"
+    if len(fit.photographs) < 2:
+        return Verdict(
+            scope,
+            check,
+            "not_evaluated",
+            None,
+            None,
+            "One photograph says nothing on how far others of the same blade would agree.",
+        )
+    apart = next(rung.between_m for rung in fit.rungs if rung.chosen) / fit.belief.edge.length_m
+    if apart > MOST_APART:
+        return _verdict(
+            scope,
+            check,
+            apart,
+            MOST_APART,
+            f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
+            f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
+            "above where there is no mat.",
+        )
+    spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
+    scale = [max(row.away_sd, spread) for row in fit.photographs]
+    value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
+    return _verdict(
+        scope,
+        check,
+        float(value),
+        MOST_DISAGREEMENT,
+        f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
+        f"away; {MOST_DISAGREEMENT:g} are allowed.",
+    )
+
+
+def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -> Verdict:
+    status: Status = "pass" if value <= threshold else "fail"
+    return Verdict(scope, check, status, value, threshold, why)
+
+
+def _notes(measured: Sequence[BladeMeasurement], best: EdgeLadder, metric: bool) -> tuple[str, ...]:
+    notes = list(dict.fromkeys(one.uncertainty for one in measured))
+    if not metric:
+        notes.append(
+            "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
+            "length (--length-mm) or the scale (--scale) to make it an edge that can be used."
+        )
+    notes.append(
+        "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
+        "of its length; the rig's opening must count from where the blades' centrelines meet."
+    )
+    notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
+    return tuple(notes)

@@ -1,0 +1,327 @@
+"""How probable an edge's cells are under a family of edges, with its gradient, and the search."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.edge.cells import EdgeCells
+from scissorcal.inference import Cluster, Optimum, Problem
+from scissorcal.inference.status import SearchStatus
+from scissorcal.model.bspline import spline_design
+
+Array = NDArray[np.float64]
+Family = Literal["line", "arc", "cubic", "spline"]
+
+FAMILIES: tuple[Family, ...] = ("line", "arc", "cubic", "spline")
+PRIOR_SD = (0.4, 0.3, 0.1, 0.4)
+"""Before any photograph, for a blade of length 1: offset, slope, curvature and its change."""
+
+KNOT_SHARE = 0.1
+"""Distance of the spline's knots, in shares of the measured length."""
+
+SEARCH_EVALUATIONS = 150
+"""Evaluations of the likelihood with its gradient that each start of a search may take."""
+
+_HALF_LOG_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
+_BOUND = 5.0
+_START_BOUND = 4.0
+_FLOOR = 0.1
+_APART = 0.5
+_NOWHERE = 1e12
+
+
+class CellData:
+    """All cells stacked, with the parts of their covariance that do not depend on parameters."""
+
+    def __init__(self, photographs: tuple[EdgeCells, ...], length_m: float) -> None:
+        self.length = length_m
+        self.station = np.concatenate([cells.station for cells in photographs])
+        self.offset = np.concatenate([cells.offset for cells in photographs])
+        self.variance = np.concatenate([cells.sd for cells in photographs]) ** 2
+        self.photo = np.repeat(np.arange(len(photographs)), [len(c.station) for c in photographs])
+        self.several = len(photographs) > 1
+        self.start = float(self.station.min())
+        self.apart = np.abs(self.station[:, None] - self.station[None, :])
+        same = self.photo[:, None] == self.photo[None, :]
+        self.known = self._moved_together(photographs)
+        tilt = self.station / length_m
+        self.between = same * (1.0 + np.outer(tilt, tilt))
+        spacing = float(np.median(np.diff(photographs[0].station)))
+        self.streaks = same * np.exp(-self.apart / (3.0 * spacing))
+
+    def _moved_together(self, photographs: tuple[EdgeCells, ...]) -> Array:
+        shared: dict[tuple[str, int], Array] = {}
+        own: list[Array] = []
+        for number, cells in enumerate(photographs):
+            here = self.photo == number
+            seen: dict[str, int] = {}
+            for column, name in zip(cells.modes.T, cells.mode_names, strict=True):
+                full = np.zeros(len(self.station))
+                full[here] = column
+                if name in ("shared mapping", "tone"):
+                    key = (name, seen.setdefault(name, 0))
+                    seen[name] += 1
+                    shared[key] = shared.get(key, np.zeros_like(full)) + full
+                else:
+                    own.append(full)
+        columns = np.stack([*shared.values(), *own], axis=1)
+        return np.asarray(columns @ columns.T)
+
+    def disagreement(self) -> tuple[float, float]:
+        """Rms of what photographs leave of one cubic: of their shifts and tilts, and within each.
+
+        Both are sizes to begin a search with, in metres (or blade lengths).
+        """
+        s = self.station / self.length
+        design = np.vander(s, 4)
+        off = self.offset - design @ np.linalg.lstsq(design, self.offset, rcond=None)[0]
+        moved = []
+        for number in range(int(self.photo[-1]) + 1):
+            here = self.photo == number
+            line = np.vander(s[here], 2)
+            own = np.linalg.lstsq(line, off[here], rcond=None)[0]
+            off[here] -= line @ own
+            moved.extend(own)
+        return float(np.sqrt(np.mean(np.square(moved)))), float(np.sqrt(np.mean(off**2)))
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Columns (n, k) of a family and its prior: mean 0, ``prior`` (k, k) by the stiffness."""
+
+    columns: Array
+    loose: Array
+    bent: Array | None
+
+    def prior(self, bend: float) -> Array:
+        return self.loose if self.bent is None else self.loose + bend**2 * self.bent
+
+
+def basis_of(data: CellData, family: Family) -> Basis:
+    """A family's columns at the cells' stations."""
+    s = data.station
+    if family != "spline":
+        powers = (np.ones_like(s), s, 0.5 * s**2, s**3 / 6.0)
+        count = FAMILIES.index(family) + 2
+        sd = np.array(PRIOR_SD) * data.length ** (1.0 - np.arange(4))
+        return Basis(np.stack(powers[:count], axis=1), np.diag(sd[:count] ** 2), None)
+    count = max(round((data.length - data.start) / (KNOT_SHARE * data.length)), 2) + 3
+    columns = spline_design(count, data.start, data.length, s)
+    width = (data.length - data.start) / (count - 3)
+    place = data.start + width * (np.arange(count) - 1.0)
+    straight = np.stack([np.ones(count), place], axis=1)
+    loose = straight @ np.diag([(PRIOR_SD[0] * data.length) ** 2, PRIOR_SD[1] ** 2]) @ straight.T
+    curve = np.diff(np.eye(count), 2, axis=0)
+    return Basis(columns, loose, np.asarray(np.linalg.pinv(curve.T @ curve) * width**4))
+
+
+class EdgeEvidence:
+    """Posterior of the sizes of the errors, the edge's own parameters integrated out.
+
+    Cells are normal with a covariance that is a sum of fixed matrices, each times the square of a
+    size, and of the roughness, whose correlation length is a parameter too. ``names`` are those of
+    the logarithms of the sizes; ``middle`` and ``sd`` (p,) their normal prior.
+    """
+
+    def __init__(self, data: CellData, basis: Basis) -> None:
+        self.data, self.basis = data, basis
+        rows = [
+            ("noise_factor", 1.2, 0.4),
+            ("roughness_m", 4e-5 * data.length, 1.5),
+            ("roughness_length_m", 0.02 * data.length, 0.6),
+            ("streak_m", 3e-5 * data.length, 1.2),
+        ]
+        # photographs on the mat agree to micrometres, those of two blades may differ by a tenth
+        # of the length: the prior must hold both, or the optimum lies on a bound
+        if data.several:
+            rows.append(("between_m", 7e-5 * data.length, 1.5))
+        if basis.bent is not None:
+            rows.append(("bending_per_m", 0.1 / data.length, 2.0))
+        self.names = tuple(row[0] for row in rows)
+        self.middle = np.log([row[1] for row in rows])
+        self.sd = np.array([row[2] for row in rows])
+        columns = basis.columns
+        self._fixed: Array = data.known + columns @ basis.loose @ columns.T
+        self._bent = None if basis.bent is None else columns @ basis.bent @ columns.T
+
+    def problem(self) -> Problem:
+        """The posterior as inference takes it."""
+        count = len(self.data.station)
+        return Problem(
+            names=self.names,
+            log_prior=self.log_prior,
+            log_likelihood_terms=self.terms,
+            series=np.zeros(count, dtype=np.int64),
+            prior_sd=self.sd,
+            starts=self.middle[None, :],
+            lower=self.middle - _BOUND * self.sd,
+            upper=self.middle + _BOUND * self.sd,
+            independent=True,
+        )
+
+    def log_prior(self, u: Array) -> float:
+        z = (u - self.middle) / self.sd
+        return float(-0.5 * z @ z - np.sum(np.log(self.sd)) - len(u) * _HALF_LOG_TWO_PI)
+
+    def terms(self, u: Array) -> Array:
+        """One term of the log-likelihood for each cell given those before it, (n,)."""
+        from scipy.linalg.lapack import dpotrf, dtrtrs
+
+        root, failed = dpotrf(self._total(u)[0], lower=1, clean=0)
+        if failed:
+            return np.array([-np.inf])
+        white = dtrtrs(root, self.data.offset, lower=1)[0]
+        return np.asarray(-0.5 * white**2 - np.log(np.diag(root)) - _HALF_LOG_TWO_PI)
+
+    def with_gradient(self, u: Array) -> tuple[float, Array]:
+        """Log-posterior and its gradient (p,); -inf and zeros where it is not finite.
+
+        With T the covariance and a = T^-1 y, a size's derivative is a' dT a / 2 - tr(T^-1 dT) / 2
+        (Rasmussen and Williams 2006, equation 5.9).
+        """
+        from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
+
+        total, rough = self._total(u)
+        root, failed = dpotrf(total, lower=1, clean=1)
+        if failed:
+            return -np.inf, np.zeros_like(u)
+        solved = dpotrs(root, self.data.offset, lower=1)[0]
+        half = dpotri(root, lower=1)[0]
+        inverse = half + half.T
+        inverse[np.diag_indices_from(inverse)] *= 0.5
+        value = -0.5 * self.data.offset @ solved - np.sum(np.log(np.diag(root)))
+        pull = np.outer(solved, solved) - inverse
+        size = np.exp(u)
+        slope = [
+            size[0] ** 2 * np.diag(pull) @ self.data.variance,
+            np.vdot(pull, rough),
+            0.5 * np.vdot(pull, rough * self.data.apart) / size[2],
+            size[3] ** 2 * np.vdot(pull, self.data.streaks),
+        ]
+        if self.data.several:
+            slope.append(size[4] ** 2 * np.vdot(pull, self.data.between))
+        if self._bent is not None:
+            slope.append(size[-1] ** 2 * np.vdot(pull, self._bent))
+        value += self.log_prior(u) - len(self.data.offset) * _HALF_LOG_TWO_PI
+        return float(value), np.array(slope) - (u - self.middle) / self.sd**2
+
+    def covariances(self, u: Array) -> tuple[Array, Array]:
+        """Covariance (n, n) of the cells about the edge, and the edge's prior (k, k)."""
+        prior = self.basis.prior(float(np.exp(u[-1])) if self._bent is not None else 0.0)
+        return self._about_edge(u, self.data.known)[0], prior
+
+    def _total(self, u: Array) -> tuple[Array, Array]:
+        """Covariance of the cells, the edge integrated out, and the roughness's part of it."""
+        total, rough = self._about_edge(u, self._fixed)
+        if self._bent is not None:
+            total += float(np.exp(2.0 * u[-1])) * self._bent
+        return total, rough
+
+    def _about_edge(self, u: Array, fixed: Array) -> tuple[Array, Array]:
+        data, size = self.data, np.exp(u)
+        rough: Array = data.apart * (-1.0 / size[2])
+        np.exp(rough, out=rough)
+        rough *= size[1] ** 2
+        total = fixed + rough
+        total += size[3] ** 2 * data.streaks
+        if data.several:
+            total += size[4] ** 2 * data.between
+        total[np.diag_indices_from(total)] += size[0] ** 2 * data.variance
+        return total, rough
+
+    def starts(self) -> Array:
+        """Where searches begin, (2, p): the prior's median, and what photographs plainly say."""
+        between, within = self.data.disagreement()
+        seen = self.middle.copy()
+        seen[3] = np.log(max(within, 1e-12))
+        if self.data.several:
+            seen[4] = np.log(max(between, 1e-12))
+        reach = _START_BOUND * self.sd
+        return np.stack([self.middle, np.clip(seen, self.middle - reach, self.middle + reach)])
+
+
+@dataclass(frozen=True)
+class Found:
+    """An optimum of the sizes, and the logarithm of the evidence by Laplace's approximation."""
+
+    optimum: Optimum
+    evidence: float
+
+    @property
+    def evaluations(self) -> int:
+        return self.optimum.evaluations
+
+
+def search(evidence: EdgeEvidence) -> Found:
+    """The most probable sizes, from each start by a quasi-Newton method, and the evidence there.
+
+    Distinct optima are kept, since photographs that disagree can be told from noise in two ways.
+    """
+    from scipy.optimize import minimize
+
+    sd, middle = evidence.sd, evidence.middle
+
+    def fallen(z: Array) -> tuple[float, Array]:
+        value, slope = evidence.with_gradient(middle + sd * z)
+        return (-value, -slope * sd) if np.isfinite(value) else (_NOWHERE, np.zeros_like(z))
+
+    ends = [
+        minimize(
+            fallen,
+            (start - middle) / sd,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(-_BOUND, _BOUND)] * len(sd),
+            options={"maxfun": SEARCH_EVALUATIONS, "ftol": 1e-11, "gtol": 1e-4},
+        )
+        for start in evidence.starts()
+    ]
+    ends.sort(key=lambda end: float(end.fun))
+    clusters: list[Cluster] = []
+    for end in ends:
+        if not any(np.linalg.norm(end.x - (c.point - middle) / sd) < _APART for c in clusters):
+            clusters.append(Cluster(middle + sd * end.x, -float(end.fun), 1, bool(end.success)))
+    best = ends[0]
+    on_bound = bool(np.any(np.abs(best.x) > _BOUND - 1e-6))
+    used_up = int(best.nfev) >= SEARCH_EVALUATIONS
+    status = (
+        SearchStatus.AT_BOUNDS
+        if on_bound
+        else SearchStatus.ROUNDS_USED_UP
+        if used_up
+        else SearchStatus.SETTLED
+    )
+    volume = _log_volume(evidence, best.x)
+    evaluations = sum(int(end.nfev) for end in ends) + 2 * len(sd)
+    agreeing = sum(float(end.fun) < float(best.fun) + _APART for end in ends)
+    optimum = Optimum(
+        clusters[0].point,
+        clusters[0].value,
+        status.found,
+        status.value,
+        agreeing,
+        len(ends),
+        evaluations,
+        status,
+        tuple(clusters),
+    )
+    return Found(optimum, clusters[0].value + len(sd) * _HALF_LOG_TWO_PI + volume)
+
+
+def _log_volume(evidence: EdgeEvidence, z: Array) -> float:
+    """Half the logarithm of the determinant of the sizes' covariance at an optimum."""
+    middle, sd, step = evidence.middle, evidence.sd, 1e-3
+    curvature = [
+        (
+            evidence.with_gradient(middle + sd * (z - reach))[1]
+            - evidence.with_gradient(middle + sd * (z + reach))[1]
+        )
+        * sd
+        / (2.0 * step)
+        for reach in step * np.eye(len(z))
+    ]
+    found = np.array(curvature)
+    levels = np.maximum(np.linalg.eigvalsh(0.5 * (found + found.T)), _FLOOR)
+    return float(np.sum(np.log(sd)) - 0.5 * np.sum(np.log(levels)))

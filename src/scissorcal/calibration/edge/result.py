@@ -1,0 +1,165 @@
+"""What a blade's fit ends in: its edge with covariance, bands along it, nicks, verdicts."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.edge.cells import FoundNick
+from scissorcal.errors import InputError
+from scissorcal.model import EdgeBelief
+from scissorcal.verdicts import Verdict
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Band:
+    """A quantity along the blade or over the scene: mean, sd and the 5 % and 95 % points."""
+
+    mean: Array
+    sd: Array
+    q05: Array
+    q95: Array
+
+
+@dataclass(frozen=True)
+class RungRow:
+    """One family of edges as it was compared.
+
+    ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` over
+    ``roughness_length_m`` is what is left of the edge beyond its family, ``noise_factor`` how much
+    noisier points are than the picture's light says, ``between_m`` how much photographs disagree.
+    """
+
+    family: str
+    evidence: float
+    chosen: bool
+    noise_factor: float
+    roughness_m: float
+    roughness_length_m: float
+    between_m: float
+
+
+@dataclass(frozen=True)
+class PhotographRow:
+    """What one photograph gave: its points, its blur, and how far it lies from the joint fit.
+
+    ``away`` is its mean residual, ``away_sd`` what that may be by its own pivot, centreline and
+    mapping. ``station`` and ``residual`` are its points, averaged over short cells, and how far
+    they lie from the joint edge.
+    """
+
+    source: str
+    points: int
+    blur_px: float
+    clear_share: float
+    spoilt_share: float
+    length: float
+    away: float
+    away_sd: float
+    seen: str
+    station: tuple[float, ...] = ()
+    residual: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class BladeFit:
+    """One blade fitted to all its photographs.
+
+    ``belief`` is what a cut's fit takes as prior, ``draws`` (n, k) are of its parameters. Lengths
+    are metres where ``metric``, else blade lengths. ``station`` (n,) are places along the edge with
+    the bands ``offset`` (e) and ``taper`` (alpha, rad). ``opening`` (i,) and ``contact`` (j,) span
+    the scene, ``height`` (i, j) is phi there; None without a scale. ``length_sd`` is the spread of
+    the length over the photographs, ``pivot_sd`` what the pivot's uncertainty moves the edge by.
+    """
+
+    name: str
+    belief: EdgeBelief
+    draws: Array
+    rungs: tuple[RungRow, ...]
+    station: Array
+    offset: Band
+    taper: Band
+    nicks: tuple[FoundNick, ...]
+    photographs: tuple[PhotographRow, ...]
+    length_sd: float
+    pivot_sd: float
+    metric: bool
+    opening: Array
+    contact: Array
+    height: Band | None
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def family(self) -> str:
+        return next(rung.family for rung in self.rungs if rung.chosen)
+
+
+@dataclass(frozen=True)
+class SeenOpening:
+    """The angle between both blades' centrelines in one photograph, 0 where they are closed."""
+
+    source: str
+    opening_rad: float
+
+
+@dataclass(frozen=True)
+class BladeResult:
+    """All that photographs of blades gave: one fit for a blade that lay alone, or one for each
+    blade of a pair ("left" and "right" as seen from the handles)."""
+
+    blades: tuple[BladeFit, ...]
+    openings: tuple[SeenOpening, ...]
+    inputs_hash: str
+    sources: tuple[str, ...]
+    pictures: tuple[str, ...] = ()
+
+    @property
+    def belief(self) -> EdgeBelief:
+        """The edge for a cut's fit, which takes both blades to be alike: that of the first one.
+
+        Raises InputError where no photograph had a scale.
+        """
+        for blade in self.blades:
+            if blade.metric:
+                return blade.belief
+        raise InputError(
+            "The photographs of the blade have no scale, so its edge is known up to its size only: "
+            "photograph it on the mat, or give its length with --length-mm."
+        )
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        return tuple(verdict for blade in self.blades for verdict in blade.verdicts)
+
+
+def blade_facts(fit: BladeFit) -> dict[str, Any]:
+    """What people and programs read of a fit: plain numbers, units in the names."""
+    unit = "mm" if fit.metric else "per_length"
+    size = 1e3 if fit.metric else 1.0
+    middle = len(fit.station) // 2
+    return {
+        "name": fit.name,
+        "family": fit.family,
+        f"offset_at_middle_{unit}": float(fit.offset.mean[middle]) * size,
+        f"offset_at_middle_sd_{unit}": float(fit.offset.sd[middle]) * size,
+        "taper_at_middle_deg": float(np.degrees(fit.taper.mean[middle])),
+        "taper_at_middle_sd_deg": float(np.degrees(fit.taper.sd[middle])),
+        f"length_{unit}": fit.belief.edge.length_m * size,
+        "rungs": [
+            {"name": rung.family, "evidence": rung.evidence, "chosen": rung.chosen}
+            for rung in fit.rungs
+        ],
+        "nicks": [
+            {
+                f"station_{unit}": nick.station_m * size,
+                f"width_{unit}": nick.width_m * size,
+                f"depth_{unit}": nick.depth_m * size,
+                "source": nick.source,
+            }
+            for nick in fit.nicks
+        ],
+    }

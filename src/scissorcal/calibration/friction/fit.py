@@ -1,0 +1,377 @@
+"""Fit friction, inertia and offset to empty motion."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.between import (
+    NOT_KNOWN,
+    compare_recordings,
+    jackknife,
+    widened,
+)
+from scissorcal.calibration.candidates import Climbed, choose, climb, optimum_of
+from scissorcal.calibration.effort import candidates_for, draft_note
+from scissorcal.calibration.friction.checks import (
+    bandwidth_verdict,
+    physical_verdict,
+    start_verdict,
+)
+from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
+from scissorcal.calibration.friction.model import FrictionExperiment, design
+from scissorcal.calibration.friction.noise import (
+    cogging_notes,
+    noise_diagnostics,
+    sample_noise,
+    stroke_offsets,
+)
+from scissorcal.calibration.friction.terms import NUISANCE, LawParts
+from scissorcal.calibration.hashing import fit_inputs_hash
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.usage import usage_of_windows
+from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
+from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.errors import InputError
+from scissorcal.inference import Posterior, Stop, infer, tails_of
+from scissorcal.model.terms import TERMS
+from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.recording import Joint, Recording
+from scissorcal.verdicts import Verdict
+
+Progress = Callable[[float, str], None]
+
+LAWS = (
+    "coulomb",
+    "coulomb+viscous",
+    "stribeck",
+    "stribeck+angle",
+    "stribeck+angle+load",
+    "stribeck+angle+presliding",
+    "stribeck+angle+load+presliding",
+)
+DRAFT_LAWS = {
+    "rotary": "stribeck + angle, asymmetric",
+    "linear": "coulomb + viscous, symmetric",
+}
+"""What draft effort fits to a joint where nothing says otherwise."""
+
+OUTLIERS = 4.0
+"""Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
+place of normal noise; milder tails are left to the widening by the scores."""
+FEWEST_BINS = 200
+LEAST_TRAVEL_S = 0.1
+"""Travel of so many seconds at the slowest certain rate is motion, if a slow one."""
+
+
+def fit_friction(
+    recordings: tuple[Recording, ...],
+    settings: FitFriction,
+    *,
+    effort: Effort,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+    last_chosen: str | None = None,
+    stop: Stop | None = None,
+    prior: StatedPrior | None = None,
+) -> FitResult:
+    """Identify friction, inertia and offset from recordings of empty motion.
+
+    drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
+    + viscous, + Stribeck, + angle, + load (where one was measured), + presliding, each symmetric or
+    not. An asymmetric law has no offset of its
+    own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
+    alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
+    the handles, and an offset of a sensor is not. The rung that unseen strokes
+    cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
+    for a rotary joint and for a linear one; units follow the recordings' joint. Two or more
+    recordings are also fitted each by itself, and draws widened by what they differ in.
+
+    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
+    InputError where the recordings hold too little motion, and says what is missing.
+    ``last_chosen`` is the law that draft effort fits where the recipe leaves several; ``stop`` says
+    whether the time allowed is used up. ``prior`` is one that a study of simulated data states.
+    """
+    tell = progress or (lambda done, sentence: None)
+    joint = recordings[0].joint if recordings else Joint()
+    sensors = inspect_sensors(recordings)
+    every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
+    windows = every.where(every.bins.moving)
+    bins = windows.bins
+    _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
+    _refuse_terms(settings, windows, joint)
+    strokes = _strokes(bins)
+    every_law, cogging = _ladder(windows, strokes, settings, joint, prior)
+    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
+    climbed: list[Climbed] = []
+    for index, candidate in enumerate(ladder):
+        tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
+        climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes, stop))
+    chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
+    chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
+    law = next(design for design in ladder if design.name == chosen.rung.name)
+    tell(0.6, f"friction: inferring {chosen.rung.name}")
+    posterior = infer(
+        chosen.rung.problem(bins.series),
+        effort,
+        rng,
+        checkpoint=checkpoint,
+        optimum=chosen.optimum,
+        stop=stop,
+        progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
+    )
+    between = compare_recordings(law, chosen.optimum.point, recordings, rng)
+    noise = sample_noise(law, chosen.optimum.point)
+    diagnostics = {
+        "window_lengthening": windows.lengthening,
+        "jackknife_sd": jackknife(law, chosen.optimum.point, NUISANCE),
+        **(between.diagnostics() if between else {}),
+        **noise_diagnostics(noise),
+        "stroke_offset_sd_Nm": stroke_offsets(
+            chosen.rung.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
+        ),
+    }
+    usage = usage_of_windows(recordings, every, sensors.usable)
+    return assemble(
+        what="friction",
+        effort=effort,
+        posterior=widened(posterior, between, rng),
+        climbed=climbed,
+        chosen=chosen,
+        structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
+        bins=bins,
+        strokes=strokes,
+        measured=bins.drive,
+        contact=np.full(len(bins.drive), np.nan),
+        recordings=recordings,
+        joint=joint,
+        inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
+        nuisance=NUISANCE,
+        rng=rng,
+        critic=settings.critic,
+        extra_verdicts=(
+            physical_verdict(law, chosen.optimum.point, chosen.share),
+            start_verdict(law, chosen.optimum.point),
+            _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
+            sensors.verdict,
+            *((between.verdict(),) if between else ()),
+        ),
+        extra_notes=(
+            *sensors.notes,
+            *_notes(every, windows, posterior, joint),
+            *draft_note(effort, every_law, ladder),
+            *cogging_notes(cogging, posterior, joint),
+            usage.sentence,
+            *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
+        ),
+        extra_diagnostics=diagnostics,
+    )
+
+
+def friction_experiment(
+    recordings: tuple[Recording, ...], settings: FitFriction, fit: FitResult
+) -> FrictionExperiment:
+    """Give the design of a finished fit: its law and priors over its own motion.
+
+    ``recordings`` and ``settings`` are those that the fit was made of; its law is taken from
+    ``fit.structure``.
+    """
+    joint = recordings[0].joint
+    every = weigh(recordings, settings.cutoff_Hz, inspect_sensors(recordings).usable)
+    windows = every.where(every.bins.moving)
+    law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
+    adopt = tuple(fit.structure.get("adopt", ()))
+    cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
+    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
+    return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+
+
+def _with_tails(
+    chosen: Climbed,
+    climbed: list[Climbed],
+    ladder: list[FrictionExperiment],
+    bins: Bins,
+    strokes: NDArray[np.int64],
+) -> Climbed:
+    """Fit the chosen law again with a Student-t noise where its residuals have outliers.
+
+    The fit takes the place of the chosen one in ``climbed``.
+    """
+    tails = tails_of(chosen.rung.likelihood.standardised(chosen.optimum.point), chosen.share)
+    if tails > OUTLIERS:
+        return chosen
+    place = next(i for i, candidate in enumerate(climbed) if candidate.rung is chosen.rung)
+    robust = replace(ladder[place], tails=tails).rung(bins.drive)
+    again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
+    climbed[place] = replace(again, alike=chosen.alike)
+    return climbed[place]
+
+
+def _bandwidth(
+    recordings: tuple[Recording, ...],
+    settings: FitFriction,
+    sensors: Sensors,
+    law: FrictionExperiment,
+    chosen: Climbed,
+    posterior: Posterior,
+    effort: Effort,
+) -> Verdict:
+    """Fit the same law once more over shorter windows, from where the fit ended."""
+    if effort == "draft":
+        why = "Draft effort does not compare cutoffs; use --effort standard."
+        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+    other_Hz = next_cutoff(law.windows)
+    if other_Hz is None:
+        why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
+        return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
+    every = weigh(recordings, settings.cutoff_Hz, sensors.usable, window_Hz=other_Hz)
+    windows = every.where(every.bins.moving)
+    if len(windows.first) < FEWEST_BINS:
+        why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
+        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+    there = replace(
+        law,
+        windows=windows,
+        strokes=_strokes(windows.bins),
+        tails=chosen.rung.likelihood.tails,
+        shared=None,
+    )
+    here = chosen.optimum.point
+    rung = replace(there.rung(there.observed), starts=here[None, :])
+    optimum = optimum_of(rung, there.series)
+    cutoffs = (law.windows.half_at, other_Hz)
+    return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
+
+
+def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
+    """What was left out near rest, and how late torque was measured."""
+    left = 1.0 - len(windows.first) / len(every.first)
+    notes = [
+        f"{left:.1%} of the time the joint rests or turns, or moves by less than "
+        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
+        "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
+        "it is left out."
+    ]
+    if windows.lengthening > 1.0:
+        notes.append(
+            f"The encoder's steps are coarse: windows pass half at {windows.half_at:.3g} Hz, "
+            "below fit.friction.cutoff_Hz, so that the steps do not lower the inertia."
+        )
+    if "delay" in posterior.names:
+        delays = posterior.draws[:, posterior.names.index("delay")]
+        notes.append(
+            f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
+            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms), which the fit takes into account."
+        )
+    return tuple(notes)
+
+
+def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:
+    tails = chosen.rung.likelihood.tails
+    return {"tails": tails} if np.isfinite(tails) else {}
+
+
+def _refuse_poor_motion(
+    bins: Bins, every: Bins, recordings: tuple[Recording, ...], joint: Joint, sensors: Sensors
+) -> None:
+    names = ", ".join(recording.source or "the recording" for recording in recordings)
+    if len(bins.rate) < FEWEST_BINS:
+        travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
+        if sensors.verdict.status == "fail":
+            raise InputError(f"{names}: hardly a sample is left to fit. {sensors.verdict.why}")
+        if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
+            raise InputError(
+                f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
+                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps "
+                "leave its direction open: record faster sweeps, or lower fit.friction.cutoff_Hz."
+            )
+        raise InputError(
+            f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
+            f"{len(bins.rate) * bins.bin_s:.2g} s of it moving). Friction needs at least "
+            f"{FEWEST_BINS * bins.bin_s:.1g} s of motion: capture sweeps in both directions at "
+            "several speeds."
+        )
+    if not (np.any(bins.rate > 0) and np.any(bins.rate < 0)):
+        missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
+        raise InputError(
+            f"{names}: the motion has one direction only; the {missing} one is missing. "
+            "Friction cannot be told from an offset: capture sweeps in both directions."
+        )
+    if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
+        raise InputError(
+            f"{names}: the drive torque is constant although the joint moves; check the "
+            "motor_torque column or the sensor's connection."
+        )
+
+
+def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
+    """Refuse what cannot be fitted to these recordings: loads where none was measured, angles."""
+    named = "" if settings.rung == "auto" else settings.rung
+    wanted = [f'fit.friction.rung = "{named}"'] if LawParts.of(named).load else []
+    wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
+    if wanted and not windows.bears_load:
+        raise InputError(
+            f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
+            "one that hardly varies: record sweeps in which motor and handle work against each "
+            "other by various amounts (motor_torque and handle_force, with handle_radius), or "
+            "choose a rung without load."
+        )
+    angles = [name for name in settings.adopt if TERMS[name].rotary]
+    if angles and joint.kind == "linear":
+        raise InputError(f'The term "{angles[0]}" is of an angle; this joint is a linear one.')
+    known = {"sign", "1", *(("rate",) if "viscous" in named or "stribeck" in named else ())}
+    known |= {"load", "load*sign"} if LawParts.of(named).load else set()
+    for name in settings.adopt:
+        if name in known or settings.adopt.count(name) > 1:
+            raise InputError(
+                f'fit.friction.adopt names "{name}", which the law has already: remove it.'
+            )
+
+
+def _strokes(bins: Bins) -> NDArray[np.int64]:
+    """Planned strokes where the recording has them, else runs of one direction."""
+    if np.all(bins.stroke >= 0) and len(np.unique(bins.stroke)) > 1:
+        return bins.stroke
+    turns = (np.sign(bins.rate[1:]) != np.sign(bins.rate[:-1])) | (np.diff(bins.series) != 0)
+    runs = np.concatenate([[0], np.cumsum(turns)])
+    planned = bins.stroke.max(initial=-1) + 1
+    return np.where(bins.stroke >= 0, bins.stroke, planned + runs).astype(np.int64)
+
+
+def _ladder(
+    windows: Windows,
+    strokes: NDArray[np.int64],
+    settings: FitFriction,
+    joint: Joint,
+    prior: StatedPrior | None,
+) -> tuple[list[FrictionExperiment], Cogging]:
+    """The laws to be compared, over columns that they share, with cogging where there is any."""
+    laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
+    either = (True, False) if joint.kind == "linear" else (False, True)
+    both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
+    plain = design(windows, strokes, laws[0], False, joint, settings.adopt)
+    steady = windows.without_turns
+    clear = plain
+    if not np.all(steady):
+        some = windows.where(steady), strokes[steady]
+        clear = design(*some, laws[0], False, joint, settings.adopt)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(clear.moments)
+    periods = cogging.periods_per_turn if cogging.found else 0.0
+    first, *others = (
+        design(windows, strokes, law, symmetric, joint, settings.adopt, periods, prior)
+        for law in laws
+        for symmetric in both[settings.symmetry]
+    )
+    first = first if periods else replace(first, shared=plain.moments)
+    return [first, *(replace(other, shared=first.moments) for other in others)], cogging
+
+
+def _laws(windows: Windows) -> tuple[str, ...]:
+    """Laws to be compared, cheapest first: those of the load only where one was measured."""
+    return LAWS if windows.bears_load else tuple(law for law in LAWS if not LawParts.of(law).load)

@@ -1,0 +1,272 @@
+"""Products of a friction law's columns by stroke: its likelihood without going through the bins.
+
+At given scales a law is linear in its columns, so that a stroke's squares are a quadratic form in
+their coefficients. The products are made once; from then on what an evaluation costs does not
+depend on how much was recorded, and leaving strokes out is leaving out their products. Many draws
+at once are scored stroke by stroke by their residuals.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
+from scissorcal.calibration.parameters import Layout
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Block = tuple[str, int, int]
+
+MEASURED: Block = ("measured", 0, 0)
+FIXED: Block = ("fixed", 0, 0)
+STEP = 1e-4
+"""Step in unconstrained parameters by which coefficients are differentiated."""
+DRAWS_AT_ONCE = 32
+"""Draws whose residuals are in memory together."""
+LEAST = 1e-13
+"""Share of the measured squares below which what is left is rounding."""
+
+
+class StrokeMoments:
+    """Products of columns and measurements, (strokes, columns, columns), as they are asked for.
+
+    ``labels`` (strokes,) are the strokes, ``counts`` (strokes,) their bins.
+    """
+
+    def __init__(self, basis: FrictionBasis, measured: Array, strokes: Integers) -> None:
+        """``measured`` and ``strokes`` (n,) belong to the windows of ``basis``."""
+        self.basis, self.measured, self.strokes = basis, measured, strokes
+        self.labels, place, counts = np.unique(strokes, return_inverse=True, return_counts=True)
+        self.counts = counts.astype(np.float64)
+        self._order = np.argsort(place, kind="stable")
+        ends = np.cumsum(counts).tolist()
+        self._bounds = list(zip([0, *ends[:-1]], ends, strict=True))
+        self._sorted: dict[Block, Array] = {}
+        self._products: dict[tuple[Block, Block], Array] = {}
+
+    def of(self, measured: Array) -> "StrokeMoments":
+        """The same columns with other measurements (n,)."""
+        other = StrokeMoments(self.basis, measured, self.strokes)
+        kept = {key: made for key, made in self._products.items() if MEASURED not in key}
+        other._products = kept
+        return other
+
+    def products(self, a: Block, b: Block) -> Array:
+        """Products of the columns of two blocks, (strokes, columns of a, columns of b)."""
+        if (a, b) not in self._products:
+            if (b, a) in self._products:
+                return np.asarray(self._products[b, a].transpose(0, 2, 1))
+            left, right = self._columns(a), self._columns(b)
+            self._products[a, b] = np.stack(
+                [left[low:high].T @ right[low:high] for low, high in self._bounds]
+            )
+        return self._products[a, b]
+
+    def squares(self, cell: Cell, factors: Array) -> Array:
+        """Squares that factors (k, q) of a cell's columns leave in each stroke, (k, strokes)."""
+        left = np.zeros((len(self.measured), len(factors)))
+        used = 0
+        for block in _blocks(cell):
+            columns = self._columns(block)
+            left += columns @ factors[:, used : used + columns.shape[1]].T
+            used += columns.shape[1]
+        return np.add.reduceat(left**2, [low for low, _ in self._bounds], axis=0).T
+
+    def assembled(
+        self, cell: Cell, products: Callable[[Block, Block], Array], shape: tuple[int, ...]
+    ) -> Array:
+        """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
+        blocks = _blocks(cell)
+        ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
+        result = np.empty((*shape, ends[-1], ends[-1]))
+        for i, left in enumerate(blocks):
+            rows = slice(ends[i], ends[i + 1])
+            for j in range(i, len(blocks)):
+                columns = slice(ends[j], ends[j + 1])
+                found = products(left, blocks[j])
+                result[..., rows, columns] = found
+                result[..., columns, rows] = np.swapaxes(found, -1, -2)
+        return result
+
+    def _columns(self, block: Block) -> Array:
+        """Columns of a block, stroke after stroke."""
+        if block not in self._sorted:
+            kind, index, other = block
+            if kind == "measured":
+                columns = self.measured[:, None]
+            elif kind == "fixed":
+                columns = self.basis.fixed
+            elif kind == "coupled":
+                columns = self.basis.coupled(index, other)
+            else:
+                scaled = self.basis.stribeck if kind == "stribeck" else self.basis.lag
+                columns = scaled.node(index)
+            in_order = bool(np.all(np.diff(self._order) == 1))
+            self._sorted[block] = columns if in_order else columns[self._order]
+        return self._sorted[block]
+
+
+@dataclass(frozen=True)
+class ReducedLaw:
+    """One law over the products of its columns; its noise is normal and of one size.
+
+    ``weights`` (strokes,) are 1 for strokes that count, 0 for those that are left out.
+    """
+
+    layout: Layout
+    moments: StrokeMoments
+    weights: Array | None = None
+
+    def without(self, labels: Integers) -> "ReducedLaw":
+        """The law over all strokes but those of ``labels``."""
+        kept = (~np.isin(self.moments.labels, labels)).astype(np.float64)
+        return ReducedLaw(self.layout, self.moments, kept)
+
+    @cached_property
+    def counted(self) -> float:
+        """Bins that count."""
+        return float(self._weights @ self.moments.counts)
+
+    def log_likelihood(self, u: Array) -> float:
+        """Log-likelihood at ``u`` (p,), up to a constant."""
+        return float(-0.5 * self.squares(u) * np.exp(-2.0 * u[-1]) - self.counted * u[-1])
+
+    def squares(self, u: Array) -> float:
+        """Sum of squared residuals at ``u`` (p,)."""
+        cell = self.cell_at(u)
+        factors = self.factors(u, cell)
+        products = self.summed(cell)
+        return max(float(factors @ products @ factors), LEAST * float(products[0, 0]))
+
+    def by_stroke(self, draws: Array) -> Array:
+        """Log-likelihood of each stroke at each draw (k, p): (k, strokes).
+
+        By residuals: draws lie in cells of their own, and a cell's products cost as much as the
+        residuals of several draws.
+        """
+        squares = np.empty((len(draws), len(self.moments.labels)))
+        cells = [self.cell_at(draw) for draw in draws]
+        for cell in dict.fromkeys(cells):
+            every = [k for k, other in enumerate(cells) if other == cell]
+            for first in range(0, len(every), DRAWS_AT_ONCE):
+                here = every[first : first + DRAWS_AT_ONCE]
+                squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
+        size = draws[:, -1:]
+        return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.moments.counts * size)
+
+    def slopes(self, u: Array, cell: Cell) -> Array:
+        """Derivatives of the factors by each parameter but the noise, (q, p - 1)."""
+        reach = STEP * np.eye(len(u))[:-1]
+        above, below = self.factors(u + reach, cell), self.factors(u - reach, cell)
+        return np.asarray((above - below).T / (2.0 * STEP))
+
+    def slope(self, u: Array) -> Array:
+        """Derivative of the log-likelihood at ``u`` (p,), shape (p,)."""
+        cell = self.cell_at(u)
+        factors, weight = self.factors(u, cell), np.exp(-2.0 * u[-1])
+        products = self.summed(cell) @ factors
+        by_mean = -weight * self.slopes(u, cell).T @ products
+        return np.append(by_mean, weight * float(factors @ products) - self.counted)
+
+    def information(self, u: Array) -> Array:
+        """Fisher's information of the likelihood at ``u`` (p,), shape (p, p)."""
+        cell = self.cell_at(u)
+        slopes = self.slopes(u, cell)
+        found = np.zeros((len(u), len(u)))
+        found[:-1, :-1] = slopes.T @ self.summed(cell) @ slopes * np.exp(-2.0 * u[-1])
+        found[-1, -1] = 2.0 * self.counted
+        return found
+
+    def cell_at(self, u: Array) -> Cell:
+        """The nodes of the scales that ``u`` (p,) lies between."""
+        basis = self.moments.basis
+        first, second = (
+            () if place is None else scaled.cell_of(float(u[place]))
+            for place, scaled in zip(self._scales, (basis.stribeck, basis.lag), strict=True)
+        )
+        return first, second
+
+    def summed(self, cell: Cell) -> Array:
+        """Products over the strokes that count, (q, q)."""
+        if cell not in self._cells:
+            self._cells[cell] = self.moments.assembled(cell, self._summed_pair, ())
+        return self._cells[cell]
+
+    def factors(self, u: Array, cell: Cell) -> Array:
+        """Factors of a cell's columns (..., q) at ``u`` (..., p): 1 of what was measured, first."""
+        known = np.ones((*u.shape[:-1], u.shape[-1] + 2))
+        known[..., :-2] = u
+        known[..., self._logs] = np.exp(u[..., self._logs])
+        known[..., self._logits] = 1.0 / (1.0 + np.exp(-u[..., self._logits]))
+        known[..., -1] = 0.0
+        fixed, stribeck, late, coupled = (
+            -signs * known[..., first] * known[..., second] * known[..., third]
+            for signs, first, second, third in self.moments.basis.places(self.layout.names)
+        )
+        parts = [np.ones((*u.shape[:-1], 1)), fixed]
+        basis = self.moments.basis
+        scales = [None if place is None else known[..., place] for place in self._scales]
+        weighed = [
+            (scaled.weights_over(scale, nodes), own)
+            for scale, nodes, scaled, own in zip(
+                scales, cell, (basis.stribeck, basis.lag), (stribeck, late), strict=True
+            )
+            if scale is not None and nodes
+        ]
+        rate, length = scales
+        if rate is not None and length is not None:
+            weighed.append((basis.coupled_weights(rate, length, cell), coupled))
+        for weights, own in weighed:
+            joined = weights[..., :, None] * own[..., None, :]
+            parts.append(joined.reshape((*u.shape[:-1], -1)))
+        return np.concatenate(parts, axis=-1)
+
+    @cached_property
+    def _scales(self) -> tuple[int | None, int | None]:
+        """Places of Stribeck's speed and Dahl's length among the parameters."""
+        names = self.layout.names
+        rate, length = (names.index(name) if name in names else None for name in SCALES)
+        return rate, length
+
+    @cached_property
+    def _logs(self) -> Integers:
+        return self._of("log")
+
+    @cached_property
+    def _logits(self) -> Integers:
+        return self._of("logit")
+
+    def _of(self, transform: str) -> Integers:
+        parameters = enumerate(self.layout.parameters)
+        return np.array([i for i, one in parameters if one.transform == transform], dtype=np.int64)
+
+    @cached_property
+    def _weights(self) -> Array:
+        return np.ones(len(self.moments.labels)) if self.weights is None else self.weights
+
+    def _summed_pair(self, a: Block, b: Block) -> Array:
+        if (a, b) not in self._pairs:
+            self._pairs[a, b] = np.tensordot(self._weights, self.moments.products(a, b), axes=1)
+        return self._pairs[a, b]
+
+    @cached_property
+    def _pairs(self) -> dict[tuple[Block, Block], Array]:
+        return {}
+
+    @cached_property
+    def _cells(self) -> dict[Cell, Array]:
+        return {}
+
+
+def _blocks(cell: Cell) -> list[Block]:
+    """Blocks of columns that a cell needs, in the order of a law's factors."""
+    return [
+        MEASURED,
+        FIXED,
+        *(("stribeck", index, 0) for index in cell[0]),
+        *(("lag", index, 0) for index in cell[1]),
+        *(("coupled", rate, length) for rate, length in coupled_nodes(cell)),
+    ]

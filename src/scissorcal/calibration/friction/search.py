@@ -1,0 +1,233 @@
+"""The optimum of a friction law over products of its columns: scans of its scales, Gauss-Newton."""
+
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction.columns import Cell
+from scissorcal.calibration.friction.moments import ReducedLaw
+from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.problem import Problem
+from scissorcal.inference.status import SearchStatus, about, picked
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 60
+ARRIVED = 1e-6
+"""Log-posterior that a further step would have to promise."""
+SAME_HEIGHT = 0.5
+AT_BOUND = 1e-6
+SILENT = 1e-9
+SCAN_REACH, SCAN_STEP = 2.5, 0.6
+"""Reach of a scan in prior standard deviations, and its step in the logarithm of a scale."""
+SCANNED_STARTS = 2
+RIDGE = 1e-10
+
+
+@dataclass(frozen=True)
+class ReducedProblem(Problem):
+    """A posterior whose sums over bins come from products by stroke, where the law has them.
+
+    Its prior is normal, with ``prior_mean`` (p,) and ``prior_precision`` (p, p).
+    """
+
+    prior_mean: Array = field(default_factory=lambda: np.zeros(0))
+    prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    reduced: ReducedLaw | None = None
+
+    def log_likelihood(self, point: Array) -> float:
+        """Sum of the likelihood's terms; -inf where it is not finite."""
+        if self.reduced is None:
+            return super().log_likelihood(point)
+        if self.tally is not None:
+            self.tally()
+        total = self.reduced.log_likelihood(point)
+        return total if np.isfinite(total) else -np.inf
+
+    @property
+    def law(self) -> ReducedLaw:
+        """The law over products; ValueError where there is none."""
+        if self.reduced is None:
+            raise ValueError("this posterior is one over bins: search it with find_optimum")
+        return self.reduced
+
+
+@dataclass(frozen=True)
+class _Ascent:
+    point: Array
+    value: float
+    evaluations: int
+
+
+def search(problem: ReducedProblem) -> Optimum:
+    """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
+
+    Levenberg and Marquardt's method on the law's own coefficients (More 1978,
+    doi:10.1007/BFb0067700), the noise at its best for each step. What depends on a scale has
+    several optima (a search for Dahl's length without a scan ended up to 172 nats below the
+    highest): scales are therefore scanned with all columns free, and the best places are starts
+    too.
+    """
+    starts = [*problem.starts, *_scanned(problem)]
+    ended = [ascend(problem, start) for start in starts]
+    best = max(ended, key=lambda one: one.value)
+    agreeing = sum(one.value > best.value - SAME_HEIGHT for one in ended)
+    optima: list[Cluster] = []
+    for one in sorted(ended, key=lambda one: -one.value):
+        if all(np.abs((one.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
+            optima.append(Cluster(one.point, one.value, 1, True))
+    optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
+    status, concerns = _status(problem, best.point)
+    sentence = about(status, concerns)
+    if agreeing < len(ended):
+        sentence += f" {agreeing} of {len(ended)} starts ended there, the others lower."
+    return Optimum(
+        point=best.point,
+        value=best.value,
+        success=status.found,
+        sentence=sentence,
+        agreeing=agreeing,
+        starts=len(ended),
+        evaluations=sum(one.evaluations for one in ended),
+        status=status,
+        optima=tuple(optima),
+        concerns=concerns,
+    )
+
+
+def ascend(problem: ReducedProblem, start: Array) -> _Ascent:
+    """Climb from one start (p,) to the optimum that it leads to."""
+    law, precision, mean = problem.law, problem.prior_precision, problem.prior_mean
+    point = _with_best_noise(problem, np.clip(start, problem.lower, problem.upper))
+    value, evaluations, damping = problem.log_posterior(point), 1, 1e-3
+    for _ in range(MOST_STEPS):
+        cell = law.cell_at(point)
+        slopes, products = law.slopes(point, cell), law.summed(cell)
+        weight = np.exp(-2.0 * point[-1])
+        factors = law.factors(point, cell)
+        slope = -weight * slopes.T @ (products @ factors) - (precision @ (point - mean))[:-1]
+        curvature = weight * slopes.T @ products @ slopes + precision[:-1, :-1]
+        evaluations += 2 * len(point) - 1
+        gained, promised = 0.0, np.inf
+        while damping < 1e12:
+            step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slope)
+            promised = float(slope @ step)
+            if promised < ARRIVED:
+                break
+            reached = point.copy()
+            reached[:-1] = np.clip(point[:-1] + step, problem.lower[:-1], problem.upper[:-1])
+            reached = _with_best_noise(problem, reached)
+            height = problem.log_posterior(reached)
+            evaluations += 1
+            if height > value:
+                gained, point, value, damping = height - value, reached, height, 0.2 * damping
+                break
+            damping = max(10.0 * damping, 1e-6)
+        if gained < ARRIVED:
+            break
+    return _Ascent(point, value, evaluations)
+
+
+def _with_best_noise(problem: ReducedProblem, point: Array) -> Array:
+    """The point (p,) with the noise at its best for the squares that the law leaves there."""
+    squares, count = problem.law.squares(point), problem.law.counted
+    mean, precision = problem.prior_mean[-1], problem.prior_precision[-1, -1]
+    size = 0.5 * np.log(squares / count)
+    for _ in range(20):
+        left = squares * np.exp(-2.0 * size)
+        step = (left - count - precision * (size - mean)) / (2.0 * left + precision)
+        size += step
+        if abs(step) < 1e-12:
+            break
+    reached = point.copy()
+    reached[-1] = np.clip(size, problem.lower[-1], problem.upper[-1])
+    return reached
+
+
+def _scanned(problem: ReducedProblem) -> list[Array]:
+    """Starts at the scales at which the columns, each of them free, leave the fewest squares.
+
+    Only laws with Dahl's length need them.
+    """
+    law = problem.law
+    names, basis = law.layout.names, law.moments.basis
+    if "presliding_length" not in names:
+        return []
+    late = names.index("presliding_length")
+    slow = names.index("stribeck_rate") if "stribeck_rate" in names else None
+    lengths = _grid(problem, late, basis.lag.spacing)
+    rates: list[int | None] = [None]
+    if slow is not None:
+        rates = list(_grid(problem, slow, basis.stribeck.spacing))
+    found = []
+    for rate, length in product(rates, lengths):
+        cell: Cell = (() if rate is None else (rate,), (length,))
+        found.append((_free_squares(law, problem.starts[0], cell), rate, length))
+    found.sort(key=lambda one: one[0])
+    starts: list[Array] = []
+    taken: list[int] = []
+    for _, rate, length in found:
+        if any(abs(length - other) * basis.lag.spacing < 1.5 * SCAN_STEP for other in taken):
+            continue
+        taken.append(length)
+        start = problem.starts[0].copy()
+        start[late] = length * basis.lag.spacing
+        if rate is not None and slow is not None:
+            start[slow] = rate * basis.stribeck.spacing
+        starts.append(start)
+        if len(starts) == SCANNED_STARTS:
+            break
+    return starts
+
+
+def _grid(problem: ReducedProblem, place: int, spacing: float) -> list[int]:
+    """Nodes over the prior of a scale's logarithm."""
+    middle, reach = problem.prior_mean[place], SCAN_REACH * problem.prior_sd[place]
+    count = max(2, round(2 * reach / SCAN_STEP) + 1)
+    logs = np.linspace(middle - reach, middle + reach, count)
+    return list(np.unique(np.round(logs / spacing).astype(int)).tolist())
+
+
+def _free_squares(law: ReducedLaw, start: Array, cell: Cell) -> float:
+    """Squares left by the columns that the law has, each with a factor of its own."""
+    products = law.summed(cell)
+    used = np.flatnonzero(np.any(law.slopes(start, cell) != 0.0, axis=1))
+    size = np.sqrt(np.diag(products)[used])
+    used, size = used[size > 0], size[size > 0]
+    inner = products[np.ix_(used, used)] / np.outer(size, size)
+    outer = products[used, 0] / size
+    solution = np.linalg.solve(inner + RIDGE * np.eye(len(used)), outer)
+    return float(products[0, 0] - outer @ solution)
+
+
+def _dips(problem: Problem, best: Cluster, other: Cluster) -> bool:
+    """Whether the log-posterior falls between two optima, so that they are two."""
+    away = other.point - best.point
+    floor = min(best.value, other.value) - SAME_HEIGHT
+    return any(
+        problem.log_posterior(best.point + share * away) <= floor for share in (0.25, 0.5, 0.75)
+    )
+
+
+def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, tuple[str, ...]]:
+    """How the search ended, and the names of the parameters that it concerns."""
+    scale = problem.prior_sd
+    bound = np.minimum(point - problem.lower, problem.upper - point) < AT_BOUND * scale
+    if np.any(bound):
+        return SearchStatus.AT_BOUNDS, picked(problem.names, bound)
+    law = problem.law
+    height = law.log_likelihood(point)
+    silent = np.array(
+        [
+            all(
+                abs(law.log_likelihood(point + sign * reach) - height) <= SILENT * (1 + abs(height))
+                for sign in (-1, 1)
+            )
+            for reach in np.diag(0.1 * scale)
+        ]
+    )
+    if np.any(silent):
+        return SearchStatus.AT_START, picked(problem.names, silent)
+    return SearchStatus.SETTLED, ()

@@ -1,0 +1,172 @@
+"""Where the plate stands: its target in photographs of a camera at rest, in the rig's frame too."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.plate.checks import plate_verdicts
+from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
+from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.geometry.rig_frame import RigPose
+from scissorcal.vision.targets.boards import PRINT_SCALE_SD
+from scissorcal.vision.targets.detect import Detection
+
+Array = NDArray[np.float64]
+
+ALGORITHM = 7
+"""Raised whenever a fit of the same photographs would give other numbers."""
+
+UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class PlatePhoto:
+    """The plate's target as one photograph shows it."""
+
+    name: str
+    detection: Detection
+
+
+def fit_plate(
+    photos: Sequence[PlatePhoto],
+    camera: Camera,
+    *,
+    plate_target: Pose = UNMOVED,
+    rig: RigPose | None = None,
+    inputs_hash: str = "",
+) -> PlateFit:
+    """Fit one pose of the plate to all photographs of it, corners and photographs together.
+
+    ``plate_target`` says how the target lies on the plate; the plate's frame has x along the cut
+    from its near edge, z out of its upper face. The camera and the plate stay where they are; a
+    photograph that shows them elsewhere is noticed by its own pose. Both poses that a plane allows
+    are refined and kept. ``rig`` takes the pose into the rig's frame.
+
+    Raises MissingError without a photograph, InputError where photographs show different targets,
+    VerdictError where the corners determine no pose.
+    """
+    if not photos:
+        raise MissingError(
+            "There is no photograph of the plate's target: print it ('scissorcal target'), stick "
+            "it to the plate, and take some with 'scissorcal capture plate --image plate-*.jpg'."
+        )
+    target = photos[0].detection.board.name
+    for photo in photos:
+        if photo.detection.board != photos[0].detection.board:
+            raise InputError(
+                f"{photo.name} shows the {photo.detection.board.name}, {photos[0].name} the "
+                f"{target}: a plate has one target; leave one of them out."
+            )
+    corners = _together(photos)
+    alone = [
+        _located(corners.where(corners.frame == i), camera, photo) for i, photo in enumerate(photos)
+    ]
+    whole = _located(corners, camera, *photos)
+    halves = _halves(corners, camera)
+    back = plate_target.inverse()
+    views = tuple(
+        _view(photo, found, whole, corners.frame == i)
+        for i, (photo, found) in enumerate(zip(photos, alone, strict=True))
+    )
+    pose = whole.pose.after(back)
+    in_rig = rig.holds(whole, camera).after(back) if rig else None
+    return PlateFit(
+        target=target,
+        camera_plate=pose,
+        other=whole.other.after(back) if whole.other else None,
+        odds=whole.odds,
+        ambiguity=whole.ambiguity,
+        rig_plate=in_rig,
+        views=views,
+        halves=halves,
+        rms_px=whole.rms_px,
+        noise_px=whole.sd_px,
+        verdicts=plate_verdicts(whole, views, halves, camera, rig),
+        inputs_hash=inputs_hash,
+        sources=tuple(photo.name for photo in photos),
+    )
+
+
+def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose:
+    try:
+        return locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+    except ValueError as error:
+        names = ", ".join(photo.name for photo in photos)
+        raise VerdictError(
+            f"{names}: {error}, so the plate's pose cannot be told. Have the whole "
+            f"{photos[0].detection.board.name} in the picture, in good light, or leave it out."
+        ) from None
+
+
+def _together(photos: Sequence[PlatePhoto]) -> Corners:
+    found = [photo.detection for photo in photos]
+    return Corners(
+        np.concatenate([one.pixels for one in found]),
+        np.concatenate([one.points for one in found]),
+        np.repeat(np.arange(len(found)), [len(one.ids) for one in found]),
+        np.concatenate([one.ids for one in found]),
+    )
+
+
+def _halves(corners: Corners, camera: Camera) -> Halves | None:
+    """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
+
+    Every other group of four corners (a marker's, or neighbours on a chessboard, which err
+    together) shows errors of single corners; the left and the right half show a bent target and a
+    lens that was fitted badly. What is unknown of the camera and of the print counts in what they
+    claim only as far as it moves them differently.
+    """
+    across = corners.points[:, 0]
+    ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
+    found = [halves for way in ways if (halves := _half_and_half(corners, camera, way))]
+    return max(found, key=lambda halves: halves.square, default=None)
+
+
+def _half_and_half(corners: Corners, camera: Camera, way: NDArray[np.bool_]) -> Halves | None:
+    alone = replace(camera, covariance=None)
+    try:
+        first, second = (locate_board(corners.where(half), alone) for half in (way, ~way))
+    except ValueError:
+        return None
+    assert first.pose.covariance is not None
+    assert second.pose.covariance is not None
+    away = difference(first.pose, second.pose)
+    printed = first.by_print - second.by_print
+    claimed = first.pose.covariance + second.pose.covariance
+    claimed = claimed + PRINT_SCALE_SD**2 * printed @ printed.T
+    if camera.covariance is not None:
+        bent = first.by_camera - second.by_camera
+        claimed = claimed + bent @ camera.covariance @ bent.T
+    return Halves(
+        rotation_deg=float(np.degrees(np.linalg.norm(away[:3]))),
+        translation_mm=float(1e3 * np.linalg.norm(away[3:])),
+        square=float(away @ np.linalg.solve(claimed, away)),
+    )
+
+
+def _view(
+    photo: PlatePhoto, found: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
+) -> PlateView:
+    normal = found.pose.matrix[:, 2]
+    to_target = found.pose.apply([photo.detection.points.mean(axis=0)])[0]
+    away = difference(found.pose, whole.pose)
+    own = whole.residuals_px[here][found.used]
+    slant = abs(normal @ to_target) / np.linalg.norm(to_target)
+    return PlateView(
+        name=photo.name,
+        corners=len(photo.detection.ids),
+        used=int(np.sum(whole.used[here])),
+        rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))),
+        rms_alone_px=found.rms_px,
+        side_px=photo.detection.square_px,
+        distance_m=float(np.linalg.norm(to_target)),
+        tilt_deg=float(np.degrees(np.arccos(np.clip(slant, 0.0, 1.0)))),
+        ambiguity=found.ambiguity,
+        away_deg=float(np.degrees(np.linalg.norm(away[:3]))),
+        away_mm=float(1e3 * np.linalg.norm(away[3:])),
+    )

@@ -1,0 +1,59 @@
+"""What the fit of a plate's pose ends in."""
+
+from dataclasses import dataclass
+
+from scissorcal.verdicts import Verdict
+from scissorcal.vision.geometry.pose import Pose
+
+
+@dataclass(frozen=True)
+class PlateView:
+    """One photograph: corners seen and used, rms errors in pixels under the common pose and under
+    its own, side of a square or marker in pixels, distance, angle between line of sight and the
+    plate's normal, ambiguity of its own pose, and how far that lies from the common one."""
+
+    name: str
+    corners: int
+    used: int
+    rms_px: float
+    rms_alone_px: float
+    side_px: float
+    distance_m: float
+    tilt_deg: float
+    ambiguity: float
+    away_deg: float
+    away_mm: float
+
+
+@dataclass(frozen=True)
+class Halves:
+    """How far poses of two halves of the corners lie apart, and ``square``, that difference in
+    units of what both claim: a chi-square of six degrees of freedom where the claims are honest."""
+
+    rotation_deg: float
+    translation_mm: float
+    square: float
+
+
+@dataclass(frozen=True)
+class PlateFit:
+    """The plate's pose before the camera and in the rig's frame, with covariance.
+
+    ``other`` is the second pose that a plane allows, ``odds`` those of the first against it,
+    ``ambiguity`` the ratio of their rms errors. ``rig_plate`` is None where the rig's frame is not
+    known. ``halves`` is None where too few corners were seen to part them.
+    """
+
+    target: str
+    camera_plate: Pose
+    other: Pose | None
+    odds: float
+    ambiguity: float
+    rig_plate: Pose | None
+    views: tuple[PlateView, ...]
+    halves: Halves | None
+    rms_px: float
+    noise_px: float
+    verdicts: tuple[Verdict, ...]
+    inputs_hash: str
+    sources: tuple[str, ...]

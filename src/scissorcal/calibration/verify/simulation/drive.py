@@ -1,0 +1,115 @@
+"""The torque that drives a motion, as a rig with a known truth would have measured it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.calibration.signals.weak_form import HELD
+from scissorcal.calibration.signals.window_length import SMOOTH
+from scissorcal.calibration.verify.simulation.motion import SmoothPiece
+from scissorcal.kernel import presliding_path
+from scissorcal.model import FrictionLaw, friction_torque
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DriveTruth:
+    """A rig without its material.
+
+    ``friction`` and ``offset`` (N m) are what the drive must overcome, ``cogging`` is (cosine,
+    sine, periods per turn) of what it gives besides. ``load_share`` of the material's torque is
+    added to friction. ``closing_offset`` and ``opening_offset`` (N m) are added to the
+    material's torque by direction, ``stroke_sd`` (N m) is what single strokes differ by.
+    ``delay_s`` is how much later than its sample says the torque is measured, ``noise``
+    what is added to each sample.
+    """
+
+    inertia: float
+    friction: FrictionLaw
+    noise: TorqueNoise
+    offset: float = 0.0
+    cogging: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    load_share: float = 0.0
+    closing_offset: float = 0.0
+    opening_offset: float = 0.0
+    stroke_sd: float = 0.0
+    delay_s: float = 0.0
+
+
+def measured_drive(
+    piece: SmoothPiece, truth: DriveTruth, material: Array, rng: np.random.Generator
+) -> Array:
+    """Drive (n,) measured at the samples of a piece, which moves as it did.
+
+    ``material`` (n - 1,) is the material's mean torque over each tick, positive as it opens. The
+    drive is taken as linear between samples, such that
+
+        inertia * acceleration = drive - friction - offset - cogging + material
+
+    holds exactly for means around each sample, as the second difference of the positions weighs
+    them; a sample shows it a delay later. Dry friction of a joint that is nearly at rest may be
+    anything up to its level: it is taken in proportion to the speed there.
+    """
+    path, tick_s = piece.opening, piece.tick_s
+    step = np.diff(path)
+    middle = 0.5 * (path[1:] + path[:-1])
+    sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
+    direction, state = np.sign(step), None
+    law = truth.friction
+    if np.any(law.presliding_share):
+        state = _built(path, float(law.presliding_length))
+        direction = direction + float(law.presliding_share) * (state - direction)
+    load = 0.5 * (piece.load[1:] + piece.load[:-1])
+    dry = sense * friction_torque(law, middle, step / tick_s, load, state)
+    cosine, sine, number = truth.cogging
+    drive = dry + truth.offset
+    drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
+    drive -= material - truth.load_share * np.abs(material) * sense * direction
+    closing = 0.5 * (1.0 - sense * np.sign(step))
+    drive -= closing * truth.closing_offset + (1.0 - closing) * truth.opening_offset
+    drive += _by_stroke(piece, truth.stroke_sd, rng)[:-1]
+    around = _around(drive)
+    around[1:-1] += truth.inertia * np.diff(path, 2) / tick_s**2
+    nodes = _nodes(around, HELD if piece.held else SMOOTH)
+    late = truth.delay_s / tick_s
+    shown = (1.0 - late) * nodes + late * np.append(nodes[0], nodes[:-1])
+    return np.asarray(shown + drawn_noise(truth.noise, len(path), tick_s, rng))
+
+
+def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator) -> Array:
+    """Noise (count,) of two time scales: white, and one that lasts."""
+    from scipy.signal import lfilter
+
+    white = noise.white_Nm * rng.standard_normal(count)
+    keep = float(np.exp(-tick_s / noise.slow_time_s))
+    kicks = rng.standard_normal(count)
+    kicks[1:] *= np.sqrt(1.0 - keep**2)
+    return np.asarray(white + noise.slow_Nm * lfilter([1.0], [1.0, -keep], kicks))
+
+
+def _around(by_tick: Array) -> Array:
+    """Means (n,) around each sample of what is known by tick (n - 1,)."""
+    return np.asarray(0.5 * (np.append(by_tick[0], by_tick) + np.append(by_tick, by_tick[-1])))
+
+
+def _nodes(around: Array, neighbour: float) -> Array:
+    """Samples (n,) of which neighbours weigh so much in the means ``around`` (n,) each."""
+    from scipy.linalg import solveh_banded
+
+    band = np.full((2, len(around)), neighbour)
+    band[1] = 1.0 - 2.0 * neighbour
+    band[1, [0, -1]] = 1.0 - neighbour
+    return np.asarray(solveh_banded(band, around))
+
+
+def _built(path: Array, length: float) -> Array:
+    state = presliding_path(path, length)
+    return np.asarray(0.5 * (state[1:] + state[:-1]))
+
+
+def _by_stroke(piece: SmoothPiece, sd: float, rng: np.random.Generator) -> Array:
+    offsets = sd * rng.standard_normal(int(piece.stroke.max(initial=0)) + 1)
+    return np.asarray(offsets[piece.stroke])

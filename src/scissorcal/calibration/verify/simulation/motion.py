@@ -1,0 +1,144 @@
+"""The motion of a recording, as a smooth path that other torques may have driven."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.path import PathMotion, path_motion
+from scissorcal.calibration.signals.sensors import resolution_of
+from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+PATH_SD = 2.0
+"""Standard deviation in samples of a Gaussian that takes off what is left of the encoder's steps:
+accelerations of a rough path would stand in the torque that drives it."""
+SLEDGE_SD = 10.0
+REST_S = 0.005
+"""Below one step of the encoder in so long a joint counts as nearly at rest."""
+REST_RATES = (1e-6, 1e-2)
+"""Least and largest of the speeds (rad/s or m/s) that this may give."""
+
+
+@dataclass(frozen=True)
+class SmoothPiece:
+    """A stretch of a recording without a gap; arrays (n,) by sample from ``start`` on.
+
+    ``opening`` (rad) and ``advance`` (m) are without steps, ``load`` (N m) is what a hand takes,
+    ``stroke`` numbers movements, the rest after one counted to it; ``sheet`` is -1 for none.
+    Below ``rest_rate`` (rad/s) the joint counts as nearly at rest; ``held`` says that commands held
+    the drive from one sample to the next.
+    """
+
+    start: int
+    opening: Array
+    advance: Array
+    load: Array
+    stroke: Integers
+    sheet: Integers
+    tick_s: float
+    rest_rate: float
+    held: bool
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A recording to be made anew: its pieces, and the steps of its channels (NaN for none)."""
+
+    recording: Recording
+    pieces: tuple[SmoothPiece, ...]
+    opening_step: float
+    advance_step: float
+    torque_step: float
+
+    def with_drive(self, drives: Sequence[Array]) -> Recording:
+        """The recording with the same motion, quantised anew, and with other drives.
+
+        ``drives`` are by piece and sample (N m): motor less handle. The handle's force, labels and
+        time stamps are kept; samples outside the pieces stay as they were.
+        """
+        samples = self.recording.samples.copy()
+        radius = self.recording.handle_radius_m
+        hand = 0.0 if np.isnan(radius) else radius * np.asarray(samples["handle_force"])
+        motor = np.asarray(samples["motor_torque"], dtype=np.float64).copy()
+        for piece, drive in zip(self.pieces, drives, strict=True):
+            span = slice(piece.start, piece.start + len(piece.opening))
+            for name, path, step in (
+                ("opening", piece.opening, self.opening_step),
+                ("advance", piece.advance, self.advance_step),
+            ):
+                samples[name][span] = _stepped(path, float(samples[name][piece.start]), step)
+            added = hand if np.ndim(hand) == 0 else np.asarray(hand)[span]
+            motor[span] = _stepped(drive + added, 0.0, self.torque_step)
+        samples["motor_torque"] = motor
+        return replace(self.recording, samples=samples)
+
+
+def motion_of(recordings: tuple[Recording, ...], inertia: float) -> tuple[Motion, ...]:
+    """The smooth motion of recordings, from :func:`~scissorcal.calibration.cut.path.path_motion`.
+
+    ``inertia`` (kg m^2) is what their smoothing takes; what moves is kept, what drove it is not.
+    """
+    found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
+    for motion in path_motion(recordings, inertia):
+        found[motion.recording].append(_piece(motion, recordings[motion.recording]))
+    return tuple(
+        Motion(
+            recording,
+            tuple(found[index]),
+            _step(recording, "opening"),
+            _step(recording, "advance"),
+            _step(recording, "motor_torque"),
+        )
+        for index, recording in enumerate(recordings)
+    )
+
+
+def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
+    span = slice(motion.start, motion.start + len(motion.opening))
+    load = np.zeros(len(motion.opening))
+    if not np.isnan(recording.handle_radius_m):
+        force = np.asarray(recording.samples["handle_force"][span], dtype=np.float64)
+        load = recording.handle_radius_m * force
+    return SmoothPiece(
+        start=motion.start,
+        opening=_smoothed(motion.opening, PATH_SD),
+        advance=_smoothed(motion.advance, SLEDGE_SD),
+        load=load,
+        stroke=_held(motion.stroke),
+        sheet=motion.sheet,
+        tick_s=motion.tick_s,
+        held=bool(np.ptp(recording.samples["torque_command"][span]) > 0),
+        rest_rate=float(np.clip(motion.resolution / REST_S, *REST_RATES)),
+    )
+
+
+def _smoothed(values: Array, sd: float) -> Array:
+    """A path (n,) under a Gaussian of ``sd`` samples; its ends go on as they come."""
+    from scipy.ndimage import gaussian_filter1d
+
+    reach = min(int(4 * sd), len(values) - 1)
+    before = 2.0 * values[0] - values[reach:0:-1]
+    after = 2.0 * values[-1] - values[-2 : -reach - 2 : -1]
+    wider = np.concatenate([before, values, after])
+    return np.asarray(gaussian_filter1d(wider, sd)[reach : reach + len(values)])
+
+
+def _held(stroke: Integers) -> Integers:
+    """Labels (n,) that last until the next movement; 0 for none before, others from 1 on."""
+    last = np.maximum.accumulate(np.where(stroke >= 0, np.arange(len(stroke)), -1))
+    return np.where(last >= 0, stroke[np.maximum(last, 0)] + 1, 0)
+
+
+def _step(recording: Recording, name: str) -> float:
+    values = np.asarray(recording.samples[name], dtype=np.float64)
+    return resolution_of(values) if np.ptp(values) > 0 else float("nan")
+
+
+def _stepped(values: Array, origin: float, step: float) -> Array:
+    if not np.isfinite(step):
+        return values
+    return np.asarray(origin + step * np.round((values - origin) / step))

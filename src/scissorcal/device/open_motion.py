@@ -1,0 +1,39 @@
+"""Start the servo on a link, whichever kind of link it is."""
+
+from scissorcal.device.link import Link, PortLink
+from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
+from scissorcal.device.motion import Motion
+from scissorcal.device.port_motion import PortMotion
+from scissorcal.kernel import ModelTables, ServoConfig
+
+SPARE_S = 30.0
+"""What a block of shared memory has room for beyond the longest reference: the way there."""
+
+
+def open_motion(
+    link: Link,
+    config: ServoConfig,
+    tables: ModelTables | None = None,
+    *,
+    longest_reference: int = 0,
+) -> Motion:
+    """Start the servo on a link: in a process of its own on a port, in this one in virtual time.
+
+    ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It begins idle, and
+    knows where the rig stands. A fault that the device has latched is cleared.
+
+    >>> from scissorcal.device.lockstep import LockstepLink
+    >>> link = LockstepLink("office-paper", np.random.default_rng(1))
+    >>> limits = ServoConfig(torque_limit=1, torque_slew=200, force_limit=0, force_slew=0)
+    >>> with open_motion(link, limits) as motion:
+    ...     samples = np.concatenate(list(motion.idle(0.2)))
+    >>> len(samples), bool(samples["torque_command"].any())
+    (200, False)
+    """
+    if isinstance(link, Exchanging):
+        return LockstepMotion(link, config, tables)
+    if not isinstance(link, PortLink):
+        raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
+    return PortMotion(
+        link, config, tables, longest_reference + round(SPARE_S * 1e6 / config.tick_us)
+    )

@@ -1,0 +1,195 @@
+"""The borders of a blade in the picture's own pixels: its edge, its back, the pivot's hole."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.profile import Crossings, Light, crossings, steepest
+from scissorcal.vision.blade.view import View
+
+Array = NDArray[np.float64]
+
+_MOST_POINTS = 3000
+_SHADOW_SEARCH = 0.05
+_LEAST_GOOD = {"edge": 0.75, "back": 0.3}
+_LEAST_IN_SHADOW = 0.4
+_MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
+
+
+@dataclass(frozen=True)
+class BorderPoints:
+    """Border points of one part in the picture: ``pixels`` (n, 2), unit ``normals`` (n, 2) outward.
+
+    ``sd_px`` (n,) is how well each is known along its normal.
+    """
+
+    pixels: Array
+    normals: Array
+    sd_px: Array
+    softness: Array
+    blur_px: float
+    good_share: float
+
+
+def find_border(
+    light: Light,
+    view: View,
+    parts: BladeParts,
+    side: Array,
+    first: float,
+    last: float,
+    source: str,
+    what: str,
+    search: float,
+) -> BorderPoints:
+    """Cross one side of a blade in the picture, about once every pixel.
+
+    ``side`` are rough points of it on the sheet, of which those between the shares ``first`` and
+    ``last`` of the blade's length count. Raises InputError where the picture is too blurred, or
+    too little of the side has a clear border.
+    """
+    frame = parts.frame(side)
+    there = (frame[:, 0] > first * parts.length) & (frame[:, 0] < last * parts.length)
+    if there.sum() < 20:
+        raise InputError(f"{source}: too little of the blade's {what} can be seen.")
+    s, e = _thinned(frame[there])
+    rough = _in_pixels(view, parts, s, e)
+    count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
+    stations = np.linspace(s[0], s[-1], count)
+    per_unit = count / max(s[-1] - s[0], 1e-12)
+    offsets = np.interp(stations, s, e)
+    outward = np.sign(np.median(e))
+    shadowed = what == "edge" and search > _SHADOW_SEARCH
+    for soft, far in ((1.2 if shadowed else 2.0, search), (1.5, 0.012)):
+        points, normals = _with_normals(view, parts, stations, offsets, outward)
+        reach = float(np.clip(far * parts.length * per_unit, 6.0, 80.0))
+        shift = steepest(light, points, normals, reach, soft, innermost=shadowed and far == search)
+        offsets = offsets + outward * shift / per_unit
+    points, normals = _with_normals(view, parts, stations, offsets, outward)
+    found = crossings(light, points, normals, 6.0)
+    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    if blur > 1.6:
+        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
+        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    good = found.good & _alike(found)
+    share = float(good.mean())
+    _refuse_blur(blur, per_unit, parts, source)
+    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD[what]):
+        raise InputError(
+            f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
+            "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
+            "the metal looks darker than the sheet."
+        )
+    seen = points + normals * found.place[:, None]
+    return BorderPoints(
+        seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
+    )
+
+
+def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -> None:
+    width = float(np.median(np.abs(parts.frame(parts.edge)[:, 1]))) * per_unit
+    if not blur < max(_MOST_BLUR_PX, _MOST_BLUR_SHARE * width):
+        raise InputError(
+            f"{source} is too blurred: borders are {blur:.1f} pixels soft. Hold the camera still, "
+            "focus on the blade, and try again."
+        )
+
+
+def _alike(found: Crossings) -> NDArray[np.bool_]:
+    """Crossings whose blur and contrast are like those of most."""
+    contrast = found.outer - found.inner
+    usual = np.median(contrast[found.good]) if found.good.any() else 0.0
+    blur = np.median(found.blur[found.good]) if found.good.any() else 1.0
+    return np.asarray(
+        (contrast * np.sign(usual) > 0.25 * abs(usual))
+        & (found.blur < 1.8 * blur + 0.2)
+        & (found.blur > 0.4 * blur - 0.3)
+    )
+
+
+def find_hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | None:
+    """Cross the pivot hole's border all around; None where there is no hole, or no clear one."""
+    if not len(parts.hole):
+        return None
+    middle = parts.hole.mean(axis=0)
+    radius = float(np.linalg.norm(parts.hole - middle, axis=1).mean())
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    for _ in range(2):
+        points = view.to_pixels(middle + radius * ring)
+        inward = view.to_pixels(middle + 0.98 * radius * ring) - points
+        size = float(np.median(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+        normals = inward / np.linalg.norm(inward, axis=1, keepdims=True)
+        found = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
+        if found.good.sum() < 60:
+            return None
+        seen = points + normals * found.place[:, None]
+        middle, radius = fit_circle(view.to_sheet(seen[found.good]))
+        off = np.abs(np.linalg.norm(view.to_sheet(seen) - middle, axis=1) - radius)
+        sure = found.good & (off < 4.0 * 1.4826 * np.median(off[found.good]) + 1e-12)
+        middle, radius = fit_circle(view.to_sheet(seen[sure]))
+    return BorderPoints(
+        seen[sure],
+        normals[sure],
+        found.sd[sure],
+        np.ones(int(sure.sum())),
+        float(np.median(found.blur[sure])),
+        1.0,
+    )
+
+
+def fit_circle(points: Array) -> tuple[Array, float]:
+    """Least-squares circle: algebraic start, then Gauss-Newton on the distances."""
+    middle = points.mean(axis=0)
+    away = points - middle
+    design = np.column_stack([2.0 * away, np.ones(len(away))])
+    a, b, c = np.linalg.lstsq(design, np.sum(away**2, axis=1), rcond=None)[0]
+    centre, radius = np.array([a, b]), float(np.sqrt(max(c + a * a + b * b, 0.0)))
+    for _ in range(10):
+        out = away - centre
+        distance = np.linalg.norm(out, axis=1)
+        J = np.column_stack([-out / distance[:, None], -np.ones(len(out))])
+        step = np.linalg.lstsq(J, -(distance - radius), rcond=None)[0]
+        centre, radius = centre + step[:2], radius + float(step[2])
+    return middle + centre, radius
+
+
+def _thinned(frame: Array) -> tuple[Array, Array]:
+    """One offset per station, smoothed over a few flat pixels."""
+    order = np.argsort(frame[:, 0])
+    s, e = frame[order, 0], frame[order, 1]
+    cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
+    index = np.digitize(s, cells)
+    kept = [(s[index == k].mean(), np.median(e[index == k])) for k in np.unique(index)]
+    thin = np.array(kept)
+    return thin[:, 0], _median_filtered(thin[:, 1], 5)
+
+
+def _median_filtered(values: Array, width: int) -> Array:
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(values, size=width, mode="nearest"))
+
+
+def _in_pixels(view: View, parts: BladeParts, s: Array, e: Array) -> Array:
+    return view.to_pixels(parts.pivot + s[:, None] * parts.axis + e[:, None] * parts.up)
+
+
+def _with_normals(
+    view: View, parts: BladeParts, s: Array, e: Array, outward: float
+) -> tuple[Array, Array]:
+    """Points in the picture and unit normals there that lead out of the blade."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth = gaussian_filter1d(e, 8.0, mode="nearest")
+    points = _in_pixels(view, parts, s, e)
+    line = _in_pixels(view, parts, s, smooth)
+    along = np.gradient(line, axis=0)
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    step = outward * 0.01 * parts.length
+    leads = _in_pixels(view, parts, s, smooth + step) - line
+    return points, normals * np.sign(np.sum(leads * normals, axis=1))[:, None]

@@ -1,0 +1,171 @@
+"""A blade in one photograph: its edge to a fraction of a pixel, and what makes it uncertain."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
+from scissorcal.vision.blade.modes import (
+    SHARP,
+    BladeFrame,
+    SeenBorders,
+    edge_modes,
+    halving_stations,
+)
+from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
+from scissorcal.vision.blade.profile import Light
+from scissorcal.vision.blade.view import View
+
+Array = NDArray[np.float64]
+
+_ANCHORS, _STRETCHES = 14, 30
+_WAVY = 0.008
+"""How far, in shares of its length, a side may leave a parabola and still be the side."""
+
+
+@dataclass(frozen=True)
+class BladeMeasurement:
+    """One blade of one photograph.
+
+    ``station``, ``offset`` and ``sd`` (n,) are points of the edge in the blade's frame (sheet
+    units: metres, or pixels without a scale), each with the noise of its own; ``modes`` (n, k) are
+    what moves them together, each column by one standard deviation: the mapping, the print's
+    scale, the pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
+    say which. ``softness`` (n,) is the blur of each point against the usual one. ``pivot_px`` and
+    ``axis_px`` are for pictures.
+    """
+
+    source: str
+    station: Array
+    offset: Array
+    sd: Array
+    softness: Array
+    modes: Array
+    mode_names: tuple[str, ...]
+    length: float
+    hole_radius: float
+    parts: BladeParts
+    edge: BorderPoints
+    metric: bool
+    uncertainty: str
+    pivot_px: Array
+    axis_px: Array
+
+
+def measure_blade(
+    light: Light, view: View, parts: BladeParts, source: str, *, search: float = 0.035
+) -> BladeMeasurement:
+    """Measure a blade whose parts are roughly known, in the photograph's own pixels.
+
+    Nothing is resampled: borders are crossed in the picture and their places taken to the sheet.
+    What each source of error does to the edge is one linear response (see `blade_modes`).
+    ``search`` is how far from the rough outline a border may lie, in blade lengths.
+    Raises InputError where the picture is too blurred or too much of the edge is hidden.
+    """
+    edge = find_border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
+    back = find_border(
+        light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
+    )
+    seen = SeenBorders(edge, back, find_hole(light, view, parts))
+    frame = _framed(view, parts, seen)
+    pivot, axis, up = frame.pivot, frame.axis, frame.up
+    columns, names = edge_modes(view, seen, frame, parts)
+    there = view.to_sheet(edge.pixels)
+    station, offset = frame.of(there)
+    # noise along the normals in pixels becomes noise along ``up`` in sheet units
+    unit = np.abs((view.to_sheet(edge.pixels + edge.normals) - there) @ up)
+    length = float(parts.length + (parts.pivot - pivot) @ axis)
+    order = np.argsort(station)
+    apart = np.diff(station[order], prepend=-np.inf, append=np.inf)
+    # points that share a station have no slope between them
+    order = order[(station[order] > 0.0) & (apart[1:] > 0.0) & (apart[:-1] > 0.0)]
+    return BladeMeasurement(
+        source,
+        station[order],
+        offset[order],
+        (unit * edge.sd_px)[order],
+        edge.softness[order],
+        columns[order],
+        names,
+        length,
+        frame.radius,
+        replace(parts, pivot=pivot, axis=axis, up=up, length=length),
+        edge,
+        view.metric,
+        view.uncertainty,
+        view.to_pixels(pivot[None])[0],
+        view.to_pixels((pivot + 0.5 * length * axis)[None])[0],
+    )
+
+
+def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
+    """The blade's frame as its borders give it."""
+    if seen.hole is None:
+        pivot, radius = parts.pivot, 0.0
+    else:
+        pivot, radius = fit_circle(view.to_sheet(seen.hole.pixels))
+    sides = [
+        view.to_sheet(border.pixels[border.softness < SHARP]) for border in (seen.edge, seen.back)
+    ]
+    axis, up = parts.axis, parts.up
+    for _ in range(3):
+        axis, up = _halved(sides, pivot, axis, up, parts.length)
+    return BladeFrame(pivot, axis, up, radius)
+
+
+def _halved(
+    sides: list[Array], pivot: Array, axis: Array, up: Array, length: float
+) -> tuple[Array, Array]:
+    """The axis turned so that it halves the way between both sides of the blade."""
+    along = halving_stations(length)
+    middle = np.zeros_like(along)
+    for side in sides:
+        away = side - pivot
+        middle += 0.5 * _smooth(away @ axis, away @ up, along)
+    return _turned(axis, up, float(np.sum(middle * along) / np.sum(along**2)))
+
+
+def _smooth(station: Array, offset: Array, along: Array) -> Array:
+    """A side of the blade at places along it, whatever nicks and glare take out of it.
+
+    Of all parabolas through three of the side's stretches the one that most stretches lie nearest
+    to tells what belongs to it; medians of that are the side, and the parabola where there are
+    none.
+    """
+    here = (station > along[0]) & (station < along[-1])
+    s, e = station[here], offset[here]
+    middle = 0.5 * (along[0] + along[-1])
+    anchors = np.array(
+        [
+            (np.median(x), np.median(y))
+            for x, y in zip(np.array_split(s, _ANCHORS), np.array_split(e, _ANCHORS), strict=True)
+            if len(x)
+        ]
+    )
+    triples = np.array(list(combinations(range(len(anchors)), 3)))
+    powers = np.vander(anchors[:, 0] - middle, 3)
+    curves = np.linalg.solve(powers[triples], anchors[triples, 1][..., None])[..., 0]
+    off = np.abs(anchors[:, 1] - curves @ powers.T)
+    curve = curves[np.argmin(np.quantile(off, 0.6, axis=1))]
+    for _ in range(4):
+        rest = np.abs(e - np.polyval(curve, s - middle))
+        usual = 4.0 * 1.4826 * float(np.quantile(rest, 0.4))
+        kept = rest < max(usual, _WAVY * float(along[-1]))
+        curve = np.polyfit(s[kept] - middle, e[kept], 2)
+    cells = np.linspace(along[0], along[-1], _STRETCHES + 1)
+    index = np.digitize(s, cells) - 1
+    places = 0.5 * (cells[1:] + cells[:-1])
+    values = np.polyval(curve, places - middle)
+    for cell in range(_STRETCHES):
+        own = kept & (index == cell)
+        if own.sum() >= 2:
+            shift = e[own] - np.polyval(curve, s[own] - middle)
+            values[cell] += float(np.median(shift))
+    return np.asarray(np.interp(along, places, values))
+
+
+def _turned(axis: Array, up: Array, angle: float) -> tuple[Array, Array]:
+    c, s = np.cos(angle), np.sin(angle)
+    return c * axis + s * up, c * up - s * axis

@@ -1,0 +1,283 @@
+"""What moves all points of a measured edge together: one linear response to every source."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.blade.borders import BorderPoints
+from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, BladeParts
+from scissorcal.vision.blade.view import View
+
+Array = NDArray[np.float64]
+
+TONE_SHARE = 0.12
+"""By how much of its blur a border may seem shifted, since a camera's curve is not quite sRGB's."""
+
+GRAIN_SHARE = 0.5
+"""Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
+
+SHARP = 1.4
+"""Blur against the usual one below which a point may say where the centreline lies."""
+
+_STRETCHES, _NEIGHBOURS = 40, 5
+
+
+@dataclass(frozen=True)
+class SeenBorders:
+    """A blade's borders in the picture; ``hole`` is None where no hole shows the pivot."""
+
+    edge: BorderPoints
+    back: BorderPoints
+    hole: BorderPoints | None
+
+
+@dataclass(frozen=True)
+class BladeFrame:
+    """A blade's frame on the sheet: ``pivot``, unit vectors ``axis`` and ``up``, hole radius."""
+
+    pivot: Array
+    axis: Array
+    up: Array
+    radius: float
+
+    def of(self, points: Array) -> tuple[Array, Array]:
+        """Stations and offsets of sheet points (n, 2)."""
+        away = points - self.pivot
+        return away @ self.axis, away @ self.up
+
+
+def halving_stations(length: float) -> Array:
+    """Stations (201,) over which the centreline halves the blade."""
+    return np.linspace(BACK_FIRST, BACK_LAST, 201) * length
+
+
+def edge_modes(
+    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts
+) -> tuple[Array, tuple[str, ...]]:
+    """What one standard deviation of each shared source of error does to the edge.
+
+    Columns (n, k) are changes of the offset at a fixed station, at the edge's points in the order
+    of ``seen.edge``; names say which source each belongs to. They come from one linear response:
+    a source moves border points and pivot on the sheet; the centreline, which halves the blade,
+    turns after them; and a point that moves along the edge changes the offset by the edge's slope.
+    That slope is a smooth one, so that no column carries the noise of the points.
+    """
+    edge, back = view.to_sheet(seen.edge.pixels), view.to_sheet(seen.back.pixels)
+    response = _Response.of(frame, parts.length, (edge, seen.edge), (back, seen.back))
+    outward = _Outward.of(view, seen)
+    rows: list[Array] = []
+    names: list[str] = []
+    for name, moved in _mapping_moves(view, seen, frame, parts):
+        rows.append(response.to(*moved))
+        names.append(name)
+    tone = TONE_SHARE * seen.edge.blur_px
+    rows.append(response.to(tone * outward.edge, tone * outward.back, tone * outward.pivot(frame)))
+    names.append("tone")
+    still = np.zeros(2)
+    rough = GRAIN_SHARE * float(np.median(seen.edge.sd_px))
+    along = np.linspace(-1.0, 1.0, len(edge))
+    rows += [
+        response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still)
+        for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0)
+    ]
+    behind = GRAIN_SHARE * float(np.median(seen.back.sd_px))
+    rows.append(response.to(0.0 * edge, behind * outward.back, still))
+    names += ["grain"] * 4
+    for shift in _pivot_shifts(outward, frame, seen, parts):
+        rows.append(response.to(0.0 * edge, 0.0 * back, shift))
+        names.append("pivot")
+    rows.append(-_turn_sd(*frame.of(back)) * response.swing)
+    names.append("centreline")
+    return np.stack(rows, axis=1), tuple(names)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One side of the blade: its smooth ``slope`` (n,) and ``swing`` (n,), by which its offset
+    falls per radian that the axis turns, and ``weight`` (n,), its points' pull on the axis."""
+
+    slope: Array
+    swing: Array
+    weight: Array
+
+    @classmethod
+    def of(cls, frame: BladeFrame, length: float, points: Array, border: BorderPoints) -> "_Side":
+        station, offset = frame.of(points)
+        slope = smooth_slope(station, offset)
+        sharp = np.flatnonzero(border.softness < SHARP)
+        weight = np.zeros(len(points))
+        weight[sharp] = _pull(station[sharp], halving_stations(length))
+        return cls(slope, station + slope * offset, weight)
+
+    def shifted(self, moves: Array, frame: BladeFrame) -> Array:
+        """Change of the offset at a fixed station under moves (n, 2) of the points."""
+        return np.asarray(moves @ frame.up - self.slope * (moves @ frame.axis))
+
+
+@dataclass(frozen=True)
+class _Response:
+    """Linear response of the measured edge to moves of both sides' points and of the pivot."""
+
+    frame: BladeFrame
+    edge: _Side
+    back: _Side
+
+    @classmethod
+    def of(
+        cls,
+        frame: BladeFrame,
+        length: float,
+        edge: tuple[Array, BorderPoints],
+        back: tuple[Array, BorderPoints],
+    ) -> "_Response":
+        return cls(frame, _Side.of(frame, length, *edge), _Side.of(frame, length, *back))
+
+    @property
+    def swing(self) -> Array:
+        return self.edge.swing
+
+    def to(self, edge_moves: Array, back_moves: Array, pivot_move: Array) -> Array:
+        """Change (n,) of the edge's offset at a fixed station, the centreline following."""
+        here = self.edge.shifted(edge_moves - pivot_move, self.frame)
+        there = self.back.shifted(back_moves - pivot_move, self.frame)
+        # the axis turns until both sides' weighted offsets balance again
+        lever = self.edge.weight @ self.edge.swing + self.back.weight @ self.back.swing
+        turn = (self.edge.weight @ here + self.back.weight @ there) / lever
+        return np.asarray(here - turn * self.swing)
+
+
+@dataclass(frozen=True)
+class _Outward:
+    """Moves on the sheet when every border moves out of the metal by a pixel."""
+
+    edge: Array
+    back: Array
+    hole: Array | None
+    hole_place: Array | None
+
+    @classmethod
+    def of(cls, view: View, seen: SeenBorders) -> "_Outward":
+        def out(border: BorderPoints) -> Array:
+            return view.to_sheet(border.pixels + border.normals) - view.to_sheet(border.pixels)
+
+        if seen.hole is None:
+            return cls(out(seen.edge), out(seen.back), None, None)
+        place = view.to_sheet(seen.hole.pixels)
+        return cls(out(seen.edge), out(seen.back), out(seen.hole), place)
+
+    def pivot(self, frame: BladeFrame) -> Array:
+        if self.hole is None or self.hole_place is None:
+            return np.zeros(2)
+        return _circle_follows(self.hole_place, self.hole, frame)
+
+
+def _circle_follows(hole: Array, moves: Array, frame: BladeFrame) -> Array:
+    """How a least-squares circle's middle (2,) follows moves (n, 2) of its points."""
+    radial = (hole - frame.pivot) / np.linalg.norm(hole - frame.pivot, axis=1, keepdims=True)
+    design = np.column_stack([radial, np.ones(len(radial))])
+    away = np.sum(radial * moves, axis=1)
+    return np.asarray(np.linalg.solve(design.T @ design, design.T @ away)[:2])
+
+
+def _mapping_moves(
+    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts
+) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:
+    """Moves of edge, back and pivot for each independent error of the mapping."""
+    pivot = seen.hole.pixels if seen.hole is not None else view.to_pixels(parts.pivot[None])
+    pixels = np.concatenate([seen.edge.pixels, seen.back.pixels, pivot])
+    borders = np.cumsum([len(seen.edge.pixels), len(seen.back.pixels)])
+    before = view.to_sheet(pixels)
+    for name, values in _mapping_errors(view):
+        edge, back, rest = np.split(view.to_sheet(pixels, values) - before, borders)
+        if seen.hole is None:
+            yield name, (edge, back, rest[0])
+        else:
+            yield name, (edge, back, _circle_follows(before[borders[1] :], rest, frame))
+
+
+def _mapping_errors(view: View) -> list[tuple[str, Array]]:
+    """Values of the mapping moved by one standard deviation of each of its independent errors.
+
+    Those shared by all photographs come first, and take with them what follows from them.
+    """
+    count = len(view.values)
+    order = np.r_[count - view.shared : count, 0 : count - view.shared]
+    covariance = view.covariance[np.ix_(order, order)]
+    scale = np.sqrt(np.diag(covariance))
+    used = np.flatnonzero(scale > 0.0)
+    if not len(used):
+        return []
+    size = scale[used]
+    correlation = covariance[np.ix_(used, used)] / np.outer(size, size)
+    root = size[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(len(used)))
+    moved = []
+    for column, place in enumerate(used):
+        values = view.values.copy()
+        values[order[used]] += root[:, column]
+        moved.append(("shared mapping" if place < view.shared else "mapping", values))
+    return moved
+
+
+def _pivot_shifts(
+    outward: _Outward, frame: BladeFrame, seen: SeenBorders, parts: BladeParts
+) -> Array:
+    """Two shifts of the pivot, one standard deviation each."""
+    if seen.hole is None or outward.hole is None or outward.hole_place is None:
+        return np.eye(2) * parts.pivot_sd
+    away = outward.hole_place - frame.pivot
+    radial = away / np.linalg.norm(away, axis=1, keepdims=True)
+    off = np.linalg.norm(away, axis=1) - frame.radius
+    # neighbours along a small circle share their pixels: about one in four says something new
+    spread = float(np.sqrt(np.mean(off**2)))
+    information = radial.T @ radial / 4.0
+    pixel = float(np.median(np.linalg.norm(outward.hole, axis=1)))
+    grain = GRAIN_SHARE * float(np.median(seen.hole.sd_px)) * pixel
+    covariance = np.linalg.inv(information) * spread**2 + grain**2 * np.eye(2)
+    return np.asarray(np.linalg.cholesky(covariance)).T
+
+
+def _turn_sd(s: Array, e: Array) -> float:
+    """How well the middle between edge and back fixes the axis, in radians.
+
+    ``s`` and ``e`` (n,) are the back's stations and offsets.
+    """
+    design = np.stack([np.ones_like(s), s, s**2, s**3], axis=1)
+    off = e - design @ np.linalg.lstsq(design, e, rcond=None)[0]
+    spread = 1.4826 * float(np.median(np.abs(off - np.median(off))))
+    stretch = 20.0 * float(np.median(np.abs(np.diff(s))) + 1e-12)
+    independent = max(float(np.ptp(s)) / max(stretch, 1e-12), 2.0)
+    return float(0.5 * spread / np.sqrt(independent * np.mean(s**2)))
+
+
+def smooth_slope(station: Array, offset: Array) -> Array:
+    """Slope (n,) of a side of the blade without its points' noise, its nicks and its glare.
+
+    Medians over short stretches, of which the median of five neighbours is taken: what is shorter
+    than two stretches leaves no trace, what is longer than ten is followed.
+    """
+    from scipy.ndimage import gaussian_filter1d, median_filter
+
+    order = np.argsort(station)
+    parts = [part for part in np.array_split(order, _STRETCHES) if len(part)]
+    middles = np.array([np.median(station[part]) for part in parts])
+    levels = np.array([np.median(offset[part]) for part in parts])
+    trend = np.polyfit(middles, levels, 1) if len(parts) > 1 else np.zeros(2)
+    # about its trend, since filters bend a steep line at its ends
+    rest = median_filter(levels - np.polyval(trend, middles), size=_NEIGHBOURS, mode="nearest")
+    slope = trend[0] + np.gradient(gaussian_filter1d(rest, 1.0, mode="nearest"), middles)
+    return np.asarray(np.interp(station, middles, slope))
+
+
+def _pull(station: Array, along: Array) -> Array:
+    """Weights (n,) of points in the sum over ``along`` of station times offset there."""
+    order = np.argsort(station)
+    s = station[order]
+    above = np.clip(np.searchsorted(s, along), 1, len(s) - 1)
+    gap = np.maximum(s[above] - s[above - 1], 1e-30)
+    share = np.clip((along - s[above - 1]) / gap, 0.0, 1.0)
+    weight = np.zeros(len(s))
+    np.add.at(weight, order[above - 1], (1.0 - share) * along)
+    np.add.at(weight, order[above], share * along)
+    return weight

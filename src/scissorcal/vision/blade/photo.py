@@ -1,0 +1,94 @@
+"""One photograph of a blade, from the file to its measured edge."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
+from scissorcal.vision.blade.parts import EdgeSide, lone_blade
+from scissorcal.vision.blade.scissors import Scissors, find_scissors
+from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
+from scissorcal.vision.blade.view import PlainView, View, see_mat
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.photo import Photo
+from scissorcal.vision.targets.marker_corners import linear_light
+
+Array = NDArray[np.float64]
+
+_SEARCH = 0.1
+"""How far, in blade lengths, shadows may lead the outline of scissors away from the metal."""
+
+_SCALE_SD = 0.005
+
+
+@dataclass(frozen=True)
+class BladePhoto:
+    """What one photograph shows: how the sheet is seen, the outline, and the edges of its blades.
+
+    ``scissors`` is None where a blade lies alone. ``measured`` has one row for a blade alone, two
+    for open scissors (the one whose tip is farther from the handles first), none for closed ones.
+    """
+
+    photo: Photo
+    view: View
+    outline: Silhouette
+    measured: tuple[BladeMeasurement, ...]
+    scissors: Scissors | None = None
+
+
+def photograph_blade(
+    photo: Photo,
+    camera: Camera | None = None,
+    *,
+    edge_side: EdgeSide = "down",
+    pivot_px: tuple[float, float] | None = None,
+    pivot_sd_px: float = 1.0,
+) -> BladePhoto:
+    """Measure one blade on the mat.
+
+    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it, known to
+    ``pivot_sd_px``.
+    Raises InputError where the photograph cannot be used, saying what is wrong with it.
+    """
+    view = see_mat(photo, camera)
+    light = linear_light(photo.grey)
+    outline = silhouette(light, view, photo.source)
+    pivot, sd = None, 0.0
+    if pivot_px is not None:
+        beside = (pivot_px[0] + 1.0, pivot_px[1])
+        there = view.to_sheet(photo.within([pivot_px, beside]))
+        pivot, sd = there[0], pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
+    parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
+    measured = measure_blade(light, view, parts, photo.source)
+    return BladePhoto(photo, view, outline, (measured,))
+
+
+def photograph_scissors(
+    photo: Photo, camera: Camera | None = None, *, mat: bool = True, scale: float | None = None
+) -> BladePhoto:
+    """Measure both blades of open scissors, on the mat or on any bright sheet.
+
+    Without the mat shapes come out up to their size; ``scale`` (metres per pixel of the whole
+    photograph) gives it, and the camera should look straight down, since its tilt stays in. Raises
+    InputError where the photograph shows no scissors, or cannot be used.
+    """
+    light = linear_light(photo.grey)
+    if mat:
+        view: View = see_mat(photo, camera)
+        outline = silhouette(light, view, photo.source)
+    else:
+        height, width = photo.image.shape[:2]
+        read = scale * photo.reduction if scale else None
+        unit = read or 1.0
+        whole = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
+        view = PlainView(whole, read, _SCALE_SD if read else 0.0)
+        outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
+    scissors = find_scissors(outline, photo.source)
+    measured = tuple(
+        measure_blade(light, view, parts, photo.source, search=_SEARCH) for parts in scissors.blades
+    )
+    if len(measured) == 2:
+        along = float(measured[0].parts.axis @ measured[1].parts.axis)
+        scissors = replace(scissors, opening=float(np.arccos(np.clip(along, -1.0, 1.0))))
+    return BladePhoto(photo, view, outline, measured, scissors)

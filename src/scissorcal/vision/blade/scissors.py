@@ -1,0 +1,310 @@
+"""Whole scissors in one outline: handles, blades, pivot and opening angle."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import Silhouette
+
+Array = NDArray[np.float64]
+
+LEAST_OPENING = 0.12
+"""Blades open by less than this (rad) hide each other's edges."""
+
+_RING_SHARE = 0.04
+_NOTCH_SHARE = 0.08
+_CLEAR_OF_CROTCH = 0.06
+_TIP_SHARE = 0.03
+_SCREW_SHARE = (0.014, 0.055)
+_FAINT, _LEAST_CIRCLE = 2.0, 0.3
+_SCREW_NEAR = 0.10
+_GUESS_SD_SHARE = 0.03
+
+
+@dataclass(frozen=True)
+class Scissors:
+    """A pair of scissors in a photograph, in sheet units.
+
+    ``blades`` are two where they are open, and none where they are closed, as then each hides the
+    other's edge. ``opening`` (rad) is the angle between their centrelines, 0 where closed.
+    ``pivot`` (2,) is known to ``pivot_sd``; ``screw`` tells whether it is a screw's middle or only
+    where the centrelines cross. ``tips`` (k, 2) and ``rings`` are the rest of what was found.
+    """
+
+    pivot: Array
+    pivot_sd: float
+    screw: bool
+    blades: tuple[BladeParts, ...]
+    opening: float
+    tips: Array
+    rings: tuple[Array, ...]
+    length: float
+
+
+def find_scissors(shape: Silhouette, source: str) -> Scissors:
+    """Take an outline apart that is expected to be a pair of scissors.
+
+    Handles are told by their rings, or by running out of the mat's field; the tips are the ends
+    away from them. Raises InputError where there are no handles (forks have none) or no blades.
+    """
+    outline = shape.outer
+    rings = _rings(shape)
+    if not rings and not len(shape.cut_off):
+        raise InputError(
+            f"{source}: what lies there has no handle with a ring and so is no pair of scissors"
+            f"{_prongs(outline)}. Photograph scissors whole, or one blade on the mat."
+        )
+    handles = (
+        np.mean([ring.mean(axis=0) for ring in rings], axis=0)
+        if rings
+        else shape.cut_off.mean(axis=0)
+    )
+    away = np.linalg.norm(outline - handles, axis=1)
+    first = int(np.argmax(away))
+    reach = float(away[first])
+    if len(shape.cut_off) and rings:
+        raise InputError(
+            f"{source}: the scissors are cut off by the border: bring all of them into the picture."
+        )
+    crotch = _crotch(shape, first, rings, reach)
+    if crotch is None:
+        return _closed(shape, outline[first], handles, rings)
+    second, notch = crotch
+    return _open(shape, source, (first, second), notch, handles, rings)
+
+
+def _rings(shape: Silhouette) -> tuple[Array, ...]:
+    import cv2
+
+    size = float(np.ptp(shape.outer, axis=0).max())
+    found = []
+    for hole in shape.holes:
+        _, sides, _ = cv2.minAreaRect(hole.astype(np.float32))
+        if min(sides) > _RING_SHARE * size:
+            found.append(hole)
+    return tuple(found)
+
+
+def _prongs(outline: Array) -> str:
+    """What else it may be: count the ends between deep notches."""
+    deep = [depth for _, _, _, depth in _notches(outline)]
+    size = float(np.ptp(outline, axis=0).max())
+    count = sum(depth > 0.04 * size for depth in deep)
+    return f" ({count + 1} prongs, as of a fork)" if count >= 2 else ""
+
+
+def _notches(outline: Array) -> list[tuple[int, int, int, float]]:
+    """Start, end, deepest point (indices) and depth of what an outline lacks of its hull."""
+    import cv2
+
+    scale = 1e4 / float(np.ptp(outline, axis=0).max())
+    whole = np.rint((outline - outline.min(axis=0)) * scale).astype(np.int32)[:, None, :]
+    hull = np.sort(cv2.convexHull(whole, returnPoints=False).ravel())[::-1]
+    # None where the outline is convex, which OpenCV's types do not say
+    defects: Any = cv2.convexityDefects(whole, hull[:, None].astype(np.int32))
+    if defects is None:
+        return []
+    return [
+        (int(a), int(b), int(deep), float(depth) / 256.0 / scale)
+        for a, b, deep, depth in np.asarray(defects).reshape(-1, 4)
+    ]
+
+
+def _crotch(
+    shape: Silhouette, tip: int, rings: tuple[Array, ...], reach: float
+) -> tuple[int, int] | None:
+    """The other tip and the point between both blades; None where they are closed."""
+    outline = shape.outer
+    handle = np.concatenate(rings) if rings else np.concatenate([shape.cut_off, shape.cut_off])
+    best: tuple[float, int, int] | None = None
+    for start, end, deep, depth in _notches(outline):
+        if depth < _NOTCH_SHARE * reach:
+            continue
+        for here, there in ((start, end), (end, start)):
+            near = float(np.linalg.norm(outline[here] - outline[tip]))
+            if near > 0.12 * reach:
+                continue
+            by_handle = float(np.linalg.norm(handle - outline[there], axis=1).min())
+            away = float(np.linalg.norm(outline[there] - handle.mean(axis=0)))
+            if (
+                by_handle > 0.15 * reach
+                and away > 0.55 * reach
+                and (best is None or depth > best[0])
+            ):
+                best = depth, there, deep
+    return None if best is None else (best[1], best[2])
+
+
+def _open(
+    shape: Silhouette,
+    source: str,
+    tips: tuple[int, int],
+    notch: int,
+    handles: Array,
+    rings: tuple[Array, ...],
+) -> Scissors:
+    outline = shape.outer
+    crotch = outline[notch]
+    sides = [_sides_of(outline, tip, notch, handles) for tip in tips]
+    lines = []
+    for (edge, back), tip in zip(sides, tips, strict=True):
+        length = float(np.linalg.norm(outline[tip] - crotch))
+        lines.append(_middle_line(edge, back, crotch, outline[tip], length))
+    guess = _meeting(lines)
+    length = float(np.mean([np.linalg.norm(outline[tip] - guess) for tip in tips]))
+    pivot, sd, screw = _pivot(shape, guess, length)
+    blades = []
+    for (edge, back), tip, line in zip(sides, tips, lines, strict=True):
+        axis = outline[tip] - pivot
+        axis = line[1] * np.sign(line[1] @ axis)
+        up = np.array([axis[1], -axis[0]])
+        up = up * np.sign(np.median((back - pivot) @ up) - np.median((edge - pivot) @ up))
+        own = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
+        stop = float(own.frame(np.concatenate([edge, back]))[:, 0].max())
+        clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
+        blades.append(
+            BladeParts(
+                pivot,
+                axis,
+                up,
+                _between(own, edge, clear, stop * (1.0 - _TIP_SHARE)),
+                _between(own, back, clear, stop * (1.0 - _TIP_SHARE)),
+                np.empty((0, 2)),
+                stop,
+                sd,
+            )
+        )
+    cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
+    opening = float(np.arccos(cosine))
+    if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
+        raise InputError(
+            f"{source}: the blades are open by {np.degrees(opening):.0f} degrees, and too little "
+            "of their edges can be seen: open them wider."
+        )
+    return Scissors(pivot, sd, screw, tuple(blades), opening, outline[list(tips)], rings, length)
+
+
+def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, ...]) -> Scissors:
+    """Closed scissors: the pivot is a screw between handles and tip, or nothing is known of it."""
+    outline = shape.outer
+    axis = tip - handles
+    reach = float(np.linalg.norm(axis))
+    axis = axis / reach
+    across = np.array([-axis[1], axis[0]])
+    along = (outline - handles) @ axis
+    behind = max(float(((ring - handles) @ axis).max()) for ring in rings) if rings else 0.0
+    places = np.linspace(behind + 0.12 * (reach - behind), behind + 0.6 * (reach - behind), 60)
+    middles = []
+    for place in places:
+        here = np.abs(along - place) < 0.02 * reach
+        off = (outline[here] - handles) @ across
+        middles.append(handles + place * axis + 0.5 * (off.min() + off.max()) * across)
+    best = _best_screw(shape, np.array(middles), 0.5 * reach, 0.045)
+    if best is None:
+        pivot = np.array(middles)[len(middles) // 4]
+        return Scissors(pivot, 0.1 * reach, False, (), 0.0, tip[None], rings, reach)
+    pivot, radius = best
+    length = float(np.linalg.norm(tip - pivot))
+    return Scissors(pivot, 0.2 * radius, True, (), 0.0, tip[None], rings, length)
+
+
+def _pivot(shape: Silhouette, guess: Array, length: float) -> tuple[Array, float, bool]:
+    found = _best_screw(shape, guess[None], length, _SCREW_NEAR)
+    if found is None:
+        return guess, _GUESS_SD_SHARE * length, False
+    return found[0], 0.2 * found[1], True
+
+
+def _best_screw(
+    shape: Silhouette, near: Array, length: float, within: float
+) -> tuple[Array, float] | None:
+    """The clearest circle near any of some places: its middle and radius.
+
+    A circle is clear where light changes straight across it, in whichever sense, along most of its
+    length; a larger one counts more than a glint on it, and one with a slot or a dome within more
+    than an even patch.
+    """
+    import cv2
+
+    centre = shape.grid(near)
+    size = length / shape.pixel
+    light = np.clip(shape.relative * 170.0, 0, 255).astype(np.uint8)
+    low, high = (max(share * size, 2.0) for share in _SCREW_SHARE)
+    room = within * size + high + 3.0
+    left, top = np.maximum(np.floor(centre.min(axis=0) - room).astype(int), 0)
+    right, bottom = np.ceil(centre.max(axis=0) + room).astype(int)
+    part = np.asarray(cv2.GaussianBlur(light, (0, 0), 0.8), dtype=np.float32)
+    part = part[top:bottom, left:right]
+    if min(part.shape) < 8:
+        return None
+    gx, gy = (cv2.Sobel(part, cv2.CV_32F, i, j) / 8.0 for i, j in ((1, 0), (0, 1)))
+    steep = np.hypot(gx, gy)
+    weight = np.clip((steep - _FAINT) / _FAINT, 0.0, 1.0) / np.maximum(steep, 1e-6)
+    gx, gy = gx * weight, gy * weight
+    y, x = np.mgrid[0 : part.shape[0], 0 : part.shape[1]]
+    place = np.stack([x.ravel() + left, y.ravel() + top], axis=1)
+    gap = np.linalg.norm(place[:, None, :] - centre[None, :, :], axis=2).min(axis=1)
+    tried = place[gap < within * size]
+    turn = np.linspace(0.0, 2.0 * np.pi, 49)[:-1].astype(np.float32)
+    best: tuple[float, Array, float] | None = None
+    for radius in np.arange(low, high + 0.5, 0.5):
+        px = (tried[:, :1] - left + radius * np.cos(turn)).astype(np.float32)
+        py = (tried[:, 1:] - top + radius * np.sin(turn)).astype(np.float32)
+        across = np.asarray(cv2.remap(gx, px, py, cv2.INTER_LINEAR)) * np.cos(turn)
+        across += np.asarray(cv2.remap(gy, px, py, cv2.INTER_LINEAR)) * np.sin(turn)
+        clear = np.maximum(np.abs(across) - 0.6, 0.0) / 0.4
+        within_it = cv2.blur(steep, (2 * int(0.35 * radius) + 1,) * 2)
+        inner = within_it[tried[:, 1] - top, tried[:, 0] - left]
+        shaped = 0.3 + 0.7 * np.minimum(inner / (2.0 * _FAINT), 1.0)
+        score = clear.mean(axis=1) * shaped * np.sqrt(radius)
+        index = int(np.argmax(score))
+        if best is None or score[index] > best[0]:
+            best = float(score[index]), tried[index], float(radius)
+    if best is None or best[0] < _LEAST_CIRCLE * np.sqrt(best[2]):
+        return None
+    return best[1] * shape.pixel + np.asarray(shape.origin), best[2] * shape.pixel
+
+
+def _sides_of(outline: Array, tip: int, notch: int, handles: Array) -> tuple[Array, Array]:
+    """The edge, from the notch to the tip, and the back, from the tip as far again."""
+    count = len(outline)
+    ahead = (notch - tip) % count
+    step = 1 if ahead < count - ahead else -1
+    span = min(ahead, count - ahead)
+    edge = outline[(tip + step * np.arange(span + 1)) % count][::-1]
+    back = outline[(tip - step * np.arange(span + 1)) % count][::-1]
+    return edge, back
+
+
+def _middle_line(
+    edge: Array, back: Array, crotch: Array, tip: Array, length: float
+) -> tuple[Array, Array]:
+    """A point and direction of the line that halves the part of a blade beyond the crotch."""
+    axis = (tip - crotch) / length
+    across = np.array([-axis[1], axis[0]])
+    along = np.linspace(0.1, 0.75, 60) * length
+    middles = np.zeros((60, 2))
+    for side in (edge, back):
+        s, e = (side - crotch) @ axis, (side - crotch) @ across
+        order = np.argsort(s)
+        off = np.interp(along, s[order], e[order])
+        middles += 0.5 * (crotch + along[:, None] * axis + off[:, None] * across)
+    centre = middles.mean(axis=0)
+    direction = np.linalg.svd(middles - centre, full_matrices=False)[2][0]
+    return centre, np.asarray(direction * np.sign(direction @ axis))
+
+
+def _meeting(lines: list[tuple[Array, Array]]) -> Array:
+    (a, u), (b, v) = lines
+    solved = np.linalg.lstsq(np.column_stack([u, -v]), b - a, rcond=None)[0]
+    return np.asarray(a + solved[0] * u)
+
+
+def _between(parts: BladeParts, side: Array, first: float, last: float) -> Array:
+    station = parts.frame(side)[:, 0]
+    kept = side[(station > first) & (station < last)]
+    return np.asarray(kept[np.argsort(parts.frame(kept)[:, 0])])

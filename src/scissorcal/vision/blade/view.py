@@ -1,0 +1,338 @@
+"""From pixels to the sheet on which a blade lies, and how far that can be trusted."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.vision.geometry.board_pose import Corners, locate_board, project_pose
+from scissorcal.vision.geometry.camera import PARAMETERS, Camera
+from scissorcal.vision.photo import Photo
+from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M, PRINT_SCALE_SD, MarkerBoard
+from scissorcal.vision.targets.detect import find_board
+
+Array = NDArray[np.float64]
+
+LEAST_MARKERS = 6
+
+_CORNER_SD_PX = 0.03
+_FIXED_POINT_STEPS = 30
+_FAR_OFF = 5.0
+
+
+class View(Protocol):
+    """One photograph's way from pixels to a sheet, x to the right and y down.
+
+    ``values`` (p,) with ``covariance`` (p, p) fix the way; `to_sheet` takes other values, so that
+    whoever measures can see what each of them moves. The last ``shared`` of them are the same
+    in every photograph of one mat and camera. ``bounds`` (left, top, right, bottom) is the
+    part of the sheet in which a blade may lie, in sheet units: metres, or pixels where no scale is
+    known (``metric`` False). ``uncertainty`` is a sentence on how well the way is known.
+    """
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]: ...
+
+    @property
+    def metric(self) -> bool: ...
+
+    @property
+    def uncertainty(self) -> str: ...
+
+    @property
+    def values(self) -> Array: ...
+
+    @property
+    def covariance(self) -> Array: ...
+
+    @property
+    def shared(self) -> int: ...
+
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array: ...
+
+    def to_pixels(self, points: Array) -> Array: ...
+
+
+def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT) -> "View":
+    """Find the blade mat in a photograph and how it is seen.
+
+    With a camera by the mat's pose; without one by a homography and one radial term of distortion.
+    Pixels are those of ``photo.image``. Raises InputError where no mat, another target, or too
+    little of it is seen, or where the camera is not that of the photograph.
+    """
+    seen = find_board(photo, mat)
+    if len(seen.ids) < 4 * LEAST_MARKERS:
+        raise InputError(
+            f"{photo.source} shows {len(seen.ids) // 4} of the {mat.name}'s {len(mat.ids)} markers "
+            f"sharply and needs {LEAST_MARKERS}: photograph all of the mat, sharp and without "
+            "glare."
+        )
+    height, width = photo.image.shape[:2]
+    pixels = (seen.pixels - photo.origin + 0.5) / photo.reduction - 0.5
+    sheet = seen.points[:, :2]
+    if camera is None:
+        return _homography_view(sheet, pixels, (width, height), MAT_FIELD_M, photo.source)
+    if (camera.width, camera.height) != (photo.width, photo.height):
+        raise InputError(
+            f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
+            f"at {camera.width} x {camera.height}: take photographs as those of the camera's fit."
+        )
+    if photo.reduction > 1:
+        camera = camera.scaled(width, height)
+    return _camera_view(sheet, pixels, camera, MAT_FIELD_M, photo.source)
+
+
+@dataclass(frozen=True)
+class PlainView:
+    """A photograph taken as it is: shapes up to similarity, or to scale where ``scale`` is given.
+
+    ``scale`` is metres per pixel, None where nobody knows.
+    """
+
+    bounds: tuple[float, float, float, float]
+    scale: float | None = None
+    scale_share_sd: float = 0.0
+
+    @property
+    def metric(self) -> bool:
+        return self.scale is not None
+
+    @property
+    def uncertainty(self) -> str:
+        if self.scale is None:
+            return "No mat: the shape is known up to its size and to the camera's tilt."
+        return "No mat: the scale was given, and the camera's tilt is not corrected."
+
+    @property
+    def values(self) -> Array:
+        return np.ones(1)
+
+    @property
+    def covariance(self) -> Array:
+        return np.full((1, 1), self.scale_share_sd**2)
+
+    @property
+    def shared(self) -> int:
+        return 1
+
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
+        share = 1.0 if values is None else float(values[0])
+        return np.asarray(pixels * ((self.scale or 1.0) * share))
+
+    def to_pixels(self, points: Array) -> Array:
+        return np.asarray(points / (self.scale or 1.0))
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """A sheet at a pose before a known camera.
+
+    Values are its rotation and shift, the camera's intrinsics, and the print's scale by axis.
+    """
+
+    camera: Camera
+    pose: Array
+    covariance: Array
+    bounds: tuple[float, float, float, float]
+    uncertainty: str
+    metric: bool = True
+    shared: int = 11
+
+    @property
+    def values(self) -> Array:
+        return np.concatenate([self.pose, _intrinsics(self.camera), np.ones(2)])
+
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
+        import cv2
+
+        v = self.values if values is None else values
+        rays = _with_intrinsics(self.camera, v[6:-2]).rays(pixels)
+        rotation = cv2.Rodrigues(v[:3])[0]
+        directions = np.column_stack([rays, np.ones(len(rays))]) @ rotation
+        origin = -v[3:6] @ rotation
+        reach = origin[2] / directions[:, 2]
+        return np.asarray((origin[:2] - directions[:, :2] * reach[:, None]) * v[-2:])
+
+    def to_pixels(self, points: Array) -> Array:
+        import cv2
+
+        rotation = cv2.Rodrigues(self.pose[:3])[0]
+        return self.camera.project(points @ rotation[:, :2].T + self.pose[3:6])
+
+
+@dataclass(frozen=True)
+class HomographyView:
+    """A sheet seen by an unknown camera: a homography after one radial term about the middle.
+
+    Values are the homography from pixels to the sheet (8, its last entry 1), the radial term,
+    and the print's scale along either axis.
+    """
+
+    matrix: Array
+    radial: float
+    size: tuple[int, int]
+    covariance: Array
+    bounds: tuple[float, float, float, float]
+    uncertainty: str
+    metric: bool = True
+    shared: int = 2
+
+    @property
+    def values(self) -> Array:
+        return np.concatenate([self.matrix.ravel()[:8], [self.radial], np.ones(2)])
+
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
+        v = self.values if values is None else values
+        return np.asarray(_through(_matrix(v[:8]), _straightened(pixels, v[8], self.size)) * v[-2:])
+
+    def to_pixels(self, points: Array) -> Array:
+        straight = _through(np.asarray(np.linalg.inv(self.matrix)), points)
+        bent = straight.copy()
+        for _ in range(_FIXED_POINT_STEPS):
+            r2 = np.sum(bent**2, axis=1, keepdims=True)
+            bent = straight / (1.0 + self.radial * r2)
+        return np.asarray(bent * _half(self.size) + _middle(self.size))
+
+
+def _camera_view(
+    sheet: Array,
+    pixels: Array,
+    camera: Camera,
+    bounds: tuple[float, float, float, float],
+    source: str,
+) -> CameraView:
+    import cv2
+
+    solid = np.column_stack([sheet, np.zeros(len(sheet))])
+    numbers = np.arange(len(sheet))
+    corners = Corners(pixels, solid, np.zeros_like(numbers), numbers)
+    try:
+        board = locate_board(corners, camera)
+    except ValueError as error:
+        raise InputError(f"{source}: the mat's pose cannot be found: {error}.") from None
+    whole = np.repeat(board.used.reshape(-1, 4).all(axis=1), 4)
+    turn, _ = cv2.Rodrigues(board.pose.matrix[:3, :3])
+    pose = np.concatenate([np.ravel(turn), np.asarray(board.pose.translation_m)])
+    residual, slope = project_pose(pose, corners.where(whole), camera)
+    J, inner = slope[:, :6], slope[:, 6:]
+    own, spread = _covariance(J, residual.ravel())
+    follow = -np.linalg.solve(J.T @ J, J.T @ inner)
+    known = np.zeros((9, 9)) if camera.covariance is None else camera.covariance
+    covariance = np.zeros((17, 17))
+    covariance[:6, :6] = own + follow @ known @ follow.T
+    covariance[:6, 6:15] = follow @ known
+    covariance[6:15, :6] = covariance[:6, 6:15].T
+    covariance[6:15, 6:15] = known
+    covariance[15:, 15:] = PRINT_SCALE_SD**2 * np.eye(2)
+    return CameraView(
+        camera,
+        pose,
+        covariance,
+        bounds,
+        f"Seen by the fitted camera: the mat's corners lie within {spread:.2f} px of its pose.",
+    )
+
+
+def _homography_view(
+    sheet: Array,
+    pixels: Array,
+    size: tuple[int, int],
+    bounds: tuple[float, float, float, float],
+    source: str,
+) -> HomographyView:
+    import cv2
+    from scipy.optimize import least_squares
+
+    start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
+    if start is None:
+        raise InputError(f"{source}: the mat's markers do not fit a flat sheet.")
+    start = np.asarray(start) / start[2, 2]
+    scale = _pixels_per_unit(start, sheet, size)
+
+    def miss(values: Array) -> Array:
+        there = _through(_matrix(values[:8]), _straightened(pixels, values[8], size))
+        return np.asarray(((there - sheet) * scale[:, None]).ravel())
+
+    first = np.concatenate([start.ravel()[:8], [0.0]])
+    solved = least_squares(miss, first, x_scale="jac", method="lm")
+    far = np.linalg.norm(solved.fun.reshape(-1, 8), axis=1)
+    kept = np.repeat(far < _FAR_OFF * np.median(far) + _CORNER_SD_PX, 4)
+    if not kept.all():
+        sheet, pixels, scale = sheet[kept], pixels[kept], scale[kept]
+        solved = least_squares(miss, solved.x, x_scale="jac", method="lm")
+    # what a lens does beyond one radial term is smooth: no more pieces of it than parameters
+    J = np.asarray(solved.jac)
+    own, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
+    covariance = np.zeros((11, 11))
+    covariance[:9, :9] = own
+    covariance[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
+    return HomographyView(
+        _matrix(solved.x[:8]),
+        float(solved.x[8]),
+        size,
+        covariance,
+        bounds,
+        "No camera fit: seen by a homography and one radial term, which leave "
+        f"{spread:.2f} px at the mat's corners.",
+    )
+
+
+def _covariance(J: Array, residual: Array, least: float = 1.0) -> tuple[Array, float]:
+    """Least squares' covariance, with the four corners of a marker counted as partly one.
+
+    Corners of a marker share its print and its light: the variance is raised by what the sums over
+    markers exceed that of independent corners, and ``least`` times at the least.
+    """
+    count, parameters = J.shape
+    variance = float(residual @ residual) / max(count - parameters, 1)
+    sums = residual.reshape(-1, 4, 2).sum(axis=1)
+    shared = max(float(np.mean(sums**2)) / (4.0 * max(variance, 1e-12)), least)
+    sure = max(variance, _CORNER_SD_PX**2) * shared
+    scale = np.sqrt(np.sum(J**2, axis=0))
+    inverse = np.linalg.pinv((J / scale).T @ (J / scale)) / np.outer(scale, scale)
+    return sure * inverse, float(np.sqrt(variance))
+
+
+def _pixels_per_unit(matrix: Array, sheet: Array, size: tuple[int, int]) -> Array:
+    """Pixels per sheet unit near each point, the geometric mean over directions."""
+    back = np.asarray(np.linalg.inv(matrix))
+    step = 1e-4 * float(np.ptp(sheet))
+    here = _through(back, sheet)
+    right = _through(back, sheet + np.array([step, 0.0])) - here
+    down = _through(back, sheet + np.array([0.0, step])) - here
+    area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
+    return np.asarray(np.sqrt(area) / step * _half(size))
+
+
+def _intrinsics(camera: Camera) -> Array:
+    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5]])
+
+
+def _with_intrinsics(camera: Camera, values: Array) -> Camera:
+    named = dict(zip(PARAMETERS[:4], values[:4].tolist(), strict=True))
+    bent = (*values[4:9].tolist(), *camera.distortion[5:])
+    return replace(camera, distortion=bent, **named)
+
+
+def _matrix(values: Array) -> Array:
+    return np.append(values, 1.0).reshape(3, 3)
+
+
+def _middle(size: tuple[int, int]) -> Array:
+    return 0.5 * (np.asarray(size, dtype=np.float64) - 1.0)
+
+
+def _half(size: tuple[int, int]) -> float:
+    return 0.5 * float(np.hypot(*size))
+
+
+def _straightened(pixels: Array, radial: float, size: tuple[int, int]) -> Array:
+    centred = (pixels - _middle(size)) / _half(size)
+    return np.asarray(centred * (1.0 + radial * np.sum(centred**2, axis=1, keepdims=True)))
+
+
+def _through(matrix: Array, points: Array) -> Array:
+    mapped = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(mapped[:, :2] / mapped[:, 2:])

@@ -1,0 +1,264 @@
+"""Where a flat target stands before a camera: both poses that a plane allows, and how sure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.pose import Pose, left_jacobian
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LEAST_SD_PX = 0.02
+"""No corner is taken to be found better than this, however well a few of them agree."""
+
+FAR_OFF = 6.0
+"""Corners farther off than this many robust standard deviations are left out."""
+
+TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
+"""What corners are usually found to, and how many residuals that counts for: four corners of a
+marker leave only two to judge by."""
+
+FEWEST = 4
+ROUNDS = 100
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Corners of one flat target as seen by a camera at rest, in one frame or several.
+
+    ``pixels`` (n, 2); ``points`` (n, 3) in the target's frame, z = 0, metres; ``frame`` and
+    ``corner`` (n,) say in which picture, and which corner of the target it is: what is wrong with a
+    corner in one picture (its print, its light) is wrong with it in the next.
+    """
+
+    pixels: Array
+    points: Array
+    frame: Integers
+    corner: Integers
+
+    def where(self, keep: NDArray[np.bool_]) -> "Corners":
+        """The corners that ``keep`` selects."""
+        return Corners(self.pixels[keep], self.points[keep], self.frame[keep], self.corner[keep])
+
+
+@dataclass(frozen=True)
+class BoardPose:
+    """T_camera_target and what it rests on.
+
+    ``other`` is the second pose that a plane allows, None where there is none. ``odds`` are those
+    of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
+    1 where both explain the picture alike. ``rms_px`` and ``sd_px`` are the rms error and the
+    standard deviation that corners were found to have; ``used`` (n,) marks the corners that count,
+    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and ``by_print``
+    (6, 2) say how the pose moves with the camera's parameters and the print's scales.
+    """
+
+    pose: Pose
+    other: Pose | None
+    odds: float
+    ambiguity: float
+    rms_px: float
+    sd_px: float
+    used: NDArray[np.bool_]
+    residuals_px: Array
+    by_camera: Array
+    by_print: Array
+
+
+def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> BoardPose:
+    """Find a flat target's pose, and the second one that may explain the picture as well.
+
+    Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
+    are refined on all corners, those far off left out; the better one is the pose. Its covariance
+    has three parts: errors that corners have anew in every frame, errors that a corner keeps
+    from frame to frame (both estimated from the residuals), and what is unknown of the camera and
+    of the print: ``print_sd`` is how far the printer's scale may be off along either axis, a share.
+
+    Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
+    """
+    if len(np.unique(corners.corner)) < FEWEST:
+        raise ValueError(f"only {len(np.unique(corners.corner))} corners were seen; 4 are needed")
+    flat = corners.points[:, :2] - corners.points[:, :2].mean(axis=0)
+    if np.linalg.svd(flat, compute_uv=False)[-1] < 1e-6 * np.linalg.norm(flat):
+        raise ValueError("the corners that were seen lie along one line")
+    used = np.all(np.isfinite(camera.rays(corners.pixels)), axis=1)
+    if len(np.unique(corners.corner[used])) < FEWEST:
+        raise ValueError("the corners that were seen lie where the camera's fit does not hold")
+    try:
+        begun = _both(corners.where(used), camera)
+        refined = [_refine(start, corners, camera, used) for start in begun]
+        used = _near(min(refined, key=_square).residuals, used)
+        refined = sorted(
+            (_refine(found.pose, corners, camera, used) for found in refined), key=_square
+        )
+        best = refined[0]
+        noise, kept = _components(best.residuals, corners, used)
+        own, by_camera, by_print = _covariance(best, corners, used, noise, kept)
+    except np.linalg.LinAlgError:
+        raise ValueError("the corners that were seen do not determine a pose") from None
+    sd = float(np.sqrt(noise + kept))
+    covariance = own + print_sd**2 * by_print @ by_print.T
+    if camera.covariance is not None:
+        covariance = covariance + by_camera @ camera.covariance @ by_camera.T
+    other = refined[1] if len(refined) > 1 and _apart(refined[0], refined[1]) else None
+    frames = len(np.unique(corners.frame[used]))
+    gap = (other.square - best.square) / (noise + kept * frames) if other else np.inf
+    return BoardPose(
+        pose=Pose.from_rotation_vector(best.pose[:3], best.pose[3:], covariance),
+        other=Pose.from_rotation_vector(other.pose[:3], other.pose[3:]) if other else None,
+        odds=float(np.exp(min(0.5 * gap, 700.0))),
+        ambiguity=_ratio(other.square, best.square) if other else np.inf,
+        rms_px=float(np.sqrt(np.mean(np.sum(best.residuals[used] ** 2, axis=1)))),
+        sd_px=sd,
+        used=used,
+        residuals_px=best.residuals,
+        by_camera=by_camera,
+        by_print=by_print,
+    )
+
+
+@dataclass(frozen=True)
+class _Refined:
+    """``pose`` (6,) as rotation vector and translation, ``slope`` (2 n, 15) of pixels by pose and
+    camera, ``square`` the sum of squared residuals of the corners used."""
+
+    pose: Array
+    residuals: Array
+    slope: Array
+    square: float
+
+
+def _both(corners: Corners, camera: Camera) -> list[Array]:
+    import cv2
+
+    middle = np.append(corners.points[:, :2].mean(axis=0), 0.0)
+    rays = camera.rays(corners.pixels)
+    _, turns, shifts, _ = cv2.solvePnPGeneric(
+        corners.points - middle, rays[:, None, :], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+    )
+    found = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        matrix = cv2.Rodrigues(turn)[0]
+        translation = shift.ravel() - matrix @ middle
+        if np.all(np.isfinite(translation)):
+            found.append(np.concatenate([turn.ravel(), translation]))
+    if not found:
+        raise ValueError("no pose in front of the camera explains the corners")
+    return found
+
+
+def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, Array]:
+    """Measured minus predicted pixels (n, 2) at a pose (6,), and slopes (2 n, 15) of the latter.
+
+    The slopes are by the pose, then by the camera's parameters.
+    """
+    import cv2
+
+    pixels, slope = cv2.projectPoints(
+        corners.points, pose[:3], pose[3:], camera.matrix, camera.coefficients
+    )
+    return np.asarray(corners.pixels - pixels.reshape(-1, 2)), np.asarray(slope[:, :15])
+
+
+def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
+    """Slopes (2 n, 2) of pixels by the print's scale along x and y, from those of `project_pose`.
+
+    A point moves in the picture as the target would with it when shifted along the same axis.
+    """
+    turned = Pose.from_rotation_vector(pose[:3], np.zeros(3)).matrix
+    shifts = (slope[:, 3:6] @ turned[:, k] * np.repeat(corners.points[:, k], 2) for k in (0, 1))
+    return np.stack(list(shifts), axis=1)
+
+
+def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
+    """Levenberg-Marquardt on the reprojection error of the corners used."""
+    both = np.repeat(used, 2)
+    pose, damping = start.copy(), 1e-3
+    residuals, slope = project_pose(pose, corners, camera)
+    square = float(np.sum(residuals[used] ** 2))
+    for _ in range(ROUNDS):
+        by_pose = slope[both, :6]
+        normal = by_pose.T @ by_pose
+        pull = by_pose.T @ residuals.ravel()[both]
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
+        tried = pose + step
+        away, leaning = project_pose(tried, corners, camera)
+        reached = float(np.sum(away[used] ** 2))
+        if reached <= square:
+            settled = square - reached <= 1e-12 * square
+            pose, residuals, slope, square = tried, away, leaning, reached
+            damping = max(0.1 * damping, 1e-12)
+            if settled:
+                break
+        else:
+            damping *= 10.0
+            if damping > 1e8:
+                break
+    return _Refined(pose, residuals, slope, square)
+
+
+def _square(found: _Refined) -> float:
+    return found.square
+
+
+def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    distance = np.sqrt(np.sum(residuals**2, axis=1))
+    robust = float(np.median(distance[used])) / 1.1774
+    return np.asarray(used & (distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0)))
+
+
+def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> tuple[float, float]:
+    """Variances of a coordinate: anew in every frame, and kept by a corner from frame to frame."""
+    frames = len(np.unique(corners.frame[used]))
+    seen = residuals[used]
+    labels, place = np.unique(corners.corner[used], return_inverse=True)
+    count = np.bincount(place)
+    spare = 2 * len(seen) - 6
+    least = LEAST_SD_PX**2
+    if frames == 1:
+        usual = TYPICAL_WEIGHT * TYPICAL_SD_PX**2
+        found = (usual + float(np.sum(seen**2))) / (TYPICAL_WEIGHT + spare)
+        return max(found, least), 0.0
+    mean = np.stack([np.bincount(place, seen[:, k]) / count for k in (0, 1)], axis=1)
+    within = float(np.sum((seen - mean[place]) ** 2)) / max(2 * (len(seen) - len(labels)), 1)
+    between = float(np.sum(count * np.sum(mean**2, axis=1))) / max(2 * len(labels) - 6, 1)
+    kept = max((between - within) / float(count.mean()), 0.0)
+    return max(within, least / 2), max(kept, least / 2)
+
+
+def _covariance(
+    best: _Refined, corners: Corners, used: NDArray[np.bool_], noise: float, kept: float
+) -> tuple[Array, Array, Array]:
+    """The corners' own covariance (6, 6), and the pose's slopes by camera and by print."""
+    slope = best.slope[np.repeat(used, 2)]
+    by_pose = slope[:, :6]
+    inverse = np.linalg.inv(by_pose.T @ by_pose)
+    spread = noise * by_pose.T @ by_pose
+    _, place = np.unique(corners.corner[used], return_inverse=True)
+    each = by_pose.reshape(-1, 2, 6)
+    summed = np.zeros((place.max() + 1, 2, 6))
+    np.add.at(summed, place, each)
+    flat = summed.reshape(-1, 6)
+    spread = spread + kept * flat.T @ flat
+    turn = np.eye(6)
+    turn[:3, :3] = left_jacobian(best.pose[:3])
+    gain = turn @ inverse
+    printed = print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
+    own = gain @ spread @ gain.T
+    return np.asarray(own), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
+
+
+def _ratio(worse: float, better: float) -> float:
+    """Ratio of rms errors; infinite where the better pose leaves nothing."""
+    return float(np.sqrt(worse / better)) if better > 1e-12 * worse else float(np.inf)
+
+
+def _apart(a: _Refined, b: _Refined) -> bool:
+    """Whether two refined poses are different ones and not one found twice."""
+    import cv2
+
+    turn = cv2.Rodrigues(cv2.Rodrigues(a.pose[:3])[0] @ cv2.Rodrigues(b.pose[:3])[0].T)[0]
+    return float(np.linalg.norm(turn)) > 1e-3

@@ -1,0 +1,233 @@
+"""Where the camera stands in the rig's frame: from a card of markers that rides on the rig."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.geometry.board_pose import (
+    LEAST_SD_PX,
+    BoardPose,
+    Corners,
+    locate_board,
+    print_slopes,
+    project_pose,
+)
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
+from scissorcal.vision.targets.boards import PRINT_SCALE_SD
+
+Array = NDArray[np.float64]
+
+OPEN = 3.0
+"""Prior standard deviation, rad and m, of what nobody said about how the card is fixed."""
+
+UNTOLD = 0.1
+"""A direction of the camera's pose whose standard deviation exceeds this (rad or m) was not told
+by the motion."""
+
+STEP = 1e-6
+ROUNDS = 60
+
+
+@dataclass(frozen=True)
+class CardView:
+    """The card in one picture, with where the rig stood: ``advance_m`` and, for a card on a moving
+    blade, ``blade_angle_rad`` by which that blade had turned (zero for a card on the carriage)."""
+
+    corners: Corners
+    advance_m: float
+    blade_angle_rad: float
+
+
+@dataclass(frozen=True)
+class RigPose:
+    """``camera_rig`` is T_camera_rig, ``rig_card`` T_rig_card at no advance and blade angle zero.
+
+    The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
+    card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
+    +z. ``untold`` names what the motion left open, empty where all is known. ``by_camera`` (6, 9)
+    says how ``camera_rig`` moves with the camera's parameters.
+    """
+
+    camera_rig: Pose
+    rig_card: Pose
+    rms_px: float
+    untold: tuple[str, ...]
+    by_camera: Array
+
+    def holds(self, board: BoardPose, camera: Camera) -> Pose:
+        """T_rig_target of a target that the same camera sees, whose errors are in both poses."""
+        known = camera.covariance
+        shared = np.zeros((6, 6))
+        if known is not None:
+            shared = self.by_camera @ known @ board.by_camera.T
+        return between(self.camera_rig, board.pose, shared)
+
+
+def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> RigPose:
+    """Find the rig's frame from pictures of a card that moves in a known way.
+
+    T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
+    squares on all corners, both poses unknown at once. Advances tell the x axis, turns tell the
+    pivot's axis and place; with one of them only, part of the frame stays open and is named.
+    The covariance holds what is unknown of the camera and of the card's print.
+    ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
+    be located at all, or where fewer than two different stances were seen.
+    """
+    stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
+    if len(stances) < 2:
+        raise ValueError(
+            "the rig stood in one place in all pictures; move it between pictures: several "
+            "advances, and several openings"
+        )
+    located = [locate_board(view.corners, camera) for view in views]
+    start = _start(views, tuple(found.pose for found in located), middle_m)
+    used = tuple(found.used for found in located)
+    point, square, normal, slopes = _search(views, camera, middle_m, used, start)
+    count = 2 * sum(int(np.sum(mask)) for mask in used)
+    noise = max(square / max(count - len(point), 1), LEAST_SD_PX**2)
+    prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
+    inverse = np.linalg.inv(normal / noise + prior)
+    spread = normal / noise
+    alike = np.zeros((11, 11))
+    alike[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
+    if camera.covariance is not None:
+        alike[:9, :9] = camera.covariance
+    drawn = slopes / noise
+    spread = spread + drawn @ alike @ drawn.T
+    turn = np.eye(len(point))
+    turn[:3, :3] = left_jacobian(point[:3])
+    covariance = turn @ inverse @ (spread + prior) @ inverse @ turn.T
+    deviation = np.sqrt(np.diag(covariance)[:6])
+    untold = tuple(name for name, sd in zip(_DIRECTIONS, deviation, strict=True) if not sd < UNTOLD)
+    rig, card = _poses(point, middle_m)
+    return RigPose(
+        Pose(rig.quaternion, rig.translation_m, covariance[:6, :6]),
+        card,
+        float(np.sqrt(2.0 * square / count)),
+        untold,
+        -(turn @ inverse @ drawn)[:6, :9],
+    )
+
+
+_DIRECTIONS = (
+    "tilt about the camera's x axis",
+    "tilt about the camera's y axis",
+    "turn about the camera's z axis",
+    "place along the camera's x axis",
+    "place along the camera's y axis",
+    "distance from the camera",
+)
+
+
+def _poses(point: Array, middle_m: Array) -> tuple[Pose, Pose]:
+    """T_camera_rig and T_rig_card of parameters (11,); the card's middle has z = 0 in the rig."""
+    rig = Pose.from_rotation_vector(point[:3], point[3:6])
+    turned = Pose.from_rotation_vector(point[6:9], np.zeros(3))
+    place = np.append(point[9:11], 0.0) - turned.apply([middle_m])[0]
+    return rig, Pose(turned.quaternion, (float(place[0]), float(place[1]), float(place[2])))
+
+
+def _motion(view: CardView) -> Pose:
+    return Pose.from_rotation_vector([0.0, 0.0, view.blade_angle_rad], [view.advance_m, 0.0, 0.0])
+
+
+def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array) -> Array:
+    """Axes from the pictures' own poses: advances give x, turns give z and the pivot's place."""
+    first = views[0]
+    shifts, turns, places = [], [], []
+    for view, pose in zip(views[1:], seen[1:], strict=True):
+        moved = view.advance_m - first.advance_m
+        turned = view.blade_angle_rad - first.blade_angle_rad
+        relative = Pose.from_matrix(pose.matrix @ seen[0].matrix.T, (0.0, 0.0, 0.0))
+        if abs(turned) > 1e-3:
+            turns.append(relative.rotation_vector * np.sign(turned))
+        if abs(turned) <= 1e-3 and abs(moved) > 1e-6:
+            shift = pose.apply([middle_m])[0] - seen[0].apply([middle_m])[0]
+            shifts.append(shift * np.sign(moved))
+    z = _unit(np.sum(turns, axis=0)) if turns else _unit(seen[0].matrix[:, 2])
+    x = np.sum(shifts, axis=0) if shifts else seen[0].matrix[:, 0]
+    x = _unit(x - z * (x @ z))
+    axes = np.stack([x, np.cross(z, x), z], axis=1)
+    rows, wanted = [], []
+    for view, pose in zip(views, seen, strict=True):
+        # middle_i = origin + x advance_i + R(angle_i) (middle_0 in the rig): linear in both places
+        angle = view.blade_angle_rad
+        turn = axes @ Pose.from_rotation_vector([0.0, 0.0, angle], np.zeros(3)).matrix
+        rows.append(np.concatenate([np.eye(3), turn[:, :2]], axis=1))
+        wanted.append(pose.apply([middle_m])[0] - x * view.advance_m)
+    places = np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=1e-6)[0]
+    rig = Pose.from_matrix(axes, places[:3])
+    turn0 = _motion(first).matrix.T @ axes.T @ seen[0].matrix
+    card = Pose.from_matrix(turn0, np.zeros(3))
+    return np.concatenate([rig.rotation_vector, places[:3], card.rotation_vector, places[3:5]])
+
+
+def _unit(vector: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    if length == 0.0:
+        raise ValueError("the card did not move although the rig did; is it fixed to it?")
+    return np.asarray(vector / length)
+
+
+def _search(
+    views: tuple[CardView, ...],
+    camera: Camera,
+    middle_m: Array,
+    used: tuple[NDArray[np.bool_], ...],
+    start: Array,
+) -> tuple[Array, float, Array, Array]:
+    """Levenberg-Marquardt: point, sum of squares, normal matrix (11, 11), slopes (11, 11) by
+    what all pictures share: the camera's parameters and the print's scales."""
+    point, damping = start, 1e-3
+    square, pull, normal, slopes = _sums(point, views, camera, middle_m, used)
+    for _ in range(ROUNDS):
+        damped = normal + damping * np.diag(np.diag(normal)) + 1e-9 * np.eye(len(point))
+        tried = point + np.linalg.solve(damped, pull)
+        reached = _sums(tried, views, camera, middle_m, used)
+        if reached[0] <= square:
+            settled = square - reached[0] <= 1e-12 * square
+            point, (square, pull, normal, slopes) = tried, reached
+            damping = max(0.1 * damping, 1e-12)
+            if settled:
+                break
+        else:
+            damping *= 10.0
+            if damping > 1e8:
+                break
+    return point, square, normal, slopes
+
+
+def _sums(
+    point: Array,
+    views: tuple[CardView, ...],
+    camera: Camera,
+    middle_m: Array,
+    used: tuple[NDArray[np.bool_], ...],
+) -> tuple[float, Array, Array, Array]:
+    square, size = 0.0, len(point)
+    pull, normal, slopes = np.zeros(size), np.zeros((size, size)), np.zeros((size, 11))
+    for view, mask in zip(views, used, strict=True):
+
+        def seen(p: Array, view: CardView = view) -> Array:
+            rig, card = _poses(p, middle_m)
+            return _vector(rig.after(_motion(view)).after(card))
+
+        stand = seen(point)
+        away, slope = project_pose(stand, view.corners, camera)
+        alike = np.hstack([slope[:, 6:15], print_slopes(stand, slope, view.corners)])
+        both = np.repeat(mask, 2)
+        chain = np.stack(
+            [(seen(point + e) - seen(point - e)) / (2 * STEP) for e in STEP * np.eye(size)], axis=1
+        )
+        by_point, left = slope[both, :6] @ chain, away.ravel()[both]
+        square += float(left @ left)
+        pull += by_point.T @ left
+        normal += by_point.T @ by_point
+        slopes += by_point.T @ alike[both]
+    return square, pull, normal, slopes
+
+
+def _vector(pose: Pose) -> Array:
+    return np.concatenate([pose.rotation_vector, pose.translation_m])

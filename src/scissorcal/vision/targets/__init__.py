@@ -1,0 +1,1 @@
+"""Printed targets: their layout, their sheets, and their corners in photographs."""

@@ -1,0 +1,57 @@
+"""A board in words, as it is given on the command line."""
+
+import re
+
+from scissorcal.errors import InputError
+from scissorcal.vision.targets.boards import CAMERA_BOARD, CharucoBoard, Chessboard
+
+FORMS = (
+    "chessboard:COLUMNSxROWS:SQUARE_MM (inner corners) or "
+    "charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares)"
+)
+
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_CHESSBOARD = re.compile(rf"chessboard:(\d+)x(\d+):{_NUMBER}")
+_CHARUCO = re.compile(rf"charuco:(\d+)x(\d+):{_NUMBER}:{_NUMBER}:(\w+)")
+
+
+def board_from_words(words: str) -> CharucoBoard | Chessboard:
+    """Read "camera" (the printed board) or one of `FORMS`. Raises InputError.
+
+    >>> board_from_words("chessboard:9x6:25")
+    Chessboard(name='chessboard 9x6', columns=9, rows=6, square_m=0.025, kind='chessboard')
+    >>> board_from_words("charuco:5x7:40:20:DICT_6X6_250").ids[-1]
+    16
+    """
+    if words == "camera":
+        return CAMERA_BOARD
+    if found := _CHESSBOARD.fullmatch(words):
+        columns, rows = int(found[1]), int(found[2])
+        if min(columns, rows) >= 3 and float(found[3]) > 0.0:
+            name = f"chessboard {columns}x{rows}"
+            return Chessboard(name, columns, rows, 1e-3 * float(found[3]))
+    elif found := _CHARUCO.fullmatch(words):
+        columns, rows, square, marker = (
+            int(found[1]),
+            int(found[2]),
+            float(found[3]),
+            float(found[4]),
+        )
+        if min(columns, rows) >= 3 and 0.0 < marker < square:
+            return _charuco(columns, rows, 1e-3 * square, 1e-3 * marker, found[5])
+    raise InputError(f"{words!r} is no board: give {FORMS}, as in chessboard:9x6:25.")
+
+
+def _charuco(columns: int, rows: int, square_m: float, marker_m: float, name: str) -> CharucoBoard:
+    import cv2
+
+    dictionaries = [key for key in dir(cv2.aruco) if key.startswith("DICT_")]
+    if name not in dictionaries:
+        raise InputError(f"{name} is no dictionary of markers: give one of {dictionaries}.")
+    board = CharucoBoard(
+        f"ChArUco {columns}x{rows}", columns, rows, square_m, marker_m, dictionary=name
+    )
+    held = len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)).bytesList)
+    if len(board.ids) > held:
+        raise InputError(f"{name} has {held} markers, and the board needs {len(board.ids)}.")
+    return board

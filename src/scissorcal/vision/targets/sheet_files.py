@@ -1,0 +1,89 @@
+"""Write a target's sheet as PDF (vectors) and PNG (20 pixels per millimetre)."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError
+from scissorcal.vision.targets.sheet import Sheet
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+PIXELS_PER_MM = 20
+_POINTS_PER_MM = 72.0 / 25.4
+
+
+def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
+    """Write target-<name>-<paper>.pdf and .png into ``folder``; both at true scale.
+
+    The same sheet gives the same bytes every time. Raises InputError where the folder cannot be
+    written.
+    """
+    stem = f"target-{sheet.name}-{sheet.paper}"
+    contents = {folder / f"{stem}.pdf": sheet_pdf(sheet), folder / f"{stem}.png": sheet_png(sheet)}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, content in contents.items():
+            part = path.with_name(path.name + ".part")
+            part.write_bytes(content)
+            part.replace(path)
+    except OSError as error:
+        raise InputError(f"{folder} cannot take the targets: {error.strerror}.") from None
+    pdf, png = contents
+    return pdf, png
+
+
+def sheet_pdf(sheet: Sheet) -> bytes:
+    """Give a sheet as a PDF of one page."""
+    from reportlab.pdfgen.canvas import Canvas
+
+    stream = io.BytesIO()
+    points = _POINTS_PER_MM
+    page = Canvas(stream, pagesize=(sheet.width * points, sheet.height * points), invariant=1)
+    page.setTitle(f"scissorcal target: {sheet.name} ({sheet.paper})")
+    page.setViewerPreference("PrintScaling", "None")
+    # One path for each shade: neighbours in one path have no seam between them.
+    for level in sorted({shape.level for shape in sheet.rectangles}):
+        path = page.beginPath()
+        for shape in sheet.rectangles:
+            if shape.level == level:
+                low = sheet.height - shape.y - shape.height
+                path.rect(
+                    shape.x * points, low * points, shape.width * points, shape.height * points
+                )
+        page.setFillGray(level)
+        page.drawPath(path, stroke=0, fill=1)
+    page.setFillGray(0.0)
+    for words in sheet.words:
+        page.setFont("Helvetica", words.size * points)
+        page.drawString(words.x * points, (sheet.height - words.y) * points, words.text)
+    page.showPage()
+    page.save()
+    return stream.getvalue()
+
+
+def sheet_png(sheet: Sheet) -> bytes:
+    """Give a sheet as a grey PNG whose resolution is stated in it."""
+    stream = io.BytesIO()
+    inch = PIXELS_PER_MM * 25.4
+    sheet_picture(sheet).save(stream, format="PNG", dpi=(inch, inch), compress_level=6)
+    return stream.getvalue()
+
+
+def sheet_picture(sheet: Sheet) -> "Image.Image":
+    """Draw a sheet at `PIXELS_PER_MM`."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    scale = PIXELS_PER_MM
+    picture = Image.new("L", (round(sheet.width * scale), round(sheet.height * scale)), 255)
+    draw = ImageDraw.Draw(picture)
+    for shape in sheet.rectangles:
+        left, top = round(shape.x * scale), round(shape.y * scale)
+        right = round((shape.x + shape.width) * scale) - 1
+        low = round((shape.y + shape.height) * scale) - 1
+        draw.rectangle((left, top, right, low), fill=round(255 * shape.level))
+    for words in sheet.words:
+        font = ImageFont.load_default(words.size * scale)
+        draw.text((words.x * scale, words.y * scale), words.text, fill=0, font=font, anchor="ls")
+    return picture

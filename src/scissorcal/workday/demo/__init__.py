@@ -1,0 +1,1 @@
+"""The demo's day on a virtual rig, and its rendered photographs."""

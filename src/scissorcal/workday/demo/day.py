@@ -1,0 +1,279 @@
+"""The whole day on a virtual rig in virtual time, ending in truth against estimate."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.recipe.load import read_text
+from scissorcal.verdicts import Verdict
+from scissorcal.workday.demo.photographs import (
+    JudgedGeometry,
+    fit_photographs,
+    judge_photographs,
+    photograph,
+)
+from scissorcal.workday.pool import open_pool
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.package import build_workspace_package
+from scissorcal.workday.runs.report import write_workspace_report
+from scissorcal.workday.workspace import Workspace, create_workspace
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from scissorcal.calibration import FitResult, FittedParameter
+    from scissorcal.calibration.result import Effort
+    from scissorcal.device.lockstep import LockstepLink
+    from scissorcal.device.sim.specimen import Specimen
+    from scissorcal.package import ModelPackage
+    from scissorcal.recipe.schema import Recipe
+    from scissorcal.render import RenderResult
+
+Progress = Callable[[float, str], None]
+
+RENDER_S = 30.0
+STROKE_RATES = 3
+PRESS_CONTACTS = 3
+OPENING_BINS = 25
+BIN_PLACES = 8
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One estimate beside the truth. ``truth`` is None where the chosen law has no such thing."""
+
+    parameter: "FittedParameter"
+    truth: float | None
+    inside: bool | None
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """What a demo ends in: estimates beside the truth, the torque's error, what was rendered.
+
+    ``torque_error`` is the rms of rendered minus true average torque over closing strokes that
+    cover the scene, relative to the rms of the true one.
+    """
+
+    workspace: Path
+    specimen: str
+    judged: tuple[Judged, ...]
+    geometry: tuple[JudgedGeometry, ...]
+    torque_error: float
+    rungs: tuple[str, ...]
+    rendering: "RenderResult"
+    verdicts: tuple[Verdict, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def share_inside(self) -> float:
+        """Share of the 90 % intervals that hold the truth, photographs' among them."""
+        known = [row.inside for row in self.judged if row.inside is not None]
+        known += [row.inside for row in self.geometry]
+        return sum(known) / len(known)
+
+
+def run_demo(
+    folder: Path,
+    *,
+    recipe_name: str = "paper-photographed",
+    seed: int = 0,
+    effort: "Effort | None" = None,
+    progress: Progress | None = None,
+) -> DemoResult:
+    """Capture, fit, report, package and render on a virtual rig, and judge it by the truth.
+
+    Makes a workspace in ``folder``. The specimen is drawn anew for each ``seed`` around the
+    recipe's own, so that nothing of it can be known beforehand; the fits see recordings only.
+    Time is virtual: equal seeds give equal numbers on every machine. Where two cores are free a
+    second process captures, so a script that calls this needs the usual guard on ``__main__``.
+    Raises InputError where the recipe has no specimen or the folder is a workspace already.
+    """
+    from scissorcal.device.lockstep import LockstepLink
+
+    tell = progress or (lambda done, sentence: None)
+    workspace = create_workspace(folder, recipe_name)
+    recipe = workspace.recipe()
+    specimen, streams = _drawn(recipe, seed)
+    with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
+        tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
+        captured = pool.executor.submit(_capture, workspace.root, seed)
+        photograph(workspace, recipe, seed, _part(tell, 0.05, 0.25))
+        geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.25, 0.4))
+        tell(0.4, "waiting for the captures")
+        try:
+            captured.result()
+        except BrokenProcessPool as error:
+            raise ScissorcalError(
+                "The process that captured was killed, most likely for want of memory: free some, "
+                f"remove {folder} and run the demo again."
+            ) from error
+    outcomes = fit_workspace(workspace, effort=effort, seed=seed, progress=_part(tell, 0.4, 0.85))
+    tell(0.85, "building the package")
+    built = build_workspace_package(workspace, seed=seed)
+    tell(0.88, "writing the report")
+    reported = write_workspace_report(workspace)
+    tell(0.92, "rendering")
+    package, rendering, recording = _render(workspace, recipe, LockstepLink(specimen, streams[1]))
+    tell(0.98, "judging")
+    fits = [outcome.result for outcome in outcomes]
+    verdicts = [verdict for found in geometry for verdict in found.verdicts]
+    verdicts += [verdict for fit in fits for verdict in fit.verdicts]
+    files = [found.path for found in geometry] + [outcome.path for outcome in outcomes]
+    return DemoResult(
+        workspace=workspace.root,
+        specimen=specimen.name,
+        judged=tuple(row for fit in fits for row in judge(fit, specimen)),
+        geometry=judge_photographs(workspace, recipe, specimen, seed),
+        torque_error=torque_error(package, specimen, recipe),
+        rungs=tuple(f"{fit.what}: {fit.rung}" for fit in fits),
+        rendering=rendering,
+        verdicts=(*verdicts, *built.verdicts, *rendering.verdicts),
+        files=(*files, built.path, reported.html, reported.json, recording),
+    )
+
+
+def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
+    """Put each parameter of a fit beside the specimen's truth.
+
+    The truth is expressed in the fit's own terms: friction expanded at its centre; the force at
+    its reference indentation; an offset that an asymmetric law cannot hold, in its Coulomb
+    levels; the mean fracture energy where a smooth law was fitted to a ripple. A response of
+    another family than the truth's has a true force at the reference, but no true exponent.
+    """
+    truth = _truth_for(fit, specimen)
+    rows = []
+    for parameter in fit.parameters:
+        value = truth.get(parameter.name)
+        inside = None if value is None else parameter.q05 <= value <= parameter.q95
+        rows.append(Judged(parameter, value, inside))
+    return tuple(rows)
+
+
+def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe") -> float:
+    """Relative rms of rendered against true average torque over the scene.
+
+    The kernel closes the blades over the scene's openings at three of its rates, step by step as
+    the loop does: on a sheet whose near edge stands at the scene's nearest contact, through which
+    a cut then runs; or, where nothing is cut and so the contact stays, at three contacts of the
+    scene. Rendered and true average torque are both averaged over 25 ranges of opening, which
+    takes the ripple out. Ranges where the true torque exceeds the recipe's limit do not count: no
+    model is rendered there, but the limit. Raises InputError where that leaves no place.
+    """
+    import numpy as np
+
+    from scissorcal.device.sim.truth import average_torque
+
+    low, high = recipe.scene.opening_rad
+    slow, fast = recipe.scene.opening_rate_rad_per_s
+    nearest, farthest = recipe.scene.contact_m
+    contacts = [nearest]
+    if not recipe.scene.cut:
+        contacts = np.linspace(nearest, farthest, PRESS_CONTACTS).tolist()
+    edges = np.linspace(high, low, OPENING_BINS * BIN_PLACES + 1)
+    places = (0.5 * (edges[1:] + edges[:-1])).reshape(OPENING_BINS, BIN_PLACES)
+    rendered, true = [], []
+    for rate in np.geomspace(2.0 * slow, 0.9 * fast, STROKE_RATES):
+        count = int((high - low) / rate * recipe.scene.loop_rate_Hz)
+        opening, rates = np.linspace(high, low, count), np.full(count, -rate)
+        whole = (np.arange(count) * OPENING_BINS) // count
+        for contact in contacts:
+            stepped = package.kernel().step_many(opening, rates, np.full(count, -contact))
+            rendered.append(np.bincount(whole, stepped["torque"]) / np.bincount(whole))
+            friction = recipe.scene.render_friction
+            true.append(average_torque(specimen, places, -rate, contact, friction))
+    within = np.concatenate(true)
+    size = within.mean(axis=1)
+    counts = np.abs(within).max(axis=1) <= recipe.limits.torque_Nm
+    if not counts.any():
+        raise InputError(
+            f"{recipe.name}: the torque exceeds limits.torque_Nm = {recipe.limits.torque_Nm:g} all "
+            "over the scene, so there is nothing to compare: raise the limit, or render a scene "
+            "that stays within it."
+        )
+    difference = (np.concatenate(rendered) - size)[counts]
+    return float(np.sqrt(np.mean(difference**2) / np.mean(size[counts] ** 2)))
+
+
+def _drawn(recipe: "Recipe", seed: int) -> tuple["Specimen", list["np.random.Generator"]]:
+    """The specimen of a seed, and streams of noise for its captures and for rendering."""
+    import numpy as np
+
+    from scissorcal.device.sim.specimen import load_specimen
+    from scissorcal.device.sim.truth import varied
+
+    rng = np.random.default_rng(seed)
+    specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
+    return specimen, rng.spawn(2)
+
+
+def _capture(root: Path, seed: int) -> None:
+    """Capture friction and cuts of a seed's specimen; another process may do it."""
+    from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+    from scissorcal.device.lockstep import LockstepLink
+
+    workspace = Workspace(root)
+    recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
+    specimen, streams = _drawn(recipe, seed)
+    link = LockstepLink(specimen, streams[0])
+    with open_writer(workspace.new_recording("friction"), "friction", link, recipe, text) as writer:
+        capture_friction(link, recipe, writer)
+    with open_writer(workspace.new_recording("cut"), "cut", link, recipe, text) as writer:
+        capture_cut(link, recipe, writer)
+    link.close()
+
+
+def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
+    from scissorcal.device.sim.truth import true_parameters
+
+    if fit.what == "friction":
+        center = fit.structure["angle_center"]
+        sides = true_parameters(specimen, angle_center=center)
+        if not fit.structure["symmetric"]:
+            sides["coulomb_pos"] += sides["offset"]
+            sides["coulomb_neg"] -= sides["offset"]
+            return sides
+        truth = true_parameters(specimen, angle_center=center, symmetric=True)
+        truth["offset"] += 0.5 * (sides["coulomb_pos"] - sides["coulomb_neg"])
+        return truth
+    truth = true_parameters(
+        specimen, reference_indentation_m=fit.structure["reference_indentation_m"]
+    )
+    if fit.structure["response"] != specimen.material.response:
+        del truth["response_exponent"]
+    if fit.structure["fracture"] == "smooth" and "kappa" in truth:
+        truth["fracture_energy"] *= _mean_share(truth)
+    return truth
+
+
+def _mean_share(truth: dict[str, float]) -> float:
+    """Mean over a ripple of a power response, as a share of its peak.
+
+    With g = g_c u^n, u even between kappa^(1/n) and 1: (1 - kappa^(1 + 1/n)) / ((n + 1) (1 - u_0)).
+    """
+    exponent, kappa = truth["response_exponent"], truth["kappa"]
+    lowest = float(kappa ** (1.0 / exponent))
+    if lowest >= 1.0:
+        return 1.0
+    return float((1.0 - lowest ** (exponent + 1.0)) / ((exponent + 1.0) * (1.0 - lowest)))
+
+
+def _render(
+    workspace: Workspace, recipe: "Recipe", link: "LockstepLink"
+) -> "tuple[ModelPackage, RenderResult, Path]":
+    from scissorcal.package import open_package
+    from scissorcal.render import open_writer, render
+
+    package = open_package(workspace.package_path(recipe))
+    path = workspace.new_recording("render")
+    with open_writer(path, link, package, read_text(workspace.recipe_path)) as writer:
+        result = render(link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer)
+    return package, result, path
+
+
+def _part(tell: Progress, low: float, high: float) -> Progress:
+    return lambda done, sentence: tell(low + (high - low) * done, sentence)

@@ -1,0 +1,162 @@
+"""The demo's photographs: rendered, taken in and fitted as a lab's own would be, then judged."""
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.recipe.requirements import GeometryKind, requirements
+from scissorcal.workday.geometry import GeometryFit, fit_geometry
+from scissorcal.workday.photographs import BladeSetup
+from scissorcal.workday.runs.blade import blade_path, capture_blade
+from scissorcal.workday.runs.camera import capture_camera
+from scissorcal.workday.runs.plate import capture_plate, require_plate
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.device.sim.specimen import Specimen
+    from scissorcal.recipe.schema import Recipe
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class JudgedGeometry:
+    """One number from photographs beside the truth, with its standard deviation.
+
+    ``inside`` says whether the truth lies in the 90 % interval.
+    """
+
+    name: str
+    unit: str
+    truth: float
+    estimate: float
+    sd: float
+
+    @property
+    def inside(self) -> bool:
+        return abs(self.estimate - self.truth) <= 1.6449 * self.sd
+
+
+def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress) -> None:
+    """Render the photographs that the scene requires, and take them in.
+
+    They show the specimen's own blade, and targets at places that only the renderer knows.
+    """
+    from scissorcal.vision.targets.boards import CAMERA_BOARD
+    from scissorcal.workday.demo.sim_photographs import (
+        render_blade_photographs,
+        render_board_photographs,
+    )
+    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
+
+    wanted = [item.name for item in requirements(recipe).photographs]
+    for index, what in enumerate(wanted):
+        share = index / len(wanted)
+
+        def tell(sentence: str, share: float = share) -> None:
+            progress(share, sentence.splitlines()[0])
+
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            if what == "camera":
+                made = render_board_photographs(CAMERA_BOARD, folder, seed, "board")
+                capture_camera(workspace, made, CAMERA_BOARD, tell)
+            elif what == "blade":
+                made = render_blade_photographs(recipe, folder, seed)
+                capture_blade(workspace, made, BladeSetup(), tell)
+            else:
+                made = render_plate_photographs(recipe, folder, seed)
+                capture_plate(workspace, made, tell)
+                card = render_card_photographs(recipe, folder, seed)
+                stances = {path.name: stance for path, stance in card.items()}
+                capture_plate(workspace, list(card), tell, stances=stances)
+
+
+def fit_photographs(
+    workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress
+) -> tuple[GeometryFit, ...]:
+    """Fit what the scene requires of its photographs, in order."""
+    needs = requirements(recipe)
+    fits: list[GeometryFit] = []
+    kinds: tuple[GeometryKind, ...] = ("camera", "blade", "plate")
+    for what in kinds:
+        if needs.needs_geometry(what):
+            progress(len(fits) / len(needs.geometry), f"fitting the {what}")
+            fits.append(fit_geometry(workspace, what, seed=seed))
+    return tuple(fits)
+
+
+def judge_photographs(
+    workspace: Workspace, recipe: "Recipe", specimen: "Specimen", seed: int
+) -> tuple[JudgedGeometry, ...]:
+    """Put the edge's height and slope and the plate's place beside what was rendered.
+
+    The edge is judged where it is used: its offset and taper at a quarter, half and three
+    quarters of the blade.
+    """
+    rows: list[JudgedGeometry] = []
+    if requirements(recipe).needs_geometry("blade"):
+        rows += _judge_edge(workspace, specimen)
+    if requirements(recipe).needs_geometry("plate"):
+        rows += _judge_plate(workspace, recipe, seed)
+    return tuple(rows)
+
+
+def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeometry]:
+    import numpy as np
+
+    from scissorcal.calibration.edge.store import load_blade
+
+    fit = load_blade(blade_path(workspace)).blades[0]
+    edges = fit.belief.with_values(fit.draws)
+    blade, length = specimen.blade, fit.belief.edge.length_m
+    rows = []
+    for share in (0.25, 0.5, 0.75):
+        s = share * length
+        offset = np.asarray(edges.offset_at(np.array([s]))).ravel() * 1e3
+        taper = np.degrees(np.arctan(np.asarray(edges.slope_at(np.array([s]))).ravel()))
+        slope = np.tan(np.radians(blade.taper_deg)) + blade.curvature_per_m * s
+        true = blade.offset_mm + 1e3 * s * (
+            np.tan(np.radians(blade.taper_deg)) + 0.5 * blade.curvature_per_m * s
+        )
+        place = f"at {1e3 * s:.0f} mm"
+        rows += [
+            _row(f"edge offset {place}", "mm", float(true), offset.mean(), offset.std()),
+            _row(
+                f"edge taper {place}",
+                "deg",
+                float(np.degrees(np.arctan(slope))),
+                taper.mean(),
+                taper.std(),
+            ),
+        ]
+    return rows
+
+
+def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[JudgedGeometry]:
+    import numpy as np
+
+    from scissorcal.vision.geometry.pose import Pose, difference
+    from scissorcal.workday.demo.sim_plate import sim_plate_scene
+
+    fit, rendered = require_plate(workspace), sim_plate_scene(recipe, seed).rig_plate
+    truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)
+    if fit.rig_plate is None or fit.rig_plate.covariance is None:
+        return []
+    away = difference(fit.rig_plate, truth)
+    sd = np.sqrt(np.diag(fit.rig_plate.covariance))
+    rows = []
+    for index, axis in enumerate("xyz"):
+        place = 1e3 * truth.translation_m[index]
+        off = 1e3 * away[3 + index]
+        rows.append(_row(f"plate {axis}", "mm", place, place + off, 1e3 * sd[3 + index]))
+    for index, axis in enumerate("xyz"):
+        off = np.degrees(away[index])
+        rows.append(_row(f"plate turn {axis}", "deg", 0.0, off, np.degrees(sd[index])))
+    return rows
+
+
+def _row(name: str, unit: str, truth: float, estimate: float, sd: float) -> JudgedGeometry:
+    return JudgedGeometry(name, unit, float(truth), float(estimate), float(sd))

@@ -1,0 +1,1 @@
+"""One function a step of the day: capture, fit, verify, report, sign, package, render."""

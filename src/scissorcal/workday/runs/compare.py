@@ -1,0 +1,88 @@
+"""Compare two runs: workspaces, reports' JSON twins, or fits."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import scissorcal
+from scissorcal.errors import InputError, MissingError
+from scissorcal.workday.runs.fit import current_fits
+from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
+
+if TYPE_CHECKING:
+    from scissorcal.report import Comparison, Side
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison and its two files."""
+
+    comparison: "Comparison"
+    html: Path
+    json: Path
+
+
+def compare_runs(
+    first: Path, second: Path, folder: Path, *, now: datetime | None = None
+) -> Compared:
+    """Write comparison.html and comparison.json into ``folder``.
+
+    Each side is a workspace, a report.json, or a fit (.nc). Raises MissingError where there is
+    nothing, InputError where a file is none of these or the two cannot be compared.
+    """
+    from scissorcal.report import compare, write_comparison
+
+    sides = [load_side(path) for path in (first, second)]
+    found = compare(*sides, created=now or datetime.now(UTC), version=scissorcal.__version__)
+    files = write_comparison(found, sides[0], sides[1], folder)
+    return Compared(found, files.html, files.json)
+
+
+def load_side(path: Path) -> "Side":
+    """Read one side of a comparison from wherever it lies."""
+    from scissorcal.report import read_twin, side_of
+
+    if path.is_dir():
+        if not (path / RECIPE_FILE).is_file():
+            raise MissingError(
+                f"{path} has no {RECIPE_FILE}, so it is no workspace: name a workspace, a "
+                "report.json or a fit (.nc)."
+            )
+        source = str(path) if path.name not in ("", "..") else path.resolve().name
+        return _side_of_workspace(Workspace(path.absolute()), source)
+    if not path.is_file():
+        raise MissingError(
+            f"{path} does not exist: name a workspace, a report.json or a fit (.nc)."
+        )
+    if path.suffix == ".nc":
+        return _side_of_fit(path)
+    try:
+        return side_of(read_twin(path.read_bytes()), str(path))
+    except (OSError, ValueError) as error:
+        first = str(error).splitlines()[0]
+        raise InputError(
+            f"{path} is not a report of this version of scissorcal ({first}): run 'scissorcal "
+            "report' again, or name a workspace or a fit (.nc)."
+        ) from error
+
+
+def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
+    from scissorcal.report import facts_of, side_of
+
+    recipe = workspace.recipe()
+    fits = current_fits(workspace, recipe, partial=True)
+    return side_of(facts_of(recipe, list(fits.values())), source)
+
+
+def _side_of_fit(path: Path) -> "Side":
+    """A fit alone: what it is of, its workspace says if it lies in one."""
+    from scissorcal.calibration import load_fit
+    from scissorcal.report import side_of_fit
+
+    fit = load_fit(path)
+    try:
+        recipe = find_workspace(path.parent).recipe()
+    except MissingError:
+        recipe = None
+    return side_of_fit(fit, str(path), recipe)

@@ -1,0 +1,204 @@
+"""What a workspace's friction fit predicts of a motion, with a band, as table and plot."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from scissorcal.errors import InputError
+from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.runs.fit import current_fits
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.friction.predict import Band, Prediction
+    from scissorcal.recording import Joint, Recording
+
+Progress = Callable[[float, str], None]
+What = Literal["friction", "load"]
+
+CHANNELS = ("opening", "motor_torque", "handle_force", "torque_command", "force_command")
+TABLES = (".csv", ".parquet")
+PLOTS = (".svg", ".png")
+MOST_POINTS = 4000
+
+
+@dataclass(frozen=True)
+class PredictionOutcome:
+    """A prediction, its band, the law that made it, the effort's unit and what was written."""
+
+    prediction: "Prediction"
+    band: "Band"
+    rung: str
+    effort_unit: str
+    position_unit: str
+    files: tuple[Path, ...]
+
+
+def predict_workspace(
+    workspace: Workspace,
+    what: What,
+    motion: Path,
+    *,
+    level: float = 0.9,
+    table: Path | None = None,
+    plot: Path | None = None,
+    progress: Progress | None = None,
+) -> PredictionOutcome:
+    """Predict the effort of empty motion, or the load at a tool's far end, for one file.
+
+    ``motion`` is a recording, or a table as ``export`` writes it (``time_s`` and ``opening_rad``,
+    or ``opening_m``; for a load ``motor_torque_Nm`` too). The band is calibrated on the
+    workspace's own friction recordings. ``table`` (.csv) and ``plot`` (.svg, .png) are written
+    where named. Raises MissingError where the fit is missing or stale, InputError for files that
+    are no motion.
+    """
+    from scissorcal.calibration import friction_experiment
+    from scissorcal.calibration.friction.predict import (
+        effort_band,
+        load_band,
+        predict_effort,
+        predict_far_load,
+    )
+
+    tell = progress or (lambda done, sentence: None)
+    _refuse_endings(table, plot)
+    recipe = workspace.recipe()
+    fit = current_fits(workspace, recipe, wanted=("friction",))["friction"]
+    settings = recipe.fit.friction
+    tell(0.0, "prediction: reading recordings")
+    own = usable_recordings(workspace, recipe, "friction").recordings
+    given = read_motion(motion, own[0].joint, own[0].handle_radius_m)
+    tell(0.2, "prediction: calibrating the band on what the fit had not seen")
+    design = friction_experiment(own, settings, fit)
+    if what == "load":
+        band = load_band(design, fit, own, settings.cutoff_Hz, level)
+        tell(0.8, "prediction: solving for the load")
+        found = predict_far_load(fit, band, (given,), settings.cutoff_Hz)
+    else:
+        band = effort_band(design, fit, level)
+        tell(0.8, "prediction: weighing the motion")
+        found = predict_effort(fit, band, (given,), settings.cutoff_Hz)
+    files = []
+    if table is not None:
+        _write_table(found, table, fit.position_unit, fit.effort_unit)
+        files.append(table)
+    if plot is not None:
+        _write_plot(found, band, plot, fit.effort_unit)
+        files.append(plot)
+    tell(1.0, "prediction: done")
+    return PredictionOutcome(
+        found, band, fit.rung, fit.effort_unit, fit.position_unit, tuple(files)
+    )
+
+
+def read_motion(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
+    """Read a recording, or a table of motion with units in its headings.
+
+    Raises InputError where columns are missing, or the joint is of another kind than ``joint``.
+    """
+    from scissorcal.recording import read_recording
+
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: name a recording (.mcap) or a table of motion.")
+    if path.suffix.lower() not in TABLES:
+        read = read_recording(path)
+    else:
+        read = _read_table(path, joint, handle_radius_m)
+    if read.joint.kind != joint.kind:
+        raise InputError(
+            f"{path} is of a {read.joint.kind} joint and the fit of a {joint.kind} one: name a "
+            "recording of the same rig."
+        )
+    return read
+
+
+def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
+    from scissorcal.recording import import_table
+    from scissorcal.recording.layout import column_name
+
+    headings = _headings(path)
+    opening = column_name("opening", joint)
+    missing = [name for name in ("time_s", opening) if name not in headings]
+    if missing:
+        raise InputError(
+            f"{path} has no column {' and none '.join(missing)}. A table of motion has time_s and "
+            f"{opening}, as 'scissorcal export' writes them; bring others in with 'scissorcal "
+            "import' and name the recording."
+        )
+    columns: dict[str, str | int] = {"time": "time_s"}
+    for channel in CHANNELS:
+        name = column_name(channel, joint)
+        usable = channel != "handle_force" or handle_radius_m > 0
+        if name in headings and usable:
+            columns[channel] = name
+    read = import_table(
+        path,
+        columns=columns,
+        joint=joint,
+        handle_radius_m=handle_radius_m if "handle_force" in columns else float("nan"),
+        motion_only=True,
+    )
+    return replace(read, source=str(path))
+
+
+def _headings(path: Path) -> list[str]:
+    if path.suffix.lower() == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            return list(pq.read_schema(path).names)
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"{path} cannot be read as Parquet ({error}).") from error
+    import csv
+
+    with path.open(encoding="utf-8", errors="replace", newline="") as file:
+        return [cell.strip() for cell in next(csv.reader(file), [])]
+
+
+def _refuse_endings(table: Path | None, plot: Path | None) -> None:
+    """Refuse before any work what could not be written after it."""
+    for path, endings in ((table, (".csv",)), (plot, PLOTS)):
+        if path is None:
+            continue
+        if path.suffix.lower() not in endings:
+            raise InputError(f"{path}: give the name the ending {' or '.join(endings)}.")
+        if not path.parent.is_dir():
+            raise InputError(f"{path.parent} is no folder. Make it first, or choose another.")
+
+
+def _write_table(found: "Prediction", path: Path, position: str, effort: str) -> None:
+    import csv
+
+    unit = effort.replace(" ", "")
+    head = ["time_s", f"opening_{position}", f"opening_rate_{position}_per_s", "moving"]
+    head += [f"{name}_{unit}" for name in ("measured", "predicted", "low", "high")]
+    arrays = (found.time_s, found.opening, found.rate, found.moving.astype(int))
+    numbers = (*arrays, found.measured, found.predicted, found.low, found.high)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(head)
+        for row in zip(*(array.tolist() for array in numbers), strict=True):
+            writer.writerow(["" if value != value else value for value in row])
+
+
+def _write_plot(found: "Prediction", band: "Band", path: Path, unit: str) -> None:
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    thin = slice(None, None, max(1, -(-len(found.time_s) // MOST_POINTS)))
+    time = found.time_s[thin]
+    told = np.isfinite(found.low)[thin]
+    predicted = np.where(told, found.predicted[thin], np.nan)
+    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    axes = figure.add_subplot()
+    low, high = np.where(told, found.low[thin], np.nan), np.where(told, found.high[thin], np.nan)
+    axes.fill_between(time, low, high, color="#56b4e9", alpha=0.4, lw=0, label=f"{band.level:.0%}")
+    if np.any(np.isfinite(found.measured)):
+        axes.plot(time, found.measured[thin], color="#333333", lw=0.7, label="measured")
+    axes.plot(time, predicted, color="#d55e00", lw=1.0, ls="--", label="predicted")
+    axes.set_xlabel("time / s")
+    axes.set_ylabel(f"effort / ({unit})")
+    axes.legend(loc="upper right", ncols=3, fontsize="small")
+    figure.savefig(path, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)

@@ -1,0 +1,223 @@
+"""The trust check of a workspace's fits: in parallel, resumable, kept beside the fit."""
+
+import hashlib
+import json
+import pickle
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.schema import Recipe
+from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.records import Record, RecordFile
+from scissorcal.workday.runs.fit import FIT_ORDER, current_fits, progress_share
+from scissorcal.workday.workspace import FitKind, Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.calibration import FitResult
+    from scissorcal.calibration.fit_model import Experiment
+    from scissorcal.calibration.verify import (
+        Check,
+        PriorKind,
+        Simulator,
+        Study,
+        Task,
+        VerifyResult,
+    )
+    from scissorcal.recording import Recording
+
+Progress = Callable[[float, str], None]
+
+ALGORITHM = 4
+"""Raised whenever a fit of the same inputs would give other numbers."""
+
+CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
+
+
+@dataclass(frozen=True)
+class VerifySettings:
+    """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
+
+    checks: "tuple[Check, ...]" = CHECKS
+    fits: int = 200
+    prior: "PriorKind" = "local"
+    spread: float = 3.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class VerifyOutcome:
+    """The check of one fit, its file, how many fits it took now, and what to say on the side."""
+
+    what: FitKind
+    result: "VerifyResult"
+    path: Path
+    fitted: int
+    notes: tuple[str, ...]
+
+
+def verify_workspace(
+    workspace: Workspace,
+    wanted: Sequence[FitKind] = (),
+    settings: VerifySettings | None = None,
+    *,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+) -> tuple[VerifyOutcome, ...]:
+    """Check the fits of a workspace, those in ``wanted`` or all that there are.
+
+    Every single fit is kept in fits/<what>.verify.partial.jsonl as soon as it is done, so that a
+    killed run goes on where it was, and one that asks for more fits takes those that are there.
+    Their random numbers depend on seed and index alone: the result is the same for any number of
+    ``workers`` and on a ``cluster``. The whole stands in fits/<what>.verify.json at the end.
+
+    Raises MissingError where a fit is missing or not of what is there now, InputError where the
+    cluster cannot be used or another run holds the file.
+    """
+    from scissorcal.calibration.verify import assess, make_study, save_verify, tasks_of
+
+    chosen = settings or VerifySettings()
+    recipe = workspace.recipe()
+    fits = current_fits(workspace, recipe, partial=True, wanted=wanted)
+    kinds = [kind for kind in FIT_ORDER if kind in fits and kind in (wanted or fits)]
+    outcomes = []
+    with open_pool(workers, cluster) as pool:
+        for index, kind in enumerate(kinds):
+            tell = progress_share(progress, index, len(kinds))
+            tell(0.0, f"{kind}: making ready")
+            experiment, simulator, sheets = _experiment(workspace, recipe, kind, fits)
+            study = make_study(
+                experiment,
+                fits[kind],
+                simulator,
+                seed=chosen.seed,
+                prior=chosen.prior,
+                spread=chosen.spread,
+                sheets=sheets,
+            )
+            tasks = tasks_of(study, chosen.checks, chosen.fits)
+            partial = workspace.verify_partial_path(kind)
+            with RecordFile(partial, _inputs_hash(fits[kind], chosen)) as file:
+                fitted = _run(pool, study, tasks, file, kind, tell)
+                wanted_tasks = {(task.kind, task.index) for task in tasks}
+                records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
+                result = assess(study, fits[kind], chosen.checks, records)
+                path = workspace.verify_path(kind)
+                save_verify(result, path)
+            notes = (file.note,) if file.note else ()
+            outcomes.append(VerifyOutcome(kind, result, path, fitted, notes))
+    return tuple(outcomes)
+
+
+def _experiment(
+    workspace: Workspace, recipe: Recipe, kind: FitKind, fits: "dict[FitKind, FitResult]"
+) -> "tuple[Experiment, Simulator, dict[int, int]]":
+    """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
+    from scissorcal.calibration.cut import cut_experiment
+    from scissorcal.calibration.friction.fit import friction_experiment
+    from scissorcal.calibration.verify import cut_simulator, friction_simulator
+    from scissorcal.workday.geometry import edge_belief
+
+    recordings = usable_recordings(workspace, recipe, kind).recordings
+    if kind == "friction":
+        settings, fit = recipe.fit.friction, fits["friction"]
+        empty = friction_experiment(recordings, settings, fit)
+        return empty, friction_simulator(recordings, settings, fit, empty.layout), {}
+    edge = edge_belief(workspace, recipe)
+    friction, fit = fits["friction"], fits["cut"]
+    design = cut_experiment(recordings, recipe, friction, fit, edge)
+    simulator = cut_simulator(recordings, recipe, friction, fit, design.layout, edge)
+    return design, simulator, _sheets(recordings)
+
+
+def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
+    """Number the sheets of all recordings, by the stroke labels that a fit gives."""
+    found: dict[int, int] = {}
+    numbers: dict[tuple[int, int], int] = {}
+    offset = 0
+    for index, recording in enumerate(recordings):
+        for stroke in recording.strokes:
+            if stroke.sheet >= 0:
+                sheet = numbers.setdefault((index, stroke.sheet), len(numbers))
+                found[offset + stroke.index] = sheet
+        offset += len(recording.strokes)
+    return found
+
+
+def _run(
+    pool: Pool,
+    study: "Study",
+    tasks: "Sequence[Task]",
+    file: RecordFile,
+    kind: FitKind,
+    tell: Progress,
+) -> int:
+    """Do the tasks that have no record yet, and record each; return how many those were."""
+    done = {(record["kind"], record["index"]) for record in file.records}
+    left = [task for task in tasks if (task.kind, task.index) not in done]
+    blob = pickle.dumps(study)
+    began, finished = time.monotonic(), 0
+    if len(left) < len(tasks):
+        tell(1 - len(left) / len(tasks), f"{kind}: {len(tasks) - len(left)} fits are there already")
+
+    def keep(record: Record) -> None:
+        nonlocal finished
+        file.append(record)
+        finished += 1
+        seconds = (time.monotonic() - began) / finished * (len(left) - finished)
+        tell(
+            1 - (len(left) - finished) / len(tasks),
+            f"{kind}: {len(tasks) - len(left) + finished} of {len(tasks)} fits, "
+            f"{_duration(seconds)} left",
+        )
+
+    try:
+        pool.work(_do, [(blob, task) for task in left], keep)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"The cluster's workers lack {error.name}: install this version of scissorcal where "
+            "they run."
+        ) from error
+    return finished
+
+
+def _do(job: "tuple[bytes, Task]") -> Record:
+    from scissorcal.calibration.verify import run
+
+    blob, task = job
+    return run(_unpacked(blob), task)
+
+
+@lru_cache(maxsize=2)
+def _unpacked(blob: bytes) -> Any:
+    return pickle.loads(blob)
+
+
+def _inputs_hash(fit: "FitResult", settings: VerifySettings) -> str:
+    """SHA-256 of all that single fits depend on; not of how many there are."""
+    facts = {
+        "algorithm": ALGORITHM,
+        "fit": fit.inputs_hash,
+        "draws": hashlib.sha256(fit.draws.tobytes()).hexdigest(),
+        "prior": settings.prior,
+        "spread": settings.spread,
+        "seed": settings.seed,
+    }
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _duration(seconds: float) -> str:
+    """Say how long, roughly.
+
+    >>> _duration(42), _duration(400), _duration(9000)
+    ('42 s', '7 min', '2.5 h')
+    """
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

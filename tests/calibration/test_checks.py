@@ -1,0 +1,203 @@
+"""Verdicts: each fails on what it is for, says what to measure next, and stops a calibration."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import fit_friction
+from scissorcal.calibration.candidates import Climbed, climb
+from scissorcal.calibration.checks import trust_verdicts
+from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.cli.fit import _text
+from scissorcal.inference import Posterior, SearchStatus, infer
+from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.workday.runs.fit import FitOutcome
+from tests.calibration.test_selection import line
+from tests.calibration.truth import Truth, friction_recording, make_recording, sweep
+
+STROKES, BINS = 8, 50
+SPEEDS = (0.1, 0.3, 0.6, 1.0)
+
+
+def motion(speeds=SPEEDS, strokes=STROKES) -> Bins:
+    """Closing strokes at the given speeds, in turn."""
+    labels = np.repeat(np.arange(strokes), BINS)
+    n = len(labels)
+    rate = -np.array(speeds)[labels % len(speeds)]
+    zeros = np.zeros(n)
+    numbers = np.zeros(n, dtype=np.int64)
+    opening = np.tile(np.linspace(0.8, 0.2, BINS), strokes)
+    yes = np.ones(n, dtype=bool)
+    return Bins(
+        time_s=np.arange(n) * 0.005,
+        opening=opening,
+        rate=rate,
+        acceleration=zeros,
+        drive=zeros,
+        advance=zeros,
+        moving=yes,
+        series=numbers,
+        recording=numbers,
+        stroke=labels,
+        sheet=numbers,
+        bin_s=0.005,
+        rate_floor=0.0,
+    )
+
+
+def fitted(bins: Bins, twin: bool = False) -> tuple[Climbed, Posterior]:
+    """A line over opening; with ``twin`` its slope stands in the law twice."""
+    rng = np.random.default_rng(1)
+    x = bins.opening - bins.opening.mean()
+    columns = np.column_stack([np.ones_like(x), x, *([x] if twin else [])])
+    outcome = 1.0 + 3.0 * x + 0.5 * rng.standard_normal(len(x))
+    found = climb(line(outcome, columns, "line", bins.stroke), bins.series, bins.stroke)
+    problem = found.rung.problem(bins.series)
+    return found, infer(problem, "draft", rng, optimum=found.optimum)
+
+
+def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), error=0.05, **fit):
+    climbed, posterior = fitted(bins, **fit)
+    diagnostics = {
+        "observations": len(bins.rate),
+        "independent_share": 0.9,
+        "largest_inflation": 1.2,
+        "r_squared": 0.8,
+        "residual_rms": 0.5,
+        "relative_error": 0.2,
+    }
+    if spoil:
+        posterior, diagnostics = spoil(posterior, diagnostics)
+    errors = tuple(
+        StrokeError(int(k), "a.mcap", "closing", 0.1, 0.1, error) for k in np.unique(bins.stroke)
+    )
+    met = np.full(len(bins.rate), np.nan) if contact is None else contact
+    verdicts = trust_verdicts(
+        what, "draft", climbed, posterior, diagnostics, errors, nuisance, bins, met
+    )
+    return {verdict.check: verdict for verdict in verdicts}
+
+
+def test_a_good_fit_fails_nothing():
+    found = judged(motion())
+    assert {v.status for v in found.values()} == {"pass", "not_evaluated"}
+    assert [name for name, v in found.items() if v.status == "not_evaluated"] == ["k-hat"]
+
+
+def test_parameters_that_act_alike_are_named_together():
+    verdict = judged(motion(), twin=True)["null-directions"]
+    assert verdict.status == "fail"
+    assert "b1" in verdict.why
+    assert "b2" in verdict.why
+    assert "Record" in verdict.why
+
+
+def test_a_number_that_is_none_is_named():
+    def spoil(posterior, diagnostics):
+        draws = posterior.draws.copy()
+        draws[3, 1] = np.nan
+        return dataclasses.replace(posterior, draws=draws), {**diagnostics, "r_squared": np.nan}
+
+    verdict = judged(motion(), spoil=spoil)["finite"]
+    assert verdict.status == "fail"
+    assert "r_squared, b1" in verdict.why
+
+
+@pytest.mark.parametrize("r2", [0.0, -190.0])
+def test_a_law_that_explains_nothing_fails(r2):
+    found = judged(motion(), spoil=lambda p, d: (p, {**d, "r_squared": r2}))
+    assert found["r-squared"].status == "fail"
+
+
+def test_a_search_that_did_not_settle_fails_with_its_own_words():
+    def spoil(posterior, diagnostics):
+        ended = dataclasses.replace(posterior.optimum, success=False, sentence="At a bound: b0.")
+        return dataclasses.replace(posterior, optimum=ended), diagnostics
+
+    verdict = judged(motion(), spoil=spoil)["optimum"]
+    assert (verdict.status, verdict.why) == ("fail", "At a bound: b0.")
+
+
+@pytest.mark.parametrize(
+    ("status", "concerns", "outcome"),
+    [
+        (SearchStatus.AT_START, ("b0",), "pass"),
+        (SearchStatus.PLATEAU, ("b0",), "pass"),
+        (SearchStatus.AT_START, ("b0", "b1"), "fail"),
+        (SearchStatus.ROUNDS_USED_UP, (), "fail"),
+        (SearchStatus.NOT_FINITE, ("b0",), "fail"),
+        (SearchStatus.AT_BOUNDS, ("b0",), "fail"),
+    ],
+)
+def test_only_a_silent_nuisance_may_stay_at_its_prior(status, concerns, outcome):
+    """b0 is a nuisance here, b1 the law's own."""
+
+    def spoil(posterior, diagnostics):
+        ended = dataclasses.replace(
+            posterior.optimum, success=False, status=status, concerns=concerns
+        )
+        return dataclasses.replace(posterior, optimum=ended), diagnostics
+
+    verdict = judged(motion(), spoil=spoil, nuisance=("b0",))["optimum"]
+    assert verdict.status == outcome
+    if outcome == "pass":
+        assert "b0 stayed where the prior is" in verdict.why
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome"), [(0.05, "not_evaluated"), (0.5, "fail")], ids=["predicts", "does not"]
+)
+def test_few_independent_bins_reject_only_what_does_not_predict(error, outcome):
+    verdict = judged(
+        motion(), spoil=lambda p, d: (p, {**d, "independent_share": 0.01}), error=error
+    )["whiteness"]
+    assert verdict.status == outcome
+    assert verdict.value < verdict.threshold
+    assert verdict.limit == "at least"
+
+
+def test_one_stroke_only_fails():
+    verdict = judged(motion(strokes=1))["strokes"]
+    assert verdict.status == "fail"
+    assert "record several" in verdict.why
+
+
+def test_friction_at_one_speed_fails_and_a_cut_at_one_speed_is_told():
+    spread = np.tile(np.linspace(0.02, 0.06, BINS), STROKES)
+    assert judged(motion(speeds=(0.3,)))["strokes"].status == "fail"
+    cut = judged(motion(speeds=(0.3,)), what="cut", contact=spread)["strokes"]
+    assert cut.status == "not_evaluated"
+    assert "speed (all near 0.3)" in cut.why
+    alike = judged(motion(speeds=(0.3,)), what="cut", contact=0 * spread + 0.04)["strokes"]
+    assert alike.status == "fail"
+    assert "where the material is met" in alike.why
+    assert judged(motion(), what="cut", contact=spread)["strokes"].status == "pass"
+
+
+def steady(truth: Truth, rng: np.random.Generator) -> Recording:
+    """Sweeps at a single speed, and nothing else."""
+    strokes, opening = [], []
+    for _ in range(6):
+        for a, b, kind in ((0.85, 0.2, "closing"), (0.2, 0.85, "opening")):
+            strokes.append(Stroke(len(strokes), kind, 0.3))
+            opening.append(sweep(a, b, 0.3))
+    return make_recording("friction", opening, [0.0] * 12, strokes, truth, rng, False)
+
+
+def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
+    rng = np.random.default_rng(2)
+    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+    found = fit_friction((steady(Truth(), rng),), settings, effort="draft", rng=rng)
+    assert "strokes" in {verdict.check for verdict in found.rejected}
+    said = _text(FitOutcome("friction", found, tmp_path / "friction.nc", cached=False))
+    first, second = said.splitlines()[:2]
+    assert first == "friction: not a calibration:"
+    assert second.startswith("  ")
+    assert said.index("strokes: Strokes are alike") < said.index("inertia")
+    assert "which are not to be used" in said
+    good = fit_friction((friction_recording(Truth(), rng),), settings, effort="draft", rng=rng)
+    assert good.rejected == ()
+    assert "not a calibration" not in _text(FitOutcome("friction", good, tmp_path, cached=False))

@@ -1,0 +1,307 @@
+"""The trust check of a workspace: resumable, the same for any number of workers, never mixed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from scissorcal.calibration.verify import VerifyResult, load_verify, save_verify
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.library import schemas_dir
+from scissorcal.workday.plan import make_plan
+from scissorcal.workday.pool import open_pool
+from scissorcal.workday.records import RecordFile
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.report import reportable_fits, why_stale, write_workspace_report
+from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
+from scissorcal.workday.workspace import Workspace
+from tests.workday.made import quick_workspace, record_friction
+
+FEW = VerifySettings(fits=6)
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    workspace = quick_workspace(tmp_path_factory.mktemp("verify") / "paper")
+    record_friction(workspace)
+    fit_workspace(workspace, ("friction",), effort="standard")
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def whole(fitted: Workspace) -> VerifyResult:
+    (outcome,) = verify_workspace(fitted, ("friction",), FEW, workers=1)
+    assert outcome.fitted == 9
+    return outcome.result
+
+
+@pytest.fixture
+def cleared(fitted: Workspace, whole: VerifyResult) -> Workspace:
+    """The same workspace without what an earlier check left there."""
+    for path in (fitted.root / "fits").glob("friction.verify*"):
+        path.unlink()
+    return fitted
+
+
+def without_times(result: VerifyResult) -> dict[str, Any]:
+    assert result.calibration is not None
+    return asdict(replace(result, calibration=replace(result.calibration, seconds=0.0)))
+
+
+def test_a_check_holds_all_three_parts_and_keeps_its_schema(
+    fitted: Workspace, whole: VerifyResult, cleared: Workspace
+) -> None:
+    names = ("inertia", "offset", "coulomb", "viscous", "effort_rms")
+    assert whole.calibration is not None
+    assert tuple(quantity.name for quantity in whole.calibration.quantities) == names
+    assert all(len(quantity.ranks) == 6 for quantity in whole.calibration.quantities)
+    assert whole.halves is not None
+    assert not set(whole.halves.first_strokes) & set(whole.halves.second_strokes)
+    assert whole.sensitivity is not None
+    assert [row.name for row in whole.sensitivity.rows] == list(names)
+    status = {verdict.check: verdict.status for verdict in whole.verdicts}
+    assert status == {
+        "calibration": "not_evaluated",
+        "refits": "pass",
+        "halves": "pass",
+        "halves-effort": "pass",
+        "prior": "pass",
+    }, [verdict.why for verdict in whole.verdicts]
+    assert {row.diagnosis for row in whole.sensitivity.rows} == {"fine"}
+    path = cleared.verify_path("friction")
+    save_verify(whole, path)
+    assert load_verify(path) == whole
+    schema = json.loads((schemas_dir() / "verify.schema.json").read_text(encoding="utf-8"))
+    jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), schema)
+
+
+def test_a_report_is_stale_once_its_check_is_another_or_gone(
+    cleared: Workspace, whole: VerifyResult
+) -> None:
+    """A check of more fits, of the same seed, is another one."""
+    recipe, path = cleared.recipe(), cleared.verify_path("friction")
+    save_verify(whole, path)
+    write_workspace_report(cleared)
+    fits = reportable_fits(cleared, recipe)
+    assert why_stale(cleared, recipe, fits) == ""
+    assert whole.calibration is not None
+    longer = replace(whole, calibration=replace(whole.calibration, fits=400))
+    save_verify(longer, path)
+    said = "it shows another trust check of friction than there is now"
+    assert why_stale(cleared, recipe, fits) == said
+    path.unlink()
+    assert why_stale(cleared, recipe, fits) == said
+
+
+def test_two_workers_give_the_same_numbers(cleared: Workspace, whole: VerifyResult) -> None:
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=2)
+    assert without_times(outcome.result) == without_times(whole)
+    records = cleared.verify_partial_path("friction").read_text(encoding="utf-8").splitlines()
+    assert len(records) == 1 + 9
+
+
+def test_a_stopped_run_goes_on_and_a_larger_one_takes_what_is_there(
+    cleared: Workspace, whole: VerifyResult
+) -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop(done: float, sentence: str) -> None:
+        if sentence.startswith("friction: 5 of 9"):
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        verify_workspace(cleared, ("friction",), FEW, workers=1, progress=stop)
+    partial = cleared.verify_partial_path("friction")
+    with partial.open("ab") as stream:
+        stream.write(b'{"kind": "simulated", "index": 3, "ra')
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=1)
+    assert outcome.fitted == 4
+    assert without_times(outcome.result) == without_times(whole)
+    more = replace(FEW, fits=8)
+    (outcome,) = verify_workspace(cleared, ("friction",), more, workers=1)
+    assert outcome.fitted == 2
+    assert outcome.result.calibration is not None
+    assert whole.calibration is not None
+    assert outcome.result.calibration.quantities[0].ranks[:6] == (
+        whole.calibration.quantities[0].ranks
+    )
+    indices = [
+        (record["kind"], record["index"])
+        for record in map(json.loads, partial.read_text(encoding="utf-8").splitlines()[1:])
+    ]
+    assert len(set(indices)) == len(indices)
+
+
+def test_records_of_another_seed_are_put_aside_with_a_word(cleared: Workspace) -> None:
+    one = VerifySettings(fits=1, checks=("sbc",))
+    verify_workspace(cleared, ("friction",), one, workers=1)
+    (outcome,) = verify_workspace(cleared, ("friction",), replace(one, seed=1), workers=1)
+    assert outcome.fitted == 1
+    (sentence,) = outcome.notes
+    assert "made from other inputs" in sentence
+    aside = cleared.root / "fits" / sentence.rsplit(" ", 1)[1].rstrip(".")
+    assert len(aside.read_text(encoding="utf-8").splitlines()) == 2
+
+
+def test_checks_that_are_not_asked_for_are_not_made(cleared: Workspace) -> None:
+    only = VerifySettings(checks=("prior",))
+    (outcome,) = verify_workspace(cleared, ("friction",), only, workers=1)
+    assert outcome.fitted == 1
+    assert (outcome.result.calibration, outcome.result.halves) == (None, None)
+    assert [verdict.check for verdict in outcome.result.verdicts] == ["prior"]
+
+
+def test_what_must_come_first_is_named(tmp_path: Path, fitted: Workspace) -> None:
+    with pytest.raises(MissingError, match="scissorcal fit"):
+        verify_workspace(quick_workspace(tmp_path / "empty"))
+    with pytest.raises(MissingError, match="There is no fit of cut yet"):
+        verify_workspace(fitted, ("cut",))
+
+
+def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
+    workspace = quick_workspace(tmp_path / "paper")
+    recipe = workspace.recipe_path.read_text(encoding="utf-8")
+    workspace.recipe_path.write_text(recipe.replace("[rig]", '[rig]\njoint = "linear"'), "utf-8")
+    record_friction(workspace, recipe_toml="")
+    assert not any("verify" in note for note in make_plan(workspace).notes)
+    fit_workspace(workspace, ("friction",))
+    assert any("'scissorcal verify'" in note for note in make_plan(workspace).notes)
+    verify_workspace(workspace, (), VerifySettings(checks=("prior",)), workers=1)
+    assert not any("verify" in note for note in make_plan(workspace).notes)
+
+
+def test_one_run_at_a_time(cleared: Workspace) -> None:
+    path = cleared.verify_partial_path("friction")
+    with RecordFile(path, "x"), pytest.raises(InputError, match="another run"):
+        verify_workspace(cleared, ("friction",), FEW, workers=1)
+
+
+def test_a_damaged_result_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "friction.verify.json"
+    path.write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"friction\.verify\.json is not a trust check"):
+        load_verify(path)
+
+
+def test_an_unreachable_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    with (
+        pytest.raises(InputError, match=r"No dask scheduler answers at nonsense://1"),
+        open_pool(cluster="nonsense://1"),
+    ):
+        pass
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    with (
+        pytest.raises(InputError, match=r"pip install 'scissorcal\[cluster\]'"),
+        open_pool(cluster="tcp://127.0.0.1:1"),
+    ):
+        pass
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_gives_the_same_numbers(cleared: Workspace, whole: VerifyResult) -> None:
+    """A real scheduler with two worker processes, spoken to by its address."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        (outcome,) = verify_workspace(
+            cleared, ("friction",), FEW, cluster=cluster.scheduler_address
+        )
+    assert outcome.fitted == 9
+    assert without_times(outcome.result) == without_times(whole)
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
+from scissorcal.workday.workspace import Workspace
+if __name__ == "__main__":
+    many = VerifySettings(fits=500)
+    verify_workspace(Workspace(Path(sys.argv[1])), ("friction",), many, workers=2)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_run_loses_nothing_and_leaves_no_worker(
+    cleared: Workspace, whole: VerifyResult, tmp_path: Path
+) -> None:
+    program = tmp_path / "killed.py"
+    program.write_text(KILLED, encoding="utf-8")
+    running = subprocess.Popen([sys.executable, str(program), str(cleared.root)])
+    partial = cleared.verify_partial_path("friction")
+    while not partial.is_file() or len(partial.read_bytes().splitlines()) < 6:
+        assert running.poll() is None
+        time.sleep(0.05)
+    children = children_of(running.pid)
+    assert len(children) >= 2
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    before = [line for line in partial.read_bytes().splitlines(keepends=True) if b"\n" in line]
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=1)
+    assert partial.read_bytes().splitlines(keepends=True)[: len(before)] == before
+    assert outcome.fitted <= 9 - 5 + 1
+    assert without_times(outcome.result) == without_times(whole)
+    deadline = time.monotonic() + 60
+    while any(is_running(pid) for pid in children) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not any(is_running(pid) for pid in children)
+
+
+def children_of(pid: int) -> list[int]:
+    path = Path(f"/proc/{pid}/task/{pid}/children")
+    if not path.is_file():
+        pytest.skip("the system does not tell a process's children")
+    return [int(word) for word in path.read_text().split()]
+
+
+def is_running(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def test_what_a_worker_raises_comes_through_and_a_dead_one_is_told() -> None:
+    from scissorcal.errors import ScissorcalError
+
+    with open_pool(2) as pool:
+        found: list[int] = []
+        pool.work(abs, [-3, 2, -1, 0, 5, -6], found.append)
+        assert sorted(found) == [0, 1, 2, 3, 5, 6]
+        with pytest.raises(ZeroDivisionError):
+            pool.work(_divide, [1, 0, 2], found.append)
+    with pytest.raises(ScissorcalError, match="fewer --workers"), open_pool(2) as pool:
+        pool.work(os._exit, [1], found.append)  # type: ignore[arg-type]
+
+
+def _divide(by: int) -> float:
+    return 1 / by
+
+
+def test_records_survive_a_torn_header(tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(b'{"format": "scissor')
+    with RecordFile(path, "one") as file:
+        assert file.records == []
+        assert "kept as a.jsonl.unreadable" in file.note
+        file.append({"value": 1.5})
+    with RecordFile(path, "one") as file:
+        records: list[Mapping[str, Any]] = file.records
+        assert records == [{"value": 1.5}]
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            file.append({"value": np.nan})
