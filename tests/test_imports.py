@@ -23,7 +23,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "recipe": set(),
     "recording": {"recipe"},
     "device": {"kernel", "recipe", "recording"},
-    "vision": {"recipe", "model"},
+    "vision": {"recipe", "model", "inference"},
     "calibration": {"kernel", "model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},

@@ -1,8 +1,7 @@
 """Fit a camera, a board's bend and its poses to seen corners at once, robustly.
 
 The unknowns are what all views share - the camera's free parameters and how far the board bulges
-along either side - and six numbers per view. So each step solves a small system for what is shared
-and one of six for every view (Schur complement; Triggs et al. 2000, doi:10.1007/3-540-44480-7_21).
+along either side - and six numbers per view (Triggs et al. 2000, doi:10.1007/3-540-44480-7_21).
 """
 
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.camera import PARAMETERS
 
 Array = NDArray[np.float64]
@@ -25,8 +25,11 @@ BULGE_SD_M = 1e-3
 """Prior standard deviation of a bulge: a sheet glued to something stiff bends less than that."""
 
 LEAST_SD_PX = 0.01
-_STEPS = 100
-_SETTLED = 1e-7
+_ROUNDS = 20
+_SETTLED = 1e-3
+"""Relative change of the scale from which on it stays; the camera then moves by far less."""
+
+_PRECISION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -100,29 +103,29 @@ def fit_bundle(
     """Maximise the Student-t likelihood of all corners over the camera and all poses.
 
     Starts at ``shared`` (11,), whose parameters that are not free are held, and at ``poses`` (found
-    from the camera where None). Scale and weights follow by iterated reweighting, each step damped
-    after Levenberg and Marquardt.
+    from the camera where None). Least squares on robust residuals with the scale held, and the
+    scale that the residuals show, follow each other until the scale stays.
     """
     if poses is None:
         poses = np.array([first_pose(view, shared[: len(PARAMETERS)]) for view in views])
-    state = _State(views, structure, shared.copy(), poses.copy())
-    damping, converged = 1e-4, False
-    for _ in range(_STEPS):
-        step = state.step(damping)
-        tried = state.moved(*step)
-        if tried.cost <= state.cost:
-            gain = state.cost - tried.cost
-            state = tried.reweighted()
-            damping = max(0.2 * damping, 1e-12)
-            if gain <= _SETTLED * max(state.cost, 1e-12):
-                converged = True
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e12:
-                converged = True
-                break
-    return state.finished(converged)
+    size = structure.spread.shape[1]
+
+    def place(point: Array) -> _Place:
+        moved = shared + structure.spread @ point[:size]
+        return _Place(views, structure, moved, point[size:].reshape(-1, 6))
+
+    def fitted(start: Array, sd_px: float) -> tuple[Array, bool]:
+        return least_squares(lambda x: place(x).rows(sd_px), start, precision=_PRECISION)
+
+    point = np.concatenate([np.zeros(size), poses.ravel()])
+    sd_px, converged = place(point).scale(), False
+    for _ in range(_ROUNDS):
+        held = sd_px
+        point, converged = fitted(point, held)
+        sd_px = place(point).scale(held)
+        if abs(np.log(sd_px / held)) < _SETTLED:
+            break
+    return place(point).bundle(sd_px, converged)
 
 
 def fit_pose(view: SeenBoard, shared: Array, start: Array) -> Array:
@@ -172,18 +175,13 @@ def _matrix(camera: Array) -> Array:
     return np.array([[camera[0], 0.0, camera[2]], [0.0, camera[1], camera[3]], [0.0, 0.0, 1.0]])
 
 
-class _State:
-    """Where a fit stands: parameters, residuals and slopes, weights and scale."""
+class _Place:
+    """Residuals (n, 2) and slopes of every view at one camera (``shared``) and ``poses``."""
 
     def __init__(
-        self,
-        views: Sequence[SeenBoard],
-        structure: Structure,
-        shared: Array,
-        poses: Array,
-        weighting: tuple[list[Array], float] | None = None,
+        self, views: Sequence[SeenBoard], structure: Structure, shared: Array, poses: Array
     ) -> None:
-        self.views, self.structure, self.shared, self.poses = views, structure, shared, poses
+        self.structure, self.shared, self.poses = structure, shared, poses
         self.residuals: list[Array] = []
         self.by_pose: list[Array] = []
         self.by_shared: list[Array] = []
@@ -192,133 +190,116 @@ class _State:
             self.residuals.append(view.pixels - pixels)
             self.by_pose.append(by_pose)
             self.by_shared.append(by_shared @ structure.spread)
-        if weighting is None:
-            self.sd_px = self._scale(np.ones(sum(map(len, self.residuals))))
-            self.weights = self._weights()
-        else:
-            self.weights, self.sd_px = weighting
 
-    @property
-    def cost(self) -> float:
-        """Weighted sum of squared residuals and the prior's; infinite behind the camera."""
-        total = self._prior_cost() + sum(
-            float(np.sum(w[:, None] * r**2))
-            for w, r in zip(self.weights, self.residuals, strict=True)
+    def rows(self, sd_px: float) -> tuple[Array, Array]:
+        """Rows whose squares are the likelihood's and the prior's, and their slopes.
+
+        Infinite behind the camera. A corner's residual r counts as (rho / |r|^2)^(1/2) r, whose
+        square is rho = (nu + 2) sd^2 log(1 + |r|^2 / (nu sd^2)). Each view is rotated so that six
+        rows hold its pose and the others the shared parameters alone; those are rotated together
+        again, which leaves 6 views + p + 1 rows.
+        """
+        size, views = self.structure.spread.shape[1], len(self.poses)
+        own = np.zeros((6 * views, size + 6 * views + 1))
+        common = []
+        for index in range(views):
+            turned = np.asarray(np.linalg.qr(self._robust(index, sd_px), mode="r"))
+            six = slice(6 * index, 6 * index + 6)
+            own[six, :size], own[six, -1] = turned[:6, 6:-1], turned[:6, -1]
+            own[six, size + 6 * index : size + 6 * index + 6] = turned[:6, :6]
+            common.append(turned[6:, 6:])
+        prior = np.sqrt(self._precision(sd_px))[:, None]
+        common.append(prior * np.column_stack([self.structure.spread, self.shared]))
+        rest = np.asarray(np.linalg.qr(np.concatenate(common), mode="r"))
+        whole = np.zeros((len(own) + len(rest), own.shape[1]))
+        whole[: len(own)] = own
+        whole[len(own) :, :size], whole[len(own) :, -1] = rest[:, :-1], rest[:, -1]
+        if np.any(self.poses[:, 5] <= 0.0):
+            whole[:, -1] = np.inf
+        return whole[:, -1], whole[:, :-1]
+
+    def _robust(self, index: int, sd_px: float) -> Array:
+        """Slopes by pose, by free parameters, and the robust residuals (2 n, 6 + p + 1)."""
+        residual = self.residuals[index]
+        squared = np.maximum(np.sum(residual**2, axis=1), 1e-20)
+        nu, variance = DEGREES_OF_FREEDOM, sd_px**2
+        rho = (nu + 2.0) * variance * np.log1p(squared / (nu * variance))
+        factor = np.sqrt(rho / squared)
+        bent = (_weights(residual, sd_px) - rho / squared) / (factor * squared)
+        slopes = np.hstack([self.by_pose[index], self.by_shared[index]])
+        by_corner = slopes.reshape(len(residual), 2, -1)
+        along = np.einsum("nk,nkp->np", residual, by_corner)
+        turned = factor[:, None, None] * by_corner
+        turned += (bent[:, None] * residual)[:, :, None] * along[:, None, :]
+        return np.column_stack(
+            [-turned.reshape(slopes.shape), (factor[:, None] * residual).ravel()]
         )
-        return total if np.isfinite(total) and np.all(self.poses[:, 5] > 0.0) else np.inf
 
-    def reweighted(self) -> "_State":
-        """Estimate scale and weights anew at the same place."""
-        self.sd_px = self._scale(np.concatenate(self.weights))
-        self.weights = self._weights()
-        return self
+    def scale(self, start_px: float | None = None) -> float:
+        """Scale of the Student-t, per coordinate, by its fixed point."""
+        residual = np.concatenate(self.residuals)
+        squared = np.sum(residual**2, axis=1)
+        unknowns = self.poses.size + self.structure.spread.shape[1]
+        spare = max(2.0 * len(squared) - unknowns, 2.0)
+        sd_px = start_px or float(np.sqrt(np.sum(squared) / spare))
+        for _ in range(_ROUNDS):
+            summed = float(np.sum(_weights(residual, sd_px) * squared))
+            sd_px = max(float(np.sqrt(summed / spare)), LEAST_SD_PX)
+        return sd_px
 
-    def moved(self, step: Array, pose_steps: Array) -> "_State":
-        shared = self.shared + self.structure.spread @ step
-        return _State(
-            self.views, self.structure, shared, self.poses + pose_steps, (self.weights, self.sd_px)
-        )
-
-    def step(self, damping: float) -> tuple[Array, Array]:
-        """Damped Gauss-Newton steps of the free shared parameters (p,) and all poses (views, 6)."""
+    def bundle(self, sd_px: float, converged: bool) -> Bundle:
+        """What the fit knows here: information by view, pulls of views and of single corners."""
         size = self.structure.spread.shape[1]
-        normal = self._prior()
-        pull = -self.structure.spread.T @ (self._precision() * self.shared)
-        kept = []
-        for A, B, C, a, b in self._blocks():
-            C = C + damping * np.diag(np.diag(C))
-            inverse = np.linalg.inv(C)
-            normal += A + damping * np.diag(np.diag(A)) - B @ inverse @ B.T
-            pull += a - B @ inverse @ b
-            kept.append((inverse, B, b))
-        step: Array = np.asarray(np.linalg.solve(normal, pull) if size else pull)
-        poses = np.array([inverse @ (b - B.T @ step) for inverse, B, b in kept])
-        return step, poses
-
-    def finished(self, converged: bool) -> Bundle:
-        size = self.structure.spread.shape[1]
+        weights = [_weights(residual, sd_px) for residual in self.residuals]
+        curvature = _curvature(np.concatenate(self.residuals), np.concatenate(weights), sd_px)
         information, scores, noise = [], [], np.zeros((size, size))
-        curvature = self._curvature()
-        rows = zip(
-            self._blocks(), self.by_shared, self.by_pose, self.residuals, self.weights, strict=True
-        )
-        for (A, B, C, a, b), by_shared, by_pose, residual, weight in rows:
-            share = np.linalg.solve(C, B.T).T
-            information.append(curvature * (A - share @ B.T))
-            scores.append(a - share @ b)
+        rows = zip(self.by_shared, self.by_pose, self.residuals, weights, strict=True)
+        for by_shared, by_pose, residual, weight in rows:
+            doubled = np.repeat(weight, 2)[:, None]
+            inner = by_pose.T @ (doubled * by_pose)
+            share = np.linalg.solve(inner, by_pose.T @ (doubled * by_shared)).T
             own = by_shared - by_pose @ share.T
-            pulls = (own * (weight[:, None] * residual).reshape(-1, 1)).reshape(
-                len(residual), 2, size
-            )
-            single = pulls.sum(axis=1)
+            pulls = own * (doubled * residual.reshape(-1, 1))
+            information.append(curvature * own.T @ (doubled * by_shared))
+            scores.append(pulls.sum(axis=0))
+            single = pulls.reshape(len(residual), 2, size).sum(axis=1)
             # The pose has taken up six of the residuals' degrees of freedom.
             noise += single.T @ single * residual.size / max(residual.size - 6, 1)
+        spread = self.structure.spread
         return Bundle(
             self.structure,
             self.shared,
             self.poses,
             tuple(self.residuals),
-            tuple(self.weights),
-            self.sd_px,
+            tuple(weights),
+            sd_px,
             np.array(information),
             np.array(scores),
             noise,
-            self._prior(),
+            spread.T @ (self._precision(sd_px)[:, None] * spread),
             converged,
         )
 
-    def _blocks(self) -> list[tuple[Array, Array, Array, Array, Array]]:
-        blocks = []
-        rows = zip(self.by_shared, self.by_pose, self.residuals, self.weights, strict=True)
-        for by_shared, by_pose, residual, weight in rows:
-            doubled = np.repeat(weight, 2)[:, None]
-            flat = residual.ravel()
-            weighted, weighted_pose = doubled * by_shared, doubled * by_pose
-            blocks.append(
-                (
-                    by_shared.T @ weighted,
-                    by_shared.T @ weighted_pose,
-                    by_pose.T @ weighted_pose,
-                    weighted.T @ flat,
-                    weighted_pose.T @ flat,
-                )
-            )
-        return blocks
-
-    def _curvature(self) -> float:
-        """How much less the likelihood bends at its top than the weights alone would have it.
-
-        A weight w falls as its corner moves off, so the slope of the pull w r, over both ways, is
-        w - w^2 r^2 / ((nu + 2) sd^2).
-        """
-        weight = np.concatenate(self.weights)
-        squared = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
-        lost = weight**2 * squared / ((DEGREES_OF_FREEDOM + 2.0) * self.sd_px**2)
-        return float(np.sum(weight - lost) / np.sum(weight))
-
-    def _precision(self) -> Array:
+    @staticmethod
+    def _precision(sd_px: float) -> Array:
         """The prior's weight (11,) on squares of the shared parameters, as a corner's has it."""
         weight = np.zeros(len(SHARED))
-        weight[len(PARAMETERS) :] = (self.sd_px / BULGE_SD_M) ** 2
+        weight[len(PARAMETERS) :] = (sd_px / BULGE_SD_M) ** 2
         return weight
 
-    def _prior(self) -> Array:
-        spread = self.structure.spread
-        return np.asarray(spread.T @ (self._precision()[:, None] * spread))
 
-    def _prior_cost(self) -> float:
-        return float(np.sum(self._precision() * self.shared**2))
+def _weights(residual: Array, sd_px: float) -> Array:
+    """Weights (n,) of corners under the Student-t."""
+    nu = DEGREES_OF_FREEDOM
+    return np.asarray((nu + 2.0) / (nu + np.sum(residual**2, axis=1) / sd_px**2))
 
-    def _scale(self, weight: Array) -> float:
-        """Scale of the Student-t by its own fixed point, per coordinate."""
-        squared = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
-        unknowns = 6 * len(self.views) + self.structure.spread.shape[1]
-        spare = max(2.0 * len(squared) - unknowns, 2.0) / 2.0
-        return max(float(np.sqrt(np.sum(weight * squared) / (2.0 * spare))), LEAST_SD_PX)
 
-    def _weights(self) -> list[Array]:
-        nu = DEGREES_OF_FREEDOM
-        return [
-            (nu + 2.0) / (nu + np.sum(residual**2, axis=1) / self.sd_px**2)
-            for residual in self.residuals
-        ]
+def _curvature(residual: Array, weight: Array, sd_px: float) -> float:
+    """How much less the likelihood bends at its top than the weights alone would have it.
+
+    A weight w falls as its corner moves off, so the slope of the pull w r, over both ways, is
+    w - w^2 r^2 / ((nu + 2) sd^2).
+    """
+    squared = np.sum(residual**2, axis=1)
+    lost = weight**2 * squared / ((DEGREES_OF_FREEDOM + 2.0) * sd_px**2)
+    return float(np.sum(weight - lost) / np.sum(weight))

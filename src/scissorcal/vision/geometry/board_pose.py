@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 
@@ -22,7 +23,6 @@ TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
 marker leave only two to judge by."""
 
 FEWEST = 4
-ROUNDS = 100
 
 
 @dataclass(frozen=True)
@@ -174,30 +174,16 @@ def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
 
 
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
-    """Levenberg-Marquardt on the reprojection error of the corners used."""
+    """Least squares on the reprojection error of the corners used."""
     both = np.repeat(used, 2)
-    pose, damping = start.copy(), 1e-3
+
+    def evaluate(pose: Array) -> tuple[Array, Array]:
+        residuals, slope = project_pose(pose, corners, camera)
+        return residuals.ravel()[both], -slope[both, :6]
+
+    pose, _ = least_squares(evaluate, start)
     residuals, slope = project_pose(pose, corners, camera)
-    square = float(np.sum(residuals[used] ** 2))
-    for _ in range(ROUNDS):
-        by_pose = slope[both, :6]
-        normal = by_pose.T @ by_pose
-        pull = by_pose.T @ residuals.ravel()[both]
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
-        tried = pose + step
-        away, leaning = project_pose(tried, corners, camera)
-        reached = float(np.sum(away[used] ** 2))
-        if reached <= square:
-            settled = square - reached <= 1e-12 * square
-            pose, residuals, slope, square = tried, away, leaning, reached
-            damping = max(0.1 * damping, 1e-12)
-            if settled:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e8:
-                break
-    return _Refined(pose, residuals, slope, square)
+    return _Refined(pose, residuals, slope, float(np.sum(residuals[used] ** 2)))
 
 
 def _square(found: _Refined) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
@@ -25,9 +26,6 @@ OPEN = 3.0
 UNTOLD = 0.1
 """A direction of the camera's pose whose standard deviation exceeds this (rad or m) was not told
 by the motion."""
-
-STEP = 1e-6
-ROUNDS = 60
 
 
 @dataclass(frozen=True)
@@ -84,8 +82,19 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
     used = tuple(found.used for found in located)
-    point, square, normal, slopes = _search(views, camera, middle_m, used, start)
-    count = 2 * sum(int(np.sum(mask)) for mask in used)
+
+    weight = LEAST_SD_PX / OPEN
+
+    def evaluate(point: Array) -> tuple[Array, Array]:
+        residuals, by_point, _ = _evaluate(point, views, camera, middle_m, used)
+        # What the motion leaves open stays near the start.
+        prior = weight * (point - start)
+        return np.concatenate([residuals, prior]), np.vstack([-by_point, weight * np.eye(11)])
+
+    point, _ = least_squares(evaluate, start)
+    residuals, by_point, by_shared = _evaluate(point, views, camera, middle_m, used)
+    square, normal = float(residuals @ residuals), by_point.T @ by_point
+    count = len(residuals)
     noise = max(square / max(count - len(point), 1), LEAST_SD_PX**2)
     prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
     inverse = np.linalg.inv(normal / noise + prior)
@@ -94,7 +103,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     alike[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
     if camera.covariance is not None:
         alike[:9, :9] = camera.covariance
-    drawn = slopes / noise
+    drawn = by_point.T @ by_shared / noise
     spread = spread + drawn @ alike @ drawn.T
     turn = np.eye(len(point))
     turn[:3, :3] = left_jacobian(point[:3])
@@ -171,63 +180,41 @@ def _unit(vector: Array) -> Array:
     return np.asarray(vector / length)
 
 
-def _search(
-    views: tuple[CardView, ...],
-    camera: Camera,
-    middle_m: Array,
-    used: tuple[NDArray[np.bool_], ...],
-    start: Array,
-) -> tuple[Array, float, Array, Array]:
-    """Levenberg-Marquardt: point, sum of squares, normal matrix (11, 11), slopes (11, 11) by
-    what all pictures share: the camera's parameters and the print's scales."""
-    point, damping = start, 1e-3
-    square, pull, normal, slopes = _sums(point, views, camera, middle_m, used)
-    for _ in range(ROUNDS):
-        damped = normal + damping * np.diag(np.diag(normal)) + 1e-9 * np.eye(len(point))
-        tried = point + np.linalg.solve(damped, pull)
-        reached = _sums(tried, views, camera, middle_m, used)
-        if reached[0] <= square:
-            settled = square - reached[0] <= 1e-12 * square
-            point, (square, pull, normal, slopes) = tried, reached
-            damping = max(0.1 * damping, 1e-12)
-            if settled:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e8:
-                break
-    return point, square, normal, slopes
-
-
-def _sums(
+def _evaluate(
     point: Array,
     views: tuple[CardView, ...],
     camera: Camera,
     middle_m: Array,
     used: tuple[NDArray[np.bool_], ...],
-) -> tuple[float, Array, Array, Array]:
-    square, size = 0.0, len(point)
-    pull, normal, slopes = np.zeros(size), np.zeros((size, size)), np.zeros((size, 11))
+) -> tuple[Array, Array, Array]:
+    """Residuals (n,) of the corners used, with slopes of predicted pixels: (n, 11) by the unknowns,
+    (n, 11) by what all pictures share (the camera's parameters and the print's scales)."""
+    residuals, by_point, by_shared = [], [], []
     for view, mask in zip(views, used, strict=True):
-
-        def seen(p: Array, view: CardView = view) -> Array:
-            rig, card = _poses(p, middle_m)
-            return _vector(rig.after(_motion(view)).after(card))
-
-        stand = seen(point)
-        away, slope = project_pose(stand, view.corners, camera)
-        alike = np.hstack([slope[:, 6:15], print_slopes(stand, slope, view.corners)])
+        pose, slopes = _card_seen(point, view, middle_m)
+        away, slope = project_pose(pose, view.corners, camera)
         both = np.repeat(mask, 2)
-        chain = np.stack(
-            [(seen(point + e) - seen(point - e)) / (2 * STEP) for e in STEP * np.eye(size)], axis=1
-        )
-        by_point, left = slope[both, :6] @ chain, away.ravel()[both]
-        square += float(left @ left)
-        pull += by_point.T @ left
-        normal += by_point.T @ by_point
-        slopes += by_point.T @ alike[both]
-    return square, pull, normal, slopes
+        shared = np.hstack([slope[:, 6:15], print_slopes(pose, slope, view.corners)])
+        residuals.append(away.ravel()[both])
+        by_point.append(slope[both, :6] @ slopes)
+        by_shared.append(shared[both])
+    return np.concatenate(residuals), np.concatenate(by_point), np.concatenate(by_shared)
 
 
-def _vector(pose: Pose) -> Array:
-    return np.concatenate([pose.rotation_vector, pose.translation_m])
+def _card_seen(point: Array, view: CardView, middle_m: Array) -> tuple[Array, Array]:
+    """T_camera_card (6,) as rotation vector and translation, and its slopes (6, 11)."""
+    import cv2
+
+    turned, by_turn = cv2.Rodrigues(point[6:9])
+    place = np.append(point[9:11], 0.0) - turned @ middle_m
+    place_slopes = np.hstack([-(by_turn.reshape(3, 3, 3) @ middle_m).T, np.eye(3, 2)])
+    motion = np.array([0.0, 0.0, view.blade_angle_rad]), np.array([view.advance_m, 0.0, 0.0])
+    moved = cv2.composeRT(point[6:9], place, *motion)
+    seen = cv2.composeRT(moved[0], moved[1], point[:3, None], point[3:6, None])
+    by_moved, by_rig = (
+        np.block([[seen[k], seen[k + 1]], [seen[k + 4], seen[k + 5]]]) for k in (2, 4)
+    )
+    by_card = np.block([[moved[2], moved[3]], [moved[6], moved[7]]])
+    card_slopes = np.vstack([np.eye(3, 5), place_slopes])
+    pose = np.concatenate([seen[0].ravel(), seen[1].ravel()])
+    return pose, np.hstack([by_rig, by_moved @ by_card @ card_slopes])
