@@ -12,7 +12,7 @@ from scissorcal.calibration.checks import HELD_OUT_LIMIT
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
-from scissorcal.calibration.friction.search import ReducedProblem, ascend, search
+from scissorcal.calibration.friction.search import ReducedProblem, search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups
@@ -188,7 +188,7 @@ def compare_recordings(
 
     def others(here: Mask) -> Array:
         left = law.without(np.unique(design.strokes[here]))
-        return np.asarray(ascend(replace(problem, reduced=left), point).point)
+        return np.asarray(search_from(replace(problem, reduced=left), point).point)
 
     return gather_recordings(
         design, design.bins.recording, point, recordings, FitsApart(own, others), rng
@@ -270,7 +270,7 @@ def jackknife(
         rest = law.without(np.array([label]))
         repeated &= np.diag(rest.information(point)) > REPEATED * every
         seen = replace(problem, reduced=rest)
-        left.append(design.layout.columns(ascend(seen, point).point))
+        left.append(design.layout.columns(search_from(seen, point).point))
     size = (law.counted / law.moments.counts)[:, None]
     pseudo = size * full - (size - 1.0) * np.stack(left)
     centre = np.sum(pseudo / size, axis=0)

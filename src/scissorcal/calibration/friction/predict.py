@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.friction.search import ascend
+from scissorcal.calibration.friction.search import search_from
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
@@ -260,7 +260,9 @@ class _Folds:
         rung = self.design.rung(self.design.observed)
         assert rung.reduced is not None
         problem = rung.problem(self.design.series)
-        return ascend(replace(problem, reduced=rung.reduced.without(left_out)), self.point).point
+        return search_from(
+            replace(problem, reduced=rung.reduced.without(left_out)), self.point
+        ).point
 
 
 def _values(fit: FitResult) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""The optimum of a friction law over products of its columns: scans of its scales, Gauss-Newton."""
+"""The optimum of a friction law by least squares over products of its columns."""
 
 from dataclasses import dataclass, field
 from itertools import product
@@ -8,15 +8,17 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
+from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 60
+MOST_ROUNDS = 20
+TINY = 1e-300
 ARRIVED = 1e-6
-"""Log-posterior that a further step would have to promise."""
+"""Log-posterior that a further round has to gain."""
 SAME_HEIGHT = 0.5
 AT_BOUND = 1e-6
 SILENT = 1e-9
@@ -55,7 +57,9 @@ class ReducedProblem(Problem):
 
 
 @dataclass(frozen=True)
-class _Ascent:
+class LocalOptimum:
+    """Where a search from one start ended: point (p,) and log-posterior."""
+
     point: Array
     value: float
     evaluations: int
@@ -64,14 +68,12 @@ class _Ascent:
 def search(problem: ReducedProblem) -> Optimum:
     """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
 
-    Levenberg and Marquardt's method on the law's own coefficients (More 1978,
-    doi:10.1007/BFb0067700), the noise at its best for each step. What depends on a scale has
-    several optima (a search for Dahl's length without a scan ended up to 172 nats below the
-    highest): scales are therefore scanned with all columns free, and the best places are starts
-    too.
+    What depends on a scale has several optima (a search for Dahl's length without a scan ended up
+    to 172 nats below the highest): scales are therefore scanned with all columns free, and the best
+    places are starts too.
     """
     starts = [*problem.starts, *_scanned(problem)]
-    ended = [ascend(problem, start) for start in starts]
+    ended = [search_from(problem, start) for start in starts]
     best = max(ended, key=lambda one: one.value)
     agreeing = sum(one.value > best.value - SAME_HEIGHT for one in ended)
     optima: list[Cluster] = []
@@ -97,37 +99,54 @@ def search(problem: ReducedProblem) -> Optimum:
     )
 
 
-def ascend(problem: ReducedProblem, start: Array) -> _Ascent:
-    """Climb from one start (p,) to the optimum that it leads to."""
-    law, precision, mean = problem.law, problem.prior_precision, problem.prior_mean
+def search_from(problem: ReducedProblem, start: Array) -> LocalOptimum:
+    """Maximise the log-posterior from one start (p,).
+
+    Least squares over the law's coefficients and the best noise for what they leave follow each
+    other until the log-posterior stays.
+    """
     point = _with_best_noise(problem, np.clip(start, problem.lower, problem.upper))
-    value, evaluations, damping = problem.log_posterior(point), 1, 1e-3
-    for _ in range(MOST_STEPS):
-        cell = law.cell_at(point)
-        slopes, products = law.slopes(point, cell), law.summed(cell)
-        weight = np.exp(-2.0 * point[-1])
-        factors = law.factors(point, cell)
-        slope = -weight * slopes.T @ (products @ factors) - (precision @ (point - mean))[:-1]
-        curvature = weight * slopes.T @ products @ slopes + precision[:-1, :-1]
-        evaluations += 2 * len(point) - 1
-        gained, promised = 0.0, np.inf
-        while damping < 1e12:
-            step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slope)
-            promised = float(slope @ step)
-            if promised < ARRIVED:
-                break
-            reached = point.copy()
-            reached[:-1] = np.clip(point[:-1] + step, problem.lower[:-1], problem.upper[:-1])
-            reached = _with_best_noise(problem, reached)
-            height = problem.log_posterior(reached)
-            evaluations += 1
-            if height > value:
-                gained, point, value, damping = height - value, reached, height, 0.2 * damping
-                break
-            damping = max(10.0 * damping, 1e-6)
-        if gained < ARRIVED:
+    value, evaluations = problem.log_posterior(point), 1
+    for _ in range(MOST_ROUNDS):
+        coefficients, used = _least_squares(problem, point)
+        reached = _with_best_noise(problem, np.append(coefficients, point[-1]))
+        height = problem.log_posterior(reached)
+        evaluations += used + 1
+        gained = height - value
+        if gained > 0.0:
+            point, value = reached, height
+        if not gained > ARRIVED:
             break
-    return _Ascent(point, value, evaluations)
+    return LocalOptimum(point, value, evaluations)
+
+
+def _least_squares(problem: ReducedProblem, point: Array) -> tuple[Array, int]:
+    """Coefficients (p - 1,) of the least squares at the noise of ``point`` (p,), and evaluations.
+
+    Squares and slopes come from products of columns. A root of these, p rows however much was
+    recorded, has the same squares and slopes as all bins and the prior. Outside the bounds the
+    prior alone acts.
+    """
+    law, count = problem.law, 0
+    mean, precision = problem.prior_mean[:-1], problem.prior_precision[:-1, :-1]
+
+    def evaluate(coefficients: Array) -> tuple[Array, Array]:
+        nonlocal count
+        count += 1
+        inside = np.clip(coefficients, problem.lower[:-1], problem.upper[:-1])
+        u = np.append(inside, point[-1])
+        cell = law.cell_at(u)
+        slopes = np.where(inside == coefficients, law.slopes(u, cell), 0.0)
+        columns = np.column_stack([slopes, law.factors(u, cell)]) * np.exp(-point[-1])
+        away = np.column_stack([np.eye(len(mean)), coefficients - mean])
+        products = columns.T @ law.summed(cell) @ columns + away.T @ precision @ away
+        size = np.sqrt(np.maximum(np.diag(products), TINY))
+        values, vectors = np.linalg.eigh(products / np.outer(size, size))
+        root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
+        return root[:, -1], root[:, :-1]
+
+    found, _ = least_squares(evaluate, point[:-1])
+    return np.clip(found, problem.lower[:-1], problem.upper[:-1]), count
 
 
 def _with_best_noise(problem: ReducedProblem, point: Array) -> Array:
