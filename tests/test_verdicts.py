@@ -8,6 +8,7 @@ import pytest
 import scissorcal
 from scissorcal.verdicts import MEANINGS, TORQUE, Verdict
 
+BUILDERS = ("Verdict", "judge", "not_evaluated", "_verdict")
 PACKAGE = Path(scissorcal.__file__).parent
 DOCS = PACKAGE.parents[1] / "docs"
 
@@ -19,9 +20,9 @@ def checks_in_source() -> set[str]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
                 continue
-            if node.func.id not in ("Verdict", "_verdict"):
+            if node.func.id not in BUILDERS:
                 continue
-            first = 1 if node.func.id == "Verdict" else 0
+            first = 0 if node.func.id == "_verdict" else 1
             words = [
                 argument.value
                 for argument in node.args[first:2]

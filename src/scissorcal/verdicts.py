@@ -162,6 +162,33 @@ class Verdict:
         return asdict(self)
 
 
+def judge(
+    scope: str, check: str, value: float, limit: float, good: str, bad: str | None = None
+) -> Verdict:
+    """Judge a value by its limit: ``good`` is said where it passes, ``bad`` where it fails.
+
+    :data:`MEANINGS` says whether the value may be at most or at least the limit; the limit itself
+    passes, NaN fails. Raises ValueError for a check whose limit has no direction there.
+
+    >>> verdict = judge("fit.plate", "residuals", 0.4, 0.3, "0.4 px.", "0.4 px: too much.")
+    >>> verdict.status, verdict.limited, verdict.why
+    ('fail', '0.4, at most 0.3', '0.4 px: too much.')
+    """
+    direction, _ = meaning_of(scope, check)
+    if not direction:
+        raise ValueError(f"the limit of {scope} {check} has no direction in MEANINGS")
+    passes = value <= limit if direction == "at most" else value >= limit
+    why = good if passes or bad is None else bad
+    return Verdict(scope, check, "pass" if passes else "fail", float(value), float(limit), why)
+
+
+def not_evaluated(
+    scope: str, check: str, why: str, limit: float | None = None, value: float | None = None
+) -> Verdict:
+    """A check that could not be made, or decides nothing here, and why."""
+    return Verdict(scope, check, "not_evaluated", value, limit, why)
+
+
 def meaning_of(scope: str, check: str) -> tuple[Limit, str]:
     """Direction of a check's limit and what it guards; empty for a check that is not known.
 

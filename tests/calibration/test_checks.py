@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.candidates import Climbed, climb
 from scissorcal.calibration.checks import trust_verdicts
+from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit import _text
@@ -15,7 +15,7 @@ from scissorcal.inference import Posterior, SearchStatus, infer
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.workday.runs.fit import FitOutcome
-from tests.calibration.test_selection import line
+from tests.calibration.test_comparison import line
 from tests.calibration.truth import Truth, friction_recording, make_recording, sweep
 
 STROKES, BINS = 8, 50
@@ -48,14 +48,14 @@ def motion(speeds=SPEEDS, strokes=STROKES) -> Bins:
     )
 
 
-def fitted(bins: Bins, twin: bool = False) -> tuple[Climbed, Posterior]:
+def fitted(bins: Bins, twin: bool = False) -> tuple[FittedCandidate, Posterior]:
     """A line over opening; with ``twin`` its slope stands in the law twice."""
     rng = np.random.default_rng(1)
     x = bins.opening - bins.opening.mean()
     columns = np.column_stack([np.ones_like(x), x, *([x] if twin else [])])
     outcome = 1.0 + 3.0 * x + 0.5 * rng.standard_normal(len(x))
-    found = climb(line(outcome, columns, "line", bins.stroke), bins.series, bins.stroke)
-    problem = found.rung.problem(bins.series)
+    found = fit_candidate(line(outcome, columns, "line", bins.stroke), bins.series, bins.stroke)
+    problem = found.candidate.problem(bins.series)
     return found, infer(problem, "draft", rng, optimum=found.optimum)
 
 
@@ -196,7 +196,7 @@ def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     first, second = said.splitlines()[:2]
     assert first == "friction: not a calibration:"
     assert second.startswith("  ")
-    assert said.index("strokes: Strokes are alike") < said.index("inertia")
+    assert said.index("strokes: Strokes do not differ") < said.index("inertia")
     assert "which are not to be used" in said
     good = fit_friction((friction_recording(Truth(), rng),), settings, effort="draft", rng=rng)
     assert good.rejected == ()

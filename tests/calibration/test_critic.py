@@ -7,8 +7,8 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.candidates import climb
 from scissorcal.calibration.critic import FEWEST_STROKES, RECURS, criticise
+from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.model.terms import TERMS, Motion
 from scissorcal.recipe.schema import FitFriction
@@ -43,7 +43,7 @@ def template():
 def critique(recording: Recording, seed: int, template):
     """Criticise Coulomb + viscous, asymmetric."""
     law = friction_experiment((recording,), SIMPLE, template)
-    climbed = climb(law.rung(law.observed), law.series, law.strokes)
+    climbed = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
     motion = Motion(law.bins.opening, law.bins.rate, law.bins.acceleration)
     rng = np.random.default_rng(seed)
     return criticise("friction", climbed, motion, recording.joint, rng)

@@ -1,4 +1,4 @@
-"""From a posterior and the ladder that was climbed to the result that people read."""
+"""Put a posterior and the compared candidates into the result that people read."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -6,13 +6,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Climbed
 from scissorcal.calibration.checks import trust_verdicts
+from scissorcal.calibration.comparison import candidate_rows, comparison_text
 from scissorcal.calibration.critic import Critique, criticise
+from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
-from scissorcal.calibration.rung_table import rung_table
-from scissorcal.calibration.selection import selection_sentence
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion
@@ -32,8 +31,8 @@ def assemble(
     what: Literal["friction", "cut"],
     effort: Effort,
     posterior: Posterior,
-    climbed: list[Climbed],
-    chosen: Climbed,
+    compared: list[FittedCandidate],
+    chosen: FittedCandidate,
     structure: Mapping[str, Any],
     bins: Bins,
     strokes: Integers,
@@ -59,15 +58,15 @@ def assemble(
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
     what the joint bore, where that was measured.
     """
-    layout = chosen.rung.layout
+    layout = chosen.candidate.layout
     fitted = layout.fitted(posterior.draws)
     wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
     others = [i for i, name in enumerate(layout.names) if name in nuisance]
     natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     series = _series(chosen, posterior, bins, strokes, measured, contact)
-    rungs = rung_table(climbed, chosen)
-    diagnostics = _diagnostics(climbed, chosen, posterior, bins, measured)
+    rows = candidate_rows(compared, chosen)
+    diagnostics = _diagnostics(compared, chosen, posterior, bins, measured)
     diagnostics |= dict(extra_diagnostics or {})
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
@@ -79,14 +78,14 @@ def assemble(
     return FitResult(
         what=what,
         effort=effort,
-        rung=chosen.rung.name,
+        rung=chosen.candidate.name,
         structure=structure,
         parameters=tuple(fitted[i] for i in wanted),
         draws=natural[:, wanted],
         map_point=layout.columns(chosen.optimum.point)[wanted],
         series=series,
         held_out=held_out,
-        rungs=rungs,
+        rungs=rows,
         diagnostics=diagnostics,
         verdicts=(*trust, *extra_verdicts),
         effort_unit=joint.effort_unit,
@@ -94,7 +93,7 @@ def assemble(
         inputs_hash=inputs_hash,
         sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
-        selection=selection_sentence(climbed, chosen, bins, contact, joint),
+        selection=comparison_text(compared, chosen, bins, contact, joint),
         critic=critique.proposals,
         replay=compare_with_replay(
             chosen,
@@ -111,17 +110,21 @@ def assemble(
 
 
 def _diagnostics(
-    climbed: list[Climbed], chosen: Climbed, posterior: Posterior, bins: Bins, measured: Array
+    compared: list[FittedCandidate],
+    chosen: FittedCandidate,
+    posterior: Posterior,
+    bins: Bins,
+    measured: Array,
 ) -> dict[str, Any]:
-    """Plain numbers and strings; ``evaluations`` are those of the whole ladder and of sampling."""
-    likelihood, point = chosen.rung.likelihood, chosen.optimum.point
+    """Plain numbers and strings; ``evaluations`` are those of all candidates and of sampling."""
+    likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
     white = ljung_box(likelihood.standardised(point), bins.series)
     residuals = likelihood.residuals(point)
     return {
         "k_hat": posterior.k_hat,
         "effective_samples": posterior.effective,
         "effort_reached": posterior.effort_reached,
-        "evaluations": sum(candidate.evaluations for candidate in climbed)
+        "evaluations": sum(candidate.evaluations for candidate in compared)
         + posterior.evaluations
         - posterior.optimum.evaluations,
         "observations": len(residuals),
@@ -150,7 +153,7 @@ def _of_time(bins: Bins) -> dict[str, float]:
 
 def _criticise(
     what: Literal["friction", "cut"],
-    chosen: Climbed,
+    chosen: FittedCandidate,
     bins: Bins,
     measured: Array,
     load: Array | None,
@@ -159,21 +162,21 @@ def _criticise(
 ) -> Critique:
     """A cut's load, where none was measured, is the torque that the law expects of the material."""
     if what == "cut" and load is None:
-        load = measured - chosen.rung.likelihood.residuals(chosen.optimum.point)
+        load = measured - chosen.candidate.likelihood.residuals(chosen.optimum.point)
     motion = Motion(bins.opening, bins.rate, bins.acceleration, load)
     return criticise(what, chosen, motion, joint, rng)
 
 
-def _prior_draws(chosen: Climbed, rng: np.random.Generator) -> Array:
+def _prior_draws(chosen: FittedCandidate, rng: np.random.Generator) -> Array:
     """Draws of the prior (PRIOR_DRAWS, parameters) in natural units."""
-    rung = chosen.rung
-    covariance = np.linalg.inv(rung.prior_precision)
-    draws = rng.multivariate_normal(rung.prior_mean, covariance, PRIOR_DRAWS, method="eigh")
-    return rung.layout.columns(draws)
+    candidate = chosen.candidate
+    covariance = np.linalg.inv(candidate.prior_precision)
+    draws = rng.multivariate_normal(candidate.prior_mean, covariance, PRIOR_DRAWS, method="eigh")
+    return candidate.layout.columns(draws)
 
 
 def _stroke_errors(
-    chosen: Climbed,
+    chosen: FittedCandidate,
     bins: Bins,
     strokes: Integers,
     measured: Array,
@@ -200,14 +203,14 @@ def _stroke_errors(
 
 
 def _series(
-    chosen: Climbed,
+    chosen: FittedCandidate,
     posterior: Posterior,
     bins: Bins,
     strokes: Integers,
     measured: Array,
     contact: Array,
 ) -> FitSeries:
-    residuals = chosen.rung.likelihood.residuals
+    residuals = chosen.candidate.likelihood.residuals
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
     every = max(1, len(posterior.draws) // BAND_DRAWS)
     predictions = np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])

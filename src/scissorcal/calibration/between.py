@@ -12,7 +12,7 @@ from scissorcal.calibration.checks import HELD_OUT_LIMIT
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
-from scissorcal.calibration.friction.search import ReducedProblem, search, search_from
+from scissorcal.calibration.friction.search import search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups
@@ -178,9 +178,9 @@ def compare_recordings(
     optimum. The prior, which all share, is taken out of the recordings' estimates before they are
     compared (see :func:`scissorcal.inference.between.between_groups`).
     """
-    every = design.rung(design.observed)
+    every = design.candidate(design.observed)
     law, problem = every.reduced, every.problem(design.series)
-    if law is None:
+    if not isinstance(law, ReducedLaw):
         return None
 
     def own(here: Mask) -> Posterior:
@@ -212,7 +212,7 @@ def gather_recordings(
     ]
     if len(labels) < 2:
         return None
-    every = design.rung(design.observed)
+    every = design.candidate(design.observed)
     prior = every.prior_precision
     points, covariances, precisions, estimates, errors = [], [], [], [], []
     for label in labels:
@@ -260,9 +260,9 @@ def jackknife(
     of their information to one stroke are left out, as no other repeats it; empty for fewer than
     three strokes.
     """
-    rung = design.rung(design.observed)
+    rung = design.candidate(design.observed)
     law, problem = rung.reduced, rung.problem(design.series)
-    if law is None or len(law.moments.labels) < 3:
+    if not isinstance(law, ReducedLaw) or len(law.moments.labels) < 3:
         return {}
     full, every = design.layout.columns(point), np.diag(law.information(point))
     left, repeated = [], np.ones(len(point), dtype=bool)
@@ -291,8 +291,8 @@ def _inferred(
 ) -> Posterior:
     """Normal approximation of the posterior by the bins (n,) of one recording."""
     outside = np.setdiff1d(law.moments.labels, np.unique(design.strokes[here]))
-    rung = replace(design.rung(design.observed), starts=point[None, :])
-    over: ReducedProblem = replace(rung.problem(design.series, here), reduced=law.without(outside))
+    rung = replace(design.candidate(design.observed), starts=point[None, :])
+    over = replace(rung.problem(design.series, here), reduced=law.without(outside))
     return infer(over, "draft", rng, optimum=search(over))
 
 

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import SEARCH_REACH, Climbed
+from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT
 from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
 PRIOR_ONLY = 0.9
 """A posterior at least this share of its prior's width says that the data are silent."""
@@ -23,6 +23,8 @@ HELD_OUT_LIMIT = 0.2
 OTHER_SPEED = 1.5
 """Ratio between the fastest and the slowest motion from which speeds count as varied."""
 OTHER_CONTACT_M = 2e-3
+NEAR_EDGE = 0.98 * SEARCH_REACH
+"""Prior standard deviations from its centre at which a parameter is at the search's limit."""
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,7 @@ Array = NDArray[np.float64]
 def trust_verdicts(
     what: str,
     effort: str,
-    chosen: Climbed,
+    chosen: FittedCandidate,
     posterior: Posterior,
     diagnostics: Mapping[str, Any],
     held_out: tuple[StrokeError, ...],
@@ -40,7 +42,7 @@ def trust_verdicts(
 ) -> tuple[Verdict, ...]:
     """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
     scope = f"fit.{what}"
-    nuisance = (*nuisance, *(p.name for p in chosen.rung.layout.parameters if p.believed))
+    nuisance = (*nuisance, *(p.name for p in chosen.candidate.layout.parameters if p.believed))
     return (
         _finite(scope, chosen, posterior, diagnostics),
         _search(scope, posterior, nuisance),
@@ -56,19 +58,17 @@ def trust_verdicts(
 
 
 def _finite(
-    scope: str, chosen: Climbed, posterior: Posterior, diagnostics: Mapping[str, Any]
+    scope: str, chosen: FittedCandidate, posterior: Posterior, diagnostics: Mapping[str, Any]
 ) -> Verdict:
     wanted = ("residual_rms", "relative_error", "r_squared", "independent_share")
     broken = [name for name in wanted if not np.isfinite(diagnostics[name])]
     bad = ~np.all(np.isfinite(posterior.draws), axis=0) | ~np.isfinite(posterior.optimum.point)
-    broken += [name for name, no in zip(chosen.rung.layout.names, bad, strict=True) if no]
-    if broken:
-        why = (
-            f"{', '.join(broken)} did not come out as a number: check the recording for gaps, "
-            "constant channels and absurd values."
-        )
-        return Verdict(scope, "finite", "fail", float(len(broken)), 0.0, why)
-    return Verdict(scope, "finite", "pass", 0.0, 0.0, "Every number of the fit is finite.")
+    broken += [name for name, no in zip(chosen.candidate.layout.names, bad, strict=True) if no]
+    bad = (
+        f"{', '.join(broken)} did not come out as a number: check the recording for gaps, constant "
+        "channels and absurd values."
+    )
+    return judge(scope, "finite", len(broken), 0.0, "Every number of the fit is finite.", bad)
 
 
 def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
@@ -93,7 +93,7 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
     k = posterior.k_hat if np.isfinite(posterior.k_hat) else None
     if effort == "draft":
         why = "Draft effort does not check the posterior's shape; use --effort standard."
-        return Verdict(scope, "k-hat", "not_evaluated", None, K_HAT_LIMIT, why)
+        return not_evaluated(scope, "k-hat", why, K_HAT_LIMIT)
     status: Status = "pass" if posterior.status.trusted else "fail"
     if posterior.ensembles:
         # what decides then is in the sentence; k-hat is of a proposal that was not used
@@ -103,24 +103,22 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
     return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
 
 
-def _bounds(scope: str, chosen: Climbed) -> Verdict:
-    layout, point = chosen.rung.layout, chosen.optimum.point
+def _bounds(scope: str, chosen: FittedCandidate) -> Verdict:
+    layout, point = chosen.candidate.layout, chosen.optimum.point
     reach = np.abs(point - layout.mean) / layout.sd
-    at = [name for name, r in zip(layout.names, reach, strict=True) if r > 0.98 * SEARCH_REACH]
-    if at:
-        why = (
-            f"{', '.join(at)} ended at the edge of the search, so no value was found: "
-            "check the units and signs of the recording."
-        )
-        return Verdict(scope, "bounds", "fail", float(reach.max()), SEARCH_REACH, why)
-    why = "No parameter ended at the edge of the search."
-    return Verdict(scope, "bounds", "pass", float(reach.max()), SEARCH_REACH, why)
+    at = [name for name, r in zip(layout.names, reach, strict=True) if r > NEAR_EDGE]
+    bad = (
+        f"{', '.join(at)} ended at the limit of the search, so no value was found: check the units "
+        "and signs of the recording."
+    )
+    good = "No parameter ended at the limit of the search."
+    return judge(scope, "bounds", float(reach.max()), NEAR_EDGE, good, bad)
 
 
 def _identified(
-    scope: str, chosen: Climbed, posterior: Posterior, nuisance: tuple[str, ...]
+    scope: str, chosen: FittedCandidate, posterior: Posterior, nuisance: tuple[str, ...]
 ) -> Verdict:
-    layout = chosen.rung.layout
+    layout = chosen.candidate.layout
     ratios = {
         name: float(posterior.draws[:, i].std(ddof=1) / layout.sd[i])
         for i, name in enumerate(layout.names)
@@ -128,14 +126,12 @@ def _identified(
     }
     worst = max(ratios, key=lambda name: ratios[name])
     silent = [name for name, ratio in ratios.items() if ratio > PRIOR_ONLY]
-    if silent:
-        why = (
-            f"The data say nothing about {', '.join(silent)}; the values shown are the prior's. "
-            "Record strokes that excite them, or choose a rung without them."
-        )
-        return Verdict(scope, "identifiability", "fail", ratios[worst], PRIOR_ONLY, why)
-    why = f"Every parameter is narrower than its prior; {worst} is the least certain one."
-    return Verdict(scope, "identifiability", "pass", ratios[worst], PRIOR_ONLY, why)
+    bad = (
+        f"The data say nothing about {', '.join(silent)}; the values shown are the prior's. Record "
+        "strokes that excite them, or choose a model without them."
+    )
+    good = f"Every parameter is narrower than its prior; {worst} is the least certain one."
+    return judge(scope, "identifiability", ratios[worst], PRIOR_ONLY, good, bad)
 
 
 def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
@@ -148,25 +144,24 @@ def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdic
         return {part.partition(" (")[0] for part in direction.split(" + ")}
 
     silent = [direction for direction in posterior.null if not names(direction) & set(nuisance)]
-    if silent:
-        why = (
-            f"The data leave {'; '.join(silent)} to the prior: parameters named together cannot be "
-            "told apart. Record motion in which they act differently, or choose a simpler rung."
-        )
-        return Verdict(scope, "null-directions", "fail", float(len(silent)), 0.0, why)
+    bad = (
+        f"The data leave {'; '.join(silent)} to the prior: the effects of parameters named "
+        "together are not distinguishable. Record motion in which they act differently, or choose "
+        "a simpler model."
+    )
     mixed = [direction for direction in posterior.null if names(direction) - set(nuisance)]
-    why = "The data speak in every direction of the law's parameters."
+    good = "The data determine every direction of the model's parameters."
     if mixed:
-        why = f"Only together with what describes the noise is anything left open: {mixed[0]}."
-    return Verdict(scope, "null-directions", "pass", 0.0, 0.0, why)
+        good = f"Only combinations with noise parameters are left open: {mixed[0]}."
+    return judge(scope, "null-directions", len(silent), 0.0, good, bad)
 
 
-def _varied(scope: str, what: str, chosen: Climbed, bins: Bins, contact: Array) -> Verdict:
+def _varied(scope: str, what: str, chosen: FittedCandidate, bins: Bins, contact: Array) -> Verdict:
     """Whether strokes differ in what the law is to be used over: speed, and where it is met."""
     labels = np.unique(chosen.strokes)
     if len(labels) < 2:
         why = (
-            "There is one stroke only, so nothing says that another would agree: record several, "
+            "There is one stroke only, so nothing shows that another would agree: record several, "
             "in both directions and at several speeds."
         )
         return Verdict(scope, "strokes", "fail", float(len(labels)), 2.0, why)
@@ -180,14 +175,13 @@ def _varied(scope: str, what: str, chosen: Climbed, bins: Bins, contact: Array) 
     same = [] if ratio >= OTHER_SPEED else [f"speed (all near {fast:.2g})"]
     if what == "cut" and not reach >= OTHER_CONTACT_M:
         same.append("where the material is met along the blades")
-    if not same:
-        why = f"Strokes differ in what matters: speeds by a factor of {ratio:.3g}."
-        return Verdict(scope, "strokes", "pass", ratio, OTHER_SPEED, why)
     status: Status = "fail" if what == "friction" or len(same) == 2 else "not_evaluated"
     why = (
-        f"Strokes are alike in {' and '.join(same)}, so the fit says nothing of others: record "
-        "some that differ in it."
+        f"Strokes do not differ in {' and '.join(same)}, so the fit says nothing of other ones: "
+        "record some that differ in it."
     )
+    if not same:
+        status, why = "pass", f"Speeds of strokes differ by a factor of {ratio:.3g}."
     return Verdict(scope, "strokes", status, ratio, OTHER_SPEED, why)
 
 
@@ -200,7 +194,7 @@ def _spread(speeds: Array) -> tuple[float, float]:
 
 def _independent(
     scope: str,
-    chosen: Climbed,
+    chosen: FittedCandidate,
     diagnostics: Mapping[str, Any],
     held_out: tuple[StrokeError, ...],
 ) -> Verdict:
@@ -217,18 +211,16 @@ def _independent(
             f"{diagnostics['observations']} segments of the path leave residuals that are worth "
             f"{count:.0f} independent ones; the likelihood takes them as its noise has them."
         )
-    if per >= FEWEST_INDEPENDENT:
-        return Verdict(scope, "whiteness", "pass", per, FEWEST_INDEPENDENT, why)
     unseen = _median_error(held_out)
-    if unseen is not None and unseen < HELD_OUT_LIMIT:
+    if per < FEWEST_INDEPENDENT and unseen is not None and unseen < HELD_OUT_LIMIT:
         why += (
             f" That is few for this many parameters, yet unseen strokes are predicted to "
-            f"{unseen:.1%}, so the fit stands: longer or more varied motion would narrow its "
+            f"{unseen:.1%}, so the fit may be used: longer or more varied motion would narrow its "
             "intervals."
         )
-        return Verdict(scope, "whiteness", "not_evaluated", per, FEWEST_INDEPENDENT, why)
-    why += " That is too few for this many parameters: record longer or more varied motion."
-    return Verdict(scope, "whiteness", "fail", per, FEWEST_INDEPENDENT, why)
+        return not_evaluated(scope, "whiteness", why, FEWEST_INDEPENDENT, per)
+    bad = f"{why} That is too few for this many parameters: record longer or more varied motion."
+    return judge(scope, "whiteness", per, FEWEST_INDEPENDENT, why, bad)
 
 
 def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
@@ -241,9 +233,9 @@ def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
 def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
     r2 = diagnostics["r_squared"]
     if r2 > 0:
-        why = f"The law explains {r2:.1%} of the variance of what was measured."
+        why = f"The model explains {r2:.1%} of the variance of what was measured."
         return Verdict(scope, "r-squared", "pass", r2, 0.0, why)
-    why = "The law is worse than a constant; check signs and units, and what was recorded."
+    why = "The model is no better than a constant: check signs, units and what was recorded."
     return Verdict(scope, "r-squared", "fail", r2, 0.0, why)
 
 
@@ -251,11 +243,10 @@ def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
     median = _median_error(held_out)
     if median is None:
         why = "Only one stroke was recorded, so none can be held out: record several."
-        return Verdict(scope, "held-out", "not_evaluated", None, HELD_OUT_LIMIT, why)
+        return not_evaluated(scope, "held-out", why, HELD_OUT_LIMIT)
     worst = max(held_out, key=lambda error: error.relative_rms)
     why = (
-        f"On strokes it had not seen the law is off by {median:.1%} (median, rms); "
-        f"worst is stroke {worst.stroke} with {worst.relative_rms:.1%}."
+        f"On held-out strokes the error is {median:.1%} (median rms); the worst is stroke "
+        f"{worst.stroke} with {worst.relative_rms:.1%}."
     )
-    status: Status = "pass" if median < HELD_OUT_LIMIT else "fail"
-    return Verdict(scope, "held-out", status, median, HELD_OUT_LIMIT, why)
+    return judge(scope, "held-out", median, HELD_OUT_LIMIT, why)

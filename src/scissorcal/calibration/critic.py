@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Climbed, beaten, split_strokes
+from scissorcal.calibration.candidates import is_positive
+from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.result import Proposal
 from scissorcal.inference import gradient, ljung_box
 from scissorcal.model.terms import TERMS, Motion, Term, evaluate
@@ -41,7 +42,7 @@ class Critique:
 
 def criticise(
     what: Literal["friction", "cut"],
-    chosen: Climbed,
+    chosen: FittedCandidate,
     motion: Motion,
     joint: Joint,
     rng: np.random.Generator,
@@ -55,7 +56,7 @@ def criticise(
     search is repeated over resamples of whole strokes, never of single bins, whose errors depend
     on each other; strokes longer than most count as several, lest all excited motion be missing
     from every third resample. A term is proposed where it is found in at least ``RECURS`` of them,
-    and lowers the error on unseen strokes consistently (:func:`~.ladder.beaten`) and by
+    and lowers the error on unseen strokes consistently (:func:`~.candidates.is_positive`) and by
     ``LEAST_GAIN`` at least, the law's parameters being refitted with it, by one Gauss-Newton step,
     as they are without it.
 
@@ -81,7 +82,7 @@ def criticise(
     for index in _search(table, np.ones(pieces)):
         inclusion = float(np.mean([bool(twins[index] & set(support)) for support in found]))
         gain, nats = _held_out(table, accepted, index)
-        if inclusion < RECURS or not beaten(nats) or gain < LEAST_GAIN:
+        if inclusion < RECURS or not is_positive(nats) or gain < LEAST_GAIN:
             continue
         accepted.append(index)
         proposals.append(
@@ -123,11 +124,13 @@ def _candidates(motion: Motion, joint: Joint) -> tuple[Term, ...]:
     )
 
 
-def _tabulate(chosen: Climbed, motion: Motion, terms: Sequence[Term], labels: Integers) -> _Table:
+def _tabulate(
+    chosen: FittedCandidate, motion: Motion, terms: Sequence[Term], labels: Integers
+) -> _Table:
     """Reduce all bins to products by stroke, leaving out terms that the law has already."""
     point = chosen.optimum.point
-    residuals = chosen.rung.likelihood.residuals
-    slopes = -gradient(residuals, point, 1e-3 * chosen.rung.layout.sd)
+    residuals = chosen.candidate.likelihood.residuals
+    slopes = -gradient(residuals, point, 1e-3 * chosen.candidate.layout.sd)
     law = slopes[:, np.any(slopes != 0, axis=0)]
     law = law / _rms(law)
     columns = evaluate(tuple(term.name for term in terms), motion)
@@ -261,7 +264,7 @@ def _held_out(table: _Table, accepted: Sequence[int], index: int) -> tuple[float
 
 def _propose(
     what: Literal["friction", "cut"],
-    chosen: Climbed,
+    chosen: FittedCandidate,
     table: _Table,
     accepted: Sequence[int],
     twins: set[int],
@@ -280,13 +283,13 @@ def _propose(
     coefficient = float(solution[-1] / table.scale[index])
     coefficient_sd = float(sd[-1] / table.scale[index])
     unit = term.unit(joint.position_unit, joint.effort_unit)
-    adopted = [str(name) for name in chosen.rung.key.get("adopt", ())]
+    adopted = [str(name) for name in chosen.candidate.key.get("adopt", ())]
     adopted += [table.terms[i].name for i in accepted]
     adoptable = what == "friction" and term.adoptable
     line = f"fit.friction.adopt = {json.dumps(adopted)}" if adoptable else ""
-    how = f"adopt it by {line}" if line else f"no rung of a {what} fit has it yet"
+    how = f"adopt it by {line}" if line else f"no {what} candidate has it yet"
     sentence = (
-        f"{chosen.rung.name} leaves {coefficient:.3g} {unit} times {term.name} ({term.meaning}) "
+        f"{chosen.name} leaves {coefficient:.3g} {unit} times {term.name} ({term.meaning}) "
         f"unexplained: found in {inclusion:.0%} of the resamples of strokes, and it lowers the "
         f"error on unseen strokes by {gain:.1%} ({nats.sum():.0f} nats); {how}."
     )

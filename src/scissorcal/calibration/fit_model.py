@@ -5,7 +5,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Rung
+from scissorcal.calibration.fit_candidate import Candidate
 from scissorcal.calibration.parameters import Layout
 
 Array = NDArray[np.float64]
@@ -40,8 +40,8 @@ class Experiment(Protocol):
     @property
     def nuisance(self) -> tuple[str, ...]: ...
 
-    def rung(self, measured: Array) -> Rung:
-        """Give the fit's rung over other outcomes (n,) of the same design."""
+    def candidate(self, measured: Array) -> Candidate:
+        """Give the fit's candidate over other outcomes (n,) of the same design."""
         ...
 
     def mean(self, u: Array) -> Array:

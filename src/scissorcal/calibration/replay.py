@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Climbed
+from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.result import ReplayComparison, ReplayRow
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import find_optimum
@@ -60,7 +60,7 @@ def replay_from_stroke(opening: Array, torque: Array, knots: int = KNOTS) -> Rep
 
 
 def compare_with_replay(
-    chosen: Climbed,
+    chosen: FittedCandidate,
     bins: Bins,
     measured: Array,
     contact: Array,
@@ -141,11 +141,11 @@ def _replayed(
     return np.array(left)
 
 
-def _one_stroke(chosen: Climbed, label: int) -> Array:
+def _one_stroke(chosen: FittedCandidate, label: int) -> Array:
     """Residuals (n,) of the law fitted to one stroke alone."""
-    problem = chosen.rung.problem(chosen.series, chosen.strokes == label)
+    problem = chosen.candidate.problem(chosen.series, chosen.strokes == label)
     found = find_optimum(problem, chosen.optimum.point[None, :])
-    return chosen.rung.likelihood.residuals(found.point)
+    return chosen.candidate.likelihood.residuals(found.point)
 
 
 def _novelty(bins: Bins, contact: Array, base: NDArray[np.intp], here: NDArray[np.intp]) -> str:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, seen
-from scissorcal.calibration.camera.candidates import RUNGS, climb
+from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, guess, seen_region
 from scissorcal.calibration.camera.pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.calibration.camera.store import load_camera, save_camera
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 1280, 720
 TRUE = np.array([1150.0, 1150.0, 648.0, 354.0, -0.2, 0.05, 0.0008, -0.0005, 0.0, 0.0, 0.0])
 LENS = Lens(1150.0, (648.0, 354.0), WIDTH, HEIGHT, (-0.2, 0.05, 0.0008, -0.0005, 0.0))
-BROWN = RUNGS[3][1]
+BROWN = CANDIDATES[3][1]
 
 
 def photographs(
@@ -194,12 +194,12 @@ def test_the_model_has_as_many_coefficients_as_data_want(
     names = []
     for seed in range(3):
         photos = photographs(np.random.default_rng(100 + seed), 12, lens=lens)
-        rungs = climb(boards(photos), start, lambda _share, _sentence: None)
-        assert [rung.chosen for rung in rungs].count(True) == 1
-        names += [rung.name for rung in rungs if rung.chosen]
-    ladder = [name for name, _ in RUNGS]
+        compared = compare_cameras(boards(photos), start, lambda _share, _sentence: None)
+        assert [one.row.chosen for one in compared].count(True) == 1
+        names += [one.row.name for one in compared if one.row.chosen]
+    order = [name for name, _ in CANDIDATES]
     assert names.count(chosen) >= 2
-    assert min(ladder.index(name) for name in names) >= ladder.index(chosen)
+    assert min(order.index(name) for name in names) >= order.index(chosen)
 
 
 def test_what_a_model_holds_is_held() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.averaging import (
-    Candidate,
+    AveragedLaw,
     Inferred,
     average,
     by_load,
@@ -23,17 +23,17 @@ NO_LAYOUT = Layout(())
 
 
 @dataclass(frozen=True)
-class Rung:
+class Candidate:
     name: str
     prior_precision: np.ndarray
 
 
 @dataclass(frozen=True)
 class Fitted:
-    rung: Rung
+    candidate: Candidate
     optimum: object
     information: np.ndarray
-    alike: tuple[str, ...] = ()
+    equivalent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def fitted(name, data, names):
     size = len(names)
     optimum = find_optimum(problem(data, names))
     information = np.full((size, size), len(data) / DATA_SD**2)
-    return Fitted(Rung(name, np.eye(size)), optimum, information)
+    return Fitted(Candidate(name, np.eye(size)), optimum, information)
 
 
 def exact_log_evidence(data, size):
@@ -91,20 +91,20 @@ def pair(data):
 
 def test_laws_are_weighed_by_their_evidence_the_richest_first():
     data = np.array([0.4, -0.2, 0.9, 0.5])
-    climbed = pair(data)
-    candidates = by_load(climbed[0][0], climbed)
-    assert [c.design.law.loaded for c in candidates] == [True, False]
+    compared = pair(data)
+    laws = by_load(compared[0][0], compared)
+    assert [c.design.law.loaded for c in laws] == [True, False]
     odds = np.exp(exact_log_evidence(data, 2) - exact_log_evidence(data, 1))
-    assert candidates[0].probability == pytest.approx(odds / (1.0 + odds), abs=1e-6)
-    assert sum(c.probability for c in candidates) == pytest.approx(1.0)
-    (note,) = load_note(candidates)
-    assert f"{candidates[0].probability:.0%} probable" in note
+    assert laws[0].probability == pytest.approx(odds / (1.0 + odds), abs=1e-6)
+    assert sum(c.probability for c in laws) == pytest.approx(1.0)
+    (note,) = load_note(laws)
+    assert f"{laws[0].probability:.0%} probable" in note
 
 
 def test_an_improbable_law_is_left_out():
     data = np.full(40, 9.0)
-    climbed = pair(data)
-    (only,) = by_load(climbed[0][0], climbed)
+    compared = pair(data)
+    (only,) = by_load(compared[0][0], compared)
     assert only.design.law.loaded
     assert only.probability == 1.0
     assert load_note([only]) == ()
@@ -114,33 +114,33 @@ def test_a_share_below_zero_is_no_friction():
     data = np.array([-0.9, -1.4, -1.1])
     (plain, design), (loaded, other) = pair(data)
     shares = tuple(Parameter(n, "1", "identity", 0.0, 1.0, "") for n in ("a", "load_share"))
-    climbed = [(plain, design), (loaded, replace(other, layout=Layout(shares)))]
+    compared = [(plain, design), (loaded, replace(other, layout=Layout(shares)))]
     assert loaded.optimum.point[1] < 0.0
-    (only,) = by_load(loaded, climbed)
-    assert only.climbed.rung.name == "plain"
+    (only,) = by_load(loaded, compared)
+    assert only.fitted.candidate.name == "plain"
     assert only.probability == 1.0
 
 
 def test_a_law_without_a_twin_stands_alone():
-    climbed = pair(np.array([0.4, -0.2]))[:1]
-    assert [c.climbed.rung.name for c in by_load(climbed[0][0], climbed)] == ["plain"]
+    compared = pair(np.array([0.4, -0.2]))[:1]
+    assert [c.fitted.candidate.name for c in by_load(compared[0][0], compared)] == ["plain"]
 
 
 def test_draws_come_from_each_law_as_often_as_it_is_probable():
     data = np.array([0.4, -0.2, 0.9, 0.5])
-    climbed = pair(data)
+    compared = pair(data)
     rng = np.random.default_rng(5)
 
-    def infer_one(candidate: Candidate) -> Inferred:
-        names = ("a", "b") if candidate.design.law.loaded else ("a",)
-        return Inferred(candidate, infer(problem(data, names), "standard", rng, count=1000), None)
+    def infer_one(law: AveragedLaw) -> Inferred:
+        names = ("a", "b") if law.design.law.loaded else ("a",)
+        return Inferred(law, infer(problem(data, names), "standard", rng, count=1000), None)
 
-    loaded, plain = by_load(climbed[0][0], climbed)
+    loaded, plain = by_load(compared[0][0], compared)
     inferred = average([loaded, plain], infer_one, rng)
-    found, best = inferred.posterior, inferred.candidate.climbed.optimum.point
+    found, best = inferred.posterior, inferred.law.fitted.optimum.point
     assert plain.probability > loaded.probability
     assert best[1] == 0.0
-    assert best[0] == pytest.approx(plain.climbed.optimum.point[0], abs=1e-4)
+    assert best[0] == pytest.approx(plain.fitted.optimum.point[0], abs=1e-4)
     assert found.names == ("a", "b")
     without = np.mean(found.draws[:, 1] == 0.0)
     assert without == pytest.approx(plain.probability, abs=1e-3)

@@ -1,4 +1,4 @@
-"""A blade's edge from its points: the ladder, its honesty, nicks, several photographs, the file."""
+"""A blade's edge from its points: comparison, intervals, nicks, several photographs, the file."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.edge import fit as edge_fit
-from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS, climb_edge_ladder
+from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.edge.fit import fit_blade, merged_nicks
 from scissorcal.calibration.edge.model import (
@@ -84,24 +84,24 @@ def measurement(rng, nicks=(), *, metric=True, source="a.jpg"):
 @pytest.mark.parametrize("family", ["line", "arc", "cubic", "spline"])
 def test_the_family_is_found_and_the_edge_within_its_intervals(family):
     rng = np.random.default_rng(3)
-    ladder = climb_edge_ladder((cells(family, rng),), LENGTH, "draft", rng)
-    best = ladder.best
+    compared = compare_edges((cells(family, rng),), LENGTH, "draft", rng)
+    best = compared.best
     order = ["line", "arc", "cubic", "spline"]
     assert order.index(best.family) >= order.index(family)
     assert (best.family == "spline") == (family == "spline")
     s = np.linspace(0.15, 0.95, 9) * LENGTH
-    draws = ladder.belief.with_values(ladder.draws).offset_at(s)
+    draws = compared.belief.with_values(compared.draws).offset_at(s)
     z = (draws.mean(axis=0) - shape(family, s)) / draws.std(axis=0)
     assert np.abs(z).max() < 3.5
     # the belief is what the draws are
-    np.testing.assert_allclose(ladder.belief.edge.offset_at(s), draws.mean(axis=0), atol=1e-8)
+    np.testing.assert_allclose(compared.belief.edge.offset_at(s), draws.mean(axis=0), atol=1e-8)
 
 
-def test_poorer_rungs_are_refuted_by_evidence_and_not_chosen():
+def test_simpler_families_that_the_evidence_rejects_are_not_chosen():
     rng = np.random.default_rng(4)
-    ladder = climb_edge_ladder((cells("arc", rng),), LENGTH, "draft", rng, ("line", "arc"))
-    assert ladder.best.family == "arc"
-    assert ladder.scores[1].evidence > ladder.scores[0].evidence + 20.0
+    compared = compare_edges((cells("arc", rng),), LENGTH, "draft", rng, ("line", "arc"))
+    assert compared.best.family == "arc"
+    assert compared.scores[1].evidence > compared.scores[0].evidence + 20.0
 
 
 @pytest.mark.parametrize("family", ["cubic", "spline"])
@@ -124,22 +124,22 @@ def test_photographs_of_two_blades_end_within_a_stated_number_of_evaluations():
     rng = np.random.default_rng(16)
     one, other = (cells("arc", rng, noise=4e-5, count=80, photo=f"{k}.jpg") for k in range(2))
     other = replace(other, offset=other.offset + 0.004 + 0.05 * other.station)
-    ladder = climb_edge_ladder((one, other), LENGTH, "standard", rng)
-    assert ladder.status.trusted
-    assert ladder.evaluations < 4 * (2 * SEARCH_EVALUATIONS + 12) + MOST_EVALUATIONS["standard"]
+    compared = compare_edges((one, other), LENGTH, "standard", rng)
+    assert compared.status.trusted
+    assert compared.evaluations < 4 * (2 * SEARCH_EVALUATIONS + 12) + MOST_EVALUATIONS["standard"]
     # in fact a twelfth of that
-    assert ladder.evaluations < 2500
-    assert ladder.best.between_m > 5e-4
+    assert compared.evaluations < 2500
+    assert compared.best.between_m > 5e-4
 
 
 def test_draws_that_cannot_be_trusted_fail_a_verdict(monkeypatch):
     rng = np.random.default_rng(17)
-    real = edge_fit.climb_edge_ladder
+    real = edge_fit.compare_edges
 
     def heavy(*arguments, **named):
         return replace(real(*arguments, **named), status=SamplingStatus.HEAVY_WEIGHTS)
 
-    monkeypatch.setattr(edge_fit, "climb_edge_ladder", heavy)
+    monkeypatch.setattr(edge_fit, "compare_edges", heavy)
     fit = fit_blade([measurement(rng)], None, effort="draft", rng=rng)
     verdict = next(v for v in fit.verdicts if v.check == "sizes of the errors")
     assert verdict.status == "fail"
@@ -169,8 +169,8 @@ def test_intervals_hold_what_they_say_over_many_blades():
     held = []
     for seed in range(120):
         rng = np.random.default_rng([9, seed])
-        ladder = climb_edge_ladder((cells("arc", rng),), LENGTH, "draft", rng, ("arc", "cubic"))
-        edges = ladder.belief.with_values(ladder.draws)
+        compared = compare_edges((cells("arc", rng),), LENGTH, "draft", rng, ("arc", "cubic"))
+        edges = compared.belief.with_values(compared.draws)
         s = 0.6 * LENGTH
         low, high = np.quantile(edges.offset_at(s), [0.05, 0.95])
         slopes = np.quantile(edges.slope_at(s), [0.05, 0.95])
@@ -188,8 +188,8 @@ def test_several_photographs_share_what_is_shared_and_average_what_is_not():
             cells("line", rng, moved=8e-6, count=30, shared=shared, photo=f"{k}.jpg")
             for k in range(count)
         )
-        ladder = climb_edge_ladder(every, LENGTH, "draft", rng, ("line",))
-        draws = ladder.belief.with_values(ladder.draws)
+        compared = compare_edges(every, LENGTH, "draft", rng, ("line",))
+        draws = compared.belief.with_values(compared.draws)
         return float(draws.offset_at(0.5 * LENGTH).std())
 
     one, four = sd_of(1), sd_of(4)

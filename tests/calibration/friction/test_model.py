@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, friction_experiment
-from scissorcal.calibration.candidates import optimum_of
 from scissorcal.inference import find_optimum, fit_ar
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.truth import Truth, friction_recording
@@ -23,9 +22,9 @@ def fitted():
 
 def test_the_fit_again_from_its_design_is_the_fit(fitted):
     fit, experiment = fitted
-    rung = pickle.loads(pickle.dumps(experiment)).rung(experiment.observed)
+    rung = pickle.loads(pickle.dumps(experiment)).candidate(experiment.observed)
     assert rung.name == fit.rung
-    optimum = optimum_of(rung, experiment.series)
+    optimum = rung.optimum(experiment.series)
     wanted = [i for i, n in enumerate(rung.layout.names) if n not in experiment.nuisance]
     natural = rung.layout.columns(optimum.point)[wanted]
     assert natural == pytest.approx(fit.map_point, rel=1e-6)
@@ -33,17 +32,17 @@ def test_the_fit_again_from_its_design_is_the_fit(fitted):
 
 def test_the_search_over_products_ends_where_a_search_over_bins_does(fitted):
     _, experiment = fitted
-    rung = experiment.rung(experiment.observed)
+    rung = experiment.candidate(experiment.observed)
     slow = find_optimum(rung.problem(experiment.series))
-    assert optimum_of(rung, experiment.series).value > slow.value - 1e-3
+    assert rung.optimum(experiment.series).value > slow.value - 1e-3
 
 
 def test_simulated_data_have_the_priors_of_the_original(fitted):
     _, experiment = fitted
-    u = experiment.rung(experiment.observed).starts[0]
+    u = experiment.candidate(experiment.observed).starts[0]
     residuals = experiment.observed - experiment.mean(u)
     noise = fit_ar(residuals, experiment.series)
     rng = np.random.default_rng(3)
     simulated = 2 * experiment.mean(u) + noise.draw(experiment.series, rng)
-    assert np.array_equal(experiment.rung(simulated).prior_mean, experiment.layout.mean)
+    assert np.array_equal(experiment.candidate(simulated).prior_mean, experiment.layout.mean)
     assert simulated.shape == experiment.strokes.shape == experiment.observed.shape

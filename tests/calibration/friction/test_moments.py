@@ -45,7 +45,7 @@ def experiment(windows, law: str, symmetric: bool = False, cogging: float = 120.
 @pytest.mark.parametrize("symmetric", [False, True])
 def test_products_give_the_likelihood_of_the_bins(windows, law, symmetric):
     one = experiment(windows, law, symmetric)
-    rung = one.rung(one.observed)
+    rung = one.candidate(one.observed)
     reduced, layout = rung.reduced, rung.layout
     rng = np.random.default_rng(3)
     draws = rung.starts[0] + 0.3 * layout.sd * rng.standard_normal((4, len(layout.names)))
@@ -61,7 +61,7 @@ def test_products_give_the_likelihood_of_the_bins(windows, law, symmetric):
 @pytest.mark.parametrize("law", LAWS)
 def test_slopes_are_those_of_the_likelihood(windows, law):
     one = experiment(windows, law)
-    rung = one.rung(one.observed)
+    rung = one.candidate(one.observed)
     reduced, point = rung.reduced, rung.starts[0]
     step = 1e-3 * np.ones(len(point))
     wanted = gradient(lambda u: np.array([reduced.log_likelihood(u)]), point, step)[0]
@@ -70,7 +70,7 @@ def test_slopes_are_those_of_the_likelihood(windows, law):
 
 def test_leaving_strokes_out_is_leaving_their_bins_out(windows):
     one = experiment(windows, "stribeck+angle")
-    rung = one.rung(one.observed)
+    rung = one.candidate(one.observed)
     point, gone = rung.starts[0], np.unique(one.strokes)[::3]
     terms = rung.likelihood.terms(point)[~np.isin(one.strokes, gone)]
     rest = rung.reduced.without(gone)
@@ -106,7 +106,7 @@ def test_the_scan_finds_a_length_far_from_every_start(length):
     ways = np.sign(windows.bins.rate)
     strokes = np.cumsum(np.diff(ways, prepend=ways[:1]) != 0)
     one = design(windows, strokes, "coulomb+presliding", True, recording.joint)
-    rung = one.rung(one.observed)
+    rung = one.candidate(one.observed)
     problem = rung.problem(one.series)
     found = search(problem)
     values = one.layout.natural(found.point)

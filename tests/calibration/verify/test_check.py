@@ -30,7 +30,7 @@ def made(rho: float, naive: bool = False, change: float = 0.0) -> Linear:
 
 
 def fit_of(experiment: Linear) -> FitResult:
-    problem = experiment.rung(experiment.observed).problem(experiment.series)
+    problem = experiment.candidate(experiment.observed).problem(experiment.series)
     return as_fit(experiment, infer(problem, "standard", np.random.default_rng(0), count=1000))
 
 

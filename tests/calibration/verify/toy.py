@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Likelihood, Rung
+from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.calibration.stated_prior import StatedPrior
@@ -34,7 +34,7 @@ LAYOUT = Layout(
 )
 
 
-class Naive(Rung):
+class Naive(Candidate):
     """A rung whose fit takes every bin for independent, whatever the noise."""
 
     def problem(self, *given: Any, **named: Any) -> Problem:
@@ -57,14 +57,14 @@ class Linear:
     def mean(self, u: Array) -> Array:
         return np.asarray(self.design @ np.array([u[0], u[1], np.exp(u[2])]))
 
-    def rung(self, measured: Array) -> Rung:
+    def candidate(self, measured: Array) -> Candidate:
         def residuals(u: Array) -> Array:
             return measured - self.mean(u)
 
         def normal(u: Array) -> tuple[Array, Array]:
             return residuals(u) / np.exp(u[3]), np.full(BINS, u[3])
 
-        return (Naive if self.naive else Rung)(
+        return (Naive if self.naive else Candidate)(
             name="linear",
             key={},
             layout=LAYOUT,
@@ -94,7 +94,7 @@ class LinearSimulator:
         self, data: Array, prior: StatedPrior, effort: Effort, rng: np.random.Generator
     ) -> FitResult:
         experiment = replace(self.experiment, observed=data)
-        rung = experiment.rung(data)
+        rung = experiment.candidate(data)
         rung = replace(
             rung,
             prior_mean=prior.layout(LAYOUT).mean,

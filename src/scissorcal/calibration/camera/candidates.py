@@ -1,7 +1,8 @@
-"""The ladder of camera models, cheap to rich, judged on photographs they have not seen."""
+"""Candidate camera models, simplest first, compared on photographs they have not seen."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from scissorcal.calibration.camera.bundle import (
     fit_bundle,
     fit_pose,
 )
+from scissorcal.calibration.camera.uncertainty import camera_covariance
+from scissorcal.calibration.candidates import Account, CandidateRow, compare
 from scissorcal.vision.geometry.camera import PARAMETERS
 
 Array = NDArray[np.float64]
@@ -32,7 +35,7 @@ def _structure(*camera: tuple[str, ...]) -> Structure:
     return Structure(tuple(group[0] if len(group) == 1 else "f" for group in groups), spread)
 
 
-RUNGS: tuple[tuple[str, Structure], ...] = (
+CANDIDATES: tuple[tuple[str, Structure], ...] = (
     ("no distortion", _structure(*_SQUARE)),
     ("k1", _structure(*_SQUARE, ("k1",))),
     ("k1, k2", _structure(*_SQUARE, ("k1",), ("k2",))),
@@ -43,56 +46,49 @@ RUNGS: tuple[tuple[str, Structure], ...] = (
     ),
     ("k1, k2, p1, p2, k3, oblong pixels", _structure(*((name,) for name in PARAMETERS))),
 )
-"""Pixels are square (fx = fy) but on the upper two rungs. The board may bulge on every rung."""
+"""Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One camera model on all photographs, and on those it had not seen.
+class CameraCandidate:
+    """One camera model fitted to all photographs; ``unseen_px`` is its rms on unseen ones."""
 
-    ``unseen_px`` is the rms there, ``behind`` (views,) the negative log-likelihood of each left-out
-    photograph less that of the best rung.
-    """
-
-    name: str
+    row: CandidateRow
     bundle: Bundle
     unseen_px: float
-    behind: Array
-    equivalent: bool = False
-    chosen: bool = False
+
+    def as_row(self) -> dict[str, Any]:
+        """The row that reports and files hold."""
+        row = asdict(self.row)
+        return {"free": row.pop("parameters"), "unseen_px": self.unseen_px, **row}
 
 
-def climb(
+def compare_cameras(
     views: Sequence[SeenBoard], start: Array, tell: Callable[[float, str], None]
-) -> tuple[Rung, ...]:
-    """Fit every rung to all photographs, and to all but each fifth part of them in turn.
+) -> tuple[CameraCandidate, ...]:
+    """Fit every model to all photographs, and to all but each fifth part of them in turn.
 
-    A rung counts as good as the best where it is behind by less than one standard error of the
-    paired differences over photographs. The cheapest such is chosen: what a richer one gains, the
-    data cannot tell from chance.
+    Models are compared by :func:`~.calibration.candidates.compare`, photographs being the units.
+    The log density of a photograph counts as many corners as err independently: its share is one
+    over the squared stretch that :func:`camera_covariance` finds.
     """
-    shared = start
-    bundles = []
-    for _, structure in RUNGS:
+    shared, bundles = start, []
+    for _, structure in CANDIDATES:
         bundles.append(fit_bundle(views, structure, shared))
         shared = bundles[-1].shared
-    sd = bundles[-1].sd_px
-    losses, errors = [], []
-    for index, (name, structure) in enumerate(RUNGS):
-        tell(0.8 * index / len(RUNGS), f"camera: {name}")
+    densities, errors = [], []
+    for index, (name, structure) in enumerate(CANDIDATES):
+        tell(0.8 * index / len(CANDIDATES), f"camera: {name}")
         residuals = unseen_residuals(views, structure, bundles[index])
-        losses.append(np.array([_surprise(residual, sd) for residual in residuals]))
+        densities.append([_log_density(residual, bundles[-1].sd_px) for residual in residuals])
         errors.append(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2) * 2.0)))
-    best = losses[int(np.argmin([loss.mean() for loss in losses]))]
-    rows = []
-    chosen = False
-    for (name, _), bundle, loss, error in zip(RUNGS, bundles, losses, errors, strict=True):
-        behind = loss - best
-        spread = float(behind.std(ddof=1)) / np.sqrt(len(views))
-        equivalent = float(behind.mean()) <= spread
-        rows.append(Rung(name, bundle, error, behind, equivalent, equivalent and not chosen))
-        chosen = chosen or equivalent
-    return tuple(rows)
+    share = camera_covariance(bundles[-1]).stretch ** -2
+    rows = compare(
+        [name for name, _ in CANDIDATES],
+        [len(structure.names) for _, structure in CANDIDATES],
+        [Account(share * np.array(densities))],
+    )
+    return tuple(map(CameraCandidate, rows, bundles, errors))
 
 
 def unseen_residuals(
@@ -111,7 +107,7 @@ def unseen_residuals(
     return found
 
 
-def _surprise(residual: Array, sd: float) -> float:
-    """Negative log-likelihood of corner errors under the fit's Student-t, but for a constant."""
+def _log_density(residual: Array, sd: float) -> float:
+    """Log density of corner errors under the fit's Student-t, up to a constant."""
     nu = DEGREES_OF_FREEDOM
-    return float(0.5 * (nu + 2.0) * np.sum(np.log1p(np.sum(residual**2, axis=1) / (nu * sd**2))))
+    return -float(0.5 * (nu + 2.0) * np.sum(np.log1p(np.sum(residual**2, axis=1) / (nu * sd**2))))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, first_pose
 from scissorcal.calibration.camera.result import CrossValidation, PixelMap, ViewError
 from scissorcal.errors import VerdictError
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.geometry.camera import Camera
 
 Array = NDArray[np.float64]
@@ -73,10 +73,9 @@ def camera_verdicts(
 def _focal(camera: Camera) -> Verdict:
     assert camera.covariance is not None
     sd = float(np.sqrt(camera.covariance[0, 0])) / camera.fx
-    good = sd <= MOST_FOCAL_SHARE
-    mend = "" if good else " Add photographs with the board tilted by 20 to 45 deg, every way."
-    why = f"The focal length, {camera.fx:.1f} px, is known to {100 * sd:.2f} %.{mend}"
-    return _verdict("focal length", good, sd, MOST_FOCAL_SHARE, why)
+    why = f"The focal length, {camera.fx:.1f} px, is known to {100 * sd:.2f} %."
+    remedy = " Add photographs with the board tilted by 20 to 45 deg, every way."
+    return judge(_SCOPE, "focal length", sd, MOST_FOCAL_SHARE, why, why + remedy)
 
 
 def _outlying(views: Sequence[ViewError]) -> Verdict:
@@ -84,61 +83,53 @@ def _outlying(views: Sequence[ViewError]) -> Verdict:
     middle = float(np.median([view.rms_px for view in views]))
     ratio = worst.rms_px / middle
     named = [view.name for view in views if view.outlying]
-    facts = f"The worst photograph, {worst.name}, fits to {worst.rms_px:.2f} px, the middle one to"
-    if named:
-        why = (
-            f"{facts} {middle:.2f} px. Look at the overlay of {', '.join(named)}: retake it, or "
-            "remove it from its capture's folder."
-        )
-    else:
-        why = f"{facts} {middle:.2f} px."
-    return _verdict("views", not named, ratio, OUTLYING, why)
+    why = (
+        f"The worst photograph, {worst.name}, fits to {worst.rms_px:.2f} px, the middle one to "
+        f"{middle:.2f} px."
+    )
+    remedy = (
+        f" Look at the overlay of {', '.join(named)}: retake it, or remove it from its capture's "
+        "folder."
+    )
+    return judge(_SCOPE, "views", ratio, OUTLYING, why, why + remedy)
 
 
 def _corners(views: Sequence[ViewError]) -> Verdict:
     count = sum(view.corners for view in views)
-    good = count >= FEWEST_CORNERS
     why = f"{count} corners were seen in {len(views)} photographs"
-    why += "." if good else f"; {FEWEST_CORNERS} are wanted: add photographs."
-    return _verdict("corners", good, float(count), float(FEWEST_CORNERS), why)
+    remedy = f"{why}; {FEWEST_CORNERS} are wanted: add photographs."
+    return judge(_SCOPE, "corners", count, FEWEST_CORNERS, f"{why}.", remedy)
 
 
 def _coverage(share: float) -> Verdict:
-    good = share >= LEAST_SHARE
     why = f"Corners were seen over {100 * share:.0f} % of the picture"
-    why += "." if good else ": bring the board into its corners too, and nearer."
-    return _verdict("coverage", good, share, LEAST_SHARE, why)
+    remedy = f"{why}: bring the board into its corners too, and nearer."
+    return judge(_SCOPE, "coverage", share, LEAST_SHARE, f"{why}.", remedy)
 
 
 def _projection(places: PixelMap) -> Verdict:
     inside = places.sd_px[places.inside]
     worst = float(np.nanmax(inside)) if inside.size else float("nan")
     outside = float(np.nanmax(places.sd_px))
-    good = worst <= MOST_SD_PX
     why = (
         f"A projected point is known to {worst:.2f} px (sd) at worst where corners were seen, to "
         f"{outside:.2f} px at worst in the whole picture."
     )
-    return _verdict("projection", good, worst, MOST_SD_PX, why)
+    return judge(_SCOPE, "projection", worst, MOST_SD_PX, why)
 
 
 def _halves(cross: CrossValidation | None) -> Verdict:
     check = "two halves"
     if cross is None:
         why = "Six photographs at least are needed to fit two halves apart."
-        return Verdict(_SCOPE, check, "not_evaluated", None, None, why)
-    good = cross.p_value >= LEAST_P
+        return not_evaluated(_SCOPE, check, why)
     why = (
         f"Two halves of the photographs differ by {cross.rms_px:.2f} px (rms) where corners were "
-        f"seen; their covariances let expect {cross.claimed_px:.2f} px (p = {cross.p_value:.3f})."
+        f"seen; {cross.claimed_px:.2f} px is expected from their covariances "
+        f"(p = {cross.p_value:.3f})."
     )
-    if not good:
-        why += " The board may be bent, or the lens moved (focus, zoom) between photographs."
-    return _verdict(check, good, cross.p_value, LEAST_P, why)
-
-
-def _verdict(check: str, good: bool, value: float, threshold: float, why: str) -> Verdict:
-    return Verdict(_SCOPE, check, "pass" if good else "fail", value, threshold, why)
+    remedy = " The board may be bent, or the lens moved (focus, zoom) between photographs."
+    return judge(_SCOPE, check, cross.p_value, LEAST_P, why, why + remedy)
 
 
 def _normals(poses: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, fit_bundle
-from scissorcal.calibration.camera.candidates import RUNGS, Rung, climb
+from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
 from scissorcal.calibration.camera.checks import (
     FEWEST_VIEWS,
     OUTLYING,
@@ -54,7 +54,7 @@ def fit_camera(
     """Fit focal length, centre and distortion, and say how well they are known.
 
     Corner errors follow a Student-t, so that a bad corner does little harm. The distortion model is
-    the cheapest that cannot be told from the best on photographs left out. The covariance counts
+    the simplest that photographs left out do not distinguish from the best. The covariance counts
     that the corners of one photograph err together. Photographs that fit far worse than the others
     are named, none is dropped.
 
@@ -69,10 +69,10 @@ def fit_camera(
     start = guess(width, height)
     refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
-    first = fit_bundle(views, RUNGS[0][1], np.append(start, [0.0, 0.0]))
+    first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))
     refuse_undetermined(first, width, height)
-    rungs = climb(views, first.shared, tell)
-    (chosen,) = (rung for rung in rungs if rung.chosen)
+    compared = compare_cameras(views, first.shared, tell)
+    (chosen,) = (one for one in compared if one.row.chosen)
     bundle = chosen.bundle
     refuse_undetermined(bundle, width, height)
     spread = camera_covariance(bundle)
@@ -85,8 +85,8 @@ def fit_camera(
         camera=camera,
         origin="fitted",
         board=photos[0].detection.board.name,
-        rung=chosen.name,
-        rungs=tuple(_row(rung) for rung in rungs),
+        rung=chosen.row.name,
+        rungs=tuple(one.as_row() for one in compared),
         draws=rng.multivariate_normal(bundle.camera, spread.covariance, _DRAWS, method="eigh"),
         views=rows,
         bulge_mm=(float(1e3 * bundle.shared[-2]), float(1e3 * bundle.shared[-1])),
@@ -154,18 +154,6 @@ def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ..
             )
         )
     return tuple(rows)
-
-
-def _row(rung: Rung) -> dict[str, object]:
-    return {
-        "name": rung.name,
-        "free": len(rung.bundle.structure.names),
-        "unseen_px": rung.unseen_px,
-        "behind": float(rung.behind.mean()),
-        "behind_se": float(rung.behind.std(ddof=1) / np.sqrt(len(rung.behind))),
-        "equivalent": rung.equivalent,
-        "chosen": rung.chosen,
-    }
 
 
 def _too_few(count: int) -> str:

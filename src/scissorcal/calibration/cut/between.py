@@ -35,7 +35,7 @@ def compare_cuts(
     """
     # One line is read off all recordings together, so it says nothing of their differences.
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
-    rung = replace(design.rung(design.observed), starts=point[None, :])
+    rung = replace(design.candidate(design.observed), starts=point[None, :])
 
     def own(here: Mask) -> Posterior:
         problem = rung.problem(design.series, here)

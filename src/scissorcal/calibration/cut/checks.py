@@ -1,5 +1,6 @@
 """Verdicts and notes that only a cut's fit has."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, failed
+from scissorcal.verdicts import Verdict, failed, judge
 
 Array = NDArray[np.float64]
 
@@ -31,14 +32,7 @@ def cut_verdicts(
     """Judge what the fit builds on, its sensors, its sheets and its line."""
     return (
         _foundations(friction, edge_verdicts),
-        Verdict(
-            "fit.cut",
-            sensors.verdict.check,
-            sensors.verdict.status,
-            sensors.verdict.value,
-            sensors.verdict.threshold,
-            sensors.verdict.why,
-        ),
+        replace(sensors.verdict, scope="fit.cut"),
         stale_verdict(count_empty(scouted.segments.motions, scouted.materials, recordings)),
         *_line(scouted),
     )
@@ -105,14 +99,10 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
 def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Verdict:
     """Whether what the fit builds on may be used at all."""
     wrong = [*friction.rejected, *failed(edge_verdicts)]
-    if not wrong:
-        why = "The fits that this one builds on passed their verdicts."
-        return Verdict("fit.cut", "foundations", "pass", 0.0, 0.0, why)
     said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
-    why = (
-        f"A fit that this one builds on failed a verdict ({said}): correct and fit that one first."
-    )
-    return Verdict("fit.cut", "foundations", "fail", float(len(wrong)), 0.0, why)
+    good = "The fits that this one builds on passed their verdicts."
+    bad = f"A fit that this one builds on failed a verdict ({said}): correct and refit it first."
+    return judge("fit.cut", "foundations", len(wrong), 0.0, good, bad)
 
 
 def _line(scouted: Scouted) -> tuple[Verdict, ...]:
@@ -121,14 +111,12 @@ def _line(scouted: Scouted) -> tuple[Verdict, ...]:
     if line is None or not scouted.believed:
         return ()
     worst = max(line.half, line.third)
-    if worst < SUBHARMONIC:
-        why = (
-            f"At a half and a third of the teeth's frequency there is {worst:.1%} of the line's "
-            "power at most, so the line is the teeth's own."
-        )
-        return (Verdict("fit.cut", "teeth", "pass", worst, SUBHARMONIC, why),)
-    why = (
+    good = (
+        f"At a half and a third of the teeth's frequency there is {worst:.1%} of the line's "
+        "power at most, so the line is the teeth's own."
+    )
+    bad = (
         f"There is {worst:.0%} of the line's power at a half or a third of its frequency: it may "
         "be a multiple of the teeth's, and kappa is then wrong. Capture slower strokes."
     )
-    return (Verdict("fit.cut", "teeth", "fail", worst, SUBHARMONIC, why),)
+    return (judge("fit.cut", "teeth", worst, SUBHARMONIC, good, bad),)

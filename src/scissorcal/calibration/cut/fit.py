@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import widened
-from scissorcal.calibration.candidates import Climbed, choose, climb
+from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.cut.averaging import (
-    Candidate,
+    AveragedLaw,
     Inferred,
     average,
     by_load,
@@ -37,6 +37,7 @@ from scissorcal.calibration.cut.toughness import with_toughness
 from scissorcal.calibration.cut.unknowns import SCENE_OF_BOUNDS, with_unknowns
 from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
+from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import inspect_sensors
@@ -94,27 +95,27 @@ def fit_cut(
     sensors = inspect_sensors(recordings, "fit.cut")
     motions = path_motion(recordings, known.inertia, sensors.usable)
     _refuse_no_contact(motions, known, recordings)
-    ladder = allowed_laws(recipe)
-    laws = candidates_for(effort, ladder, last_chosen)
+    allowed = allowed_laws(recipe)
+    laws = candidates_for(effort, allowed, last_chosen)
     tell(0.05, "cut: finding where cracks wait and run")
     scouted = _scouted(motions, known, recipe, geometry, laws, recordings)
-    climbed = _climb(scouted, geometry, recipe, laws, known, tell, stop)
-    candidates = by_load(choose([one for one, _ in climbed]), climbed)
+    compared = _fit_laws(scouted, geometry, recipe, laws, known, tell, stop)
+    laws_used = by_load(choose([one for one, _ in compared]), compared)
 
-    def infer_one(candidate: Candidate) -> Inferred:
-        tell(0.5, f"cut: inferring {candidate.climbed.rung.name}")
-        first = candidate is candidates[0]
-        return _infer(candidate, recipe, effort, rng, tell, checkpoint if first else None, stop)
+    def infer_one(law: AveragedLaw) -> Inferred:
+        tell(0.5, f"cut: inferring {law.fitted.candidate.name}")
+        first = law is laws_used[0]
+        return _infer(law, recipe, effort, rng, tell, checkpoint if first else None, stop)
 
-    inferred = average(candidates, infer_one, rng)
-    chosen, design = inferred.candidate.climbed, inferred.candidate.design
+    inferred = average(laws_used, infer_one, rng)
+    chosen, design = inferred.law.fitted, inferred.law.design
     u = chosen.optimum.point
     between = compare_cuts(design, u, recordings, rng)
     fit = assemble(
         what="cut",
         effort=effort,
         posterior=widened(inferred.posterior, between, rng),
-        climbed=[one for one, _ in climbed],
+        compared=[one for one, _ in compared],
         chosen=chosen,
         structure=design.key,
         bins=design.bins,
@@ -140,8 +141,8 @@ def fit_cut(
         extra_notes=(
             *sensors.notes,
             *line_notes(scouted, design, inferred.budget),
-            *load_note(candidates),
-            *draft_note(effort, ladder, laws),
+            *load_note(laws_used),
+            *draft_note(effort, allowed, laws),
             usage_sentence(recordings, usage_of_segments(recordings, scouted.segments)),
             *between_notes(between, NUISANCE),
         ),
@@ -154,7 +155,7 @@ def fit_cut(
 
 
 def _infer(
-    candidate: Candidate,
+    law: AveragedLaw,
     recipe: Recipe,
     effort: Effort,
     rng: np.random.Generator,
@@ -162,21 +163,21 @@ def _infer(
     checkpoint: Path | None,
     stop: Stop | None,
 ) -> Inferred:
-    climbed, design = candidate.climbed, candidate.design
+    fitted, design = law.fitted, law.design
     posterior = infer(
-        climbed.rung.problem(design.series),
+        fitted.candidate.problem(design.series),
         effort,
         rng,
         count=DRAWS,
-        optimum=climbed.optimum,
+        optimum=fitted.optimum,
         budget=STANDARD_BUDGET if effort == "standard" else None,
         checkpoint=checkpoint,
         stop=stop,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
     share = 0.01 * recipe.fit.cut.lack_of_fit_percent
-    budget = budget_of(design, climbed.optimum.point, posterior.covariance, share)
-    return Inferred(candidate, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
+    budget = budget_of(design, fitted.optimum.point, posterior.covariance, share)
+    return Inferred(law, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
 
 
 def cut_experiment(
@@ -232,7 +233,7 @@ def _scouted(
         ) from error
 
 
-def _climb(
+def _fit_laws(
     scouted: Scouted,
     geometry: Geometry,
     recipe: Recipe,
@@ -240,9 +241,9 @@ def _climb(
     known: KnownFriction,
     tell: Progress,
     stop: Stop | None,
-) -> list[tuple[Climbed, CutExperiment]]:
+) -> list[tuple[FittedCandidate, CutExperiment]]:
     """Fit every law to the same segments; each begins where the scouting ended."""
-    found: list[tuple[Climbed, CutExperiment]] = []
+    found: list[tuple[FittedCandidate, CutExperiment]] = []
     values = dict(scouted.values)
     for index, law in enumerate(laws):
         tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
@@ -257,8 +258,8 @@ def _climb(
         design = make_experiment(
             scouted.segments, geometry, recipe, law, known, begin, scouted.datum
         )
-        rung = design.rung(design.observed)
-        found.append((climb(rung, design.series, design.strokes, stop), design))
+        candidate = design.candidate(design.observed)
+        found.append((fit_candidate(candidate, design.series, design.strokes, stop), design))
     return found
 
 

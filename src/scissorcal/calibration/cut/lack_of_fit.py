@@ -50,13 +50,13 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
     the same way in every stroke leaves no trace in residuals, so no statistic of them could tell
     its size: it is stated in the recipe.
     """
-    problem = design.rung(design.observed).problem(design.series)
+    problem = design.candidate(design.observed).problem(design.series)
     step = 0.1 * natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
     shifts = {}
     for kind, changed in _changed(design).items():
         if changed is None:
             continue
-        other = changed.rung(changed.observed).problem(changed.series)
+        other = changed.candidate(changed.observed).problem(changed.series)
 
         def gained(u: Array, other: object = other, problem: object = problem) -> Array:
             return np.array([other.log_likelihood(u) - problem.log_likelihood(u)])  # type: ignore[attr-defined]

@@ -8,12 +8,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import SEARCH_REACH, Likelihood, Rung
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.path import mean_advance
 from scissorcal.calibration.cut.structure import response_from
-from scissorcal.calibration.friction.search import ReducedProblem
+from scissorcal.calibration.fit_candidate import (
+    SEARCH_REACH,
+    Candidate,
+    CandidateProblem,
+    Likelihood,
+)
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
 
@@ -22,7 +26,7 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class CutRung(Rung):
+class CutCandidate(Candidate):
     """A law of a cut over its segments: whitened, so that its terms are taken as independent.
 
     ``log_likelihoods`` gives the likelihood over all segments at points (k, p), shape (k,).
@@ -30,7 +34,7 @@ class CutRung(Rung):
 
     log_likelihoods: Callable[[Array], Array] | None = None
 
-    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> ReducedProblem:
+    def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> CandidateProblem:
         """The posterior of this rung, over the segments that ``keep`` selects."""
         many = self.log_likelihoods
 
@@ -106,7 +110,7 @@ class CutExperiment:
         """Expected mean torque (n,) at ``u`` (p,)."""
         return np.asarray(self.likelihood.torque_at(self.evaluate(u)))
 
-    def rung(self, measured: Array) -> Rung:
+    def candidate(self, measured: Array) -> Candidate:
         """Give the law over ``measured`` (n,), ready to be fitted."""
         design = self
         if measured is not self.observed:
@@ -123,7 +127,7 @@ class CutExperiment:
             values = design.layout.natural(points)
             return design.likelihood.log_likelihoods(values, response_from(design.key, values))
 
-        return CutRung(
+        return CutCandidate(
             log_likelihoods=log_likelihoods,
             name=self.name,
             key=self.key,

@@ -87,7 +87,7 @@ def scout(
             if not segments.pieces:
                 raise NoUnloadingError("no unloading was seen")
             design = make_experiment(segments, geometry, recipe, law, known, values)
-            optimum = find_optimum(design.rung(design.observed).problem(design.series))
+            optimum = find_optimum(design.candidate(design.observed).problem(design.series))
             evaluations += optimum.evaluations
             values = _natural(design, optimum.point)
             guess = _guess_of(design, values)
@@ -175,13 +175,13 @@ def _with_line(
         return replace(
             found, line=first, reason="The line of the teeth does not show at two stroke speeds."
         )
-    alone = design.rung(design.observed).problem(design.series)
+    alone = design.candidate(design.observed).problem(design.series)
     values, line, evaluations = dict(found.values), first, found.evaluations
     for _ in range(ROUNDS):
         values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
         datum = LineDatum(line.log_period, line.sd, line.stretches)
         design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
-        with_line = find_optimum(design.rung(design.observed).problem(design.series))
+        with_line = find_optimum(design.candidate(design.observed).problem(design.series))
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
         again = _line(replace(found, values=values), geometry, design, near=True)

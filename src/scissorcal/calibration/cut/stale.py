@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.segments import find_runs
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Verdict, judge
 
 EMPTY = 0.1
 """A closing stroke cuts nothing where the material's mean torque is below this share of what
@@ -71,15 +71,13 @@ def stale_verdict(rows: tuple[SheetStrokes, ...]) -> Verdict:
     """Judge whether every sheet was there, and fresh, for most of its strokes."""
     stale = [row for row in rows if row.share > MOST]
     worst = max((row.share for row in rows), default=0.0)
-    if not stale:
-        why = f"{worst:.0%} at most of a sheet's closing strokes cut nothing."
-        return Verdict("fit.cut", "stale sheets", "pass", worst, MOST, why)
+    good = f"{worst:.0%} at most of a sheet's closing strokes cut nothing."
     named = "; ".join(
         f"sheet {row.sheet} of {row.recording}: {row.empty} of {row.strokes}" for row in stale
     )
-    why = (
+    bad = (
         f"Closing strokes that cut nothing: {named}. The sheet was cut before, or had ended, and "
-        "the fit takes what is not there for weak material. Put fresh material in, with its near "
-        "edge where advance is 0, and capture again."
+        "the fit takes the missing material for weak material. Put fresh material in, with its "
+        "near edge where advance is 0, and capture again."
     )
-    return Verdict("fit.cut", "stale sheets", "fail", worst, MOST, why)
+    return judge("fit.cut", "stale sheets", worst, MOST, good, bad)

@@ -1,35 +1,31 @@
-"""The edge's ladder: line, arc, cubic, smoothing spline, compared by their evidence."""
+"""Candidate edges - line, arc, cubic, smoothing spline - compared by their evidence."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.candidates import Account, compare
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.calibration.edge.model import (
     FAMILIES,
+    Basis,
     CellData,
     EdgeEvidence,
     Family,
     basis_of,
     search,
 )
-from scissorcal.inference import Effort, SamplingStatus, infer
+from scissorcal.inference.infer import infer
+from scissorcal.inference.posterior import Effort
+from scissorcal.inference.status import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
-
-REFUTED = 5.0
-"""Evidence (natural logarithm) against a richer polynomial from which on it is left out.
-
-An edge that is said to be straight has intervals that say so too; odds of 150 to 1 are asked."""
-
-SPLINE_GAIN = 2.0
-"""Evidence by which a spline, with its many parameters, must beat every polynomial."""
 
 MOST_EVALUATIONS: dict[Effort, int] = {"draft": 0, "standard": 20_000, "thorough": 200_000}
 """Evaluations of the likelihood that sampling the sizes of the errors may take."""
@@ -56,7 +52,7 @@ class EdgeScore:
 
 
 @dataclass(frozen=True)
-class EdgeLadder:
+class EdgeComparison:
     """All families compared, and the ``chosen`` one (an index) fitted to all photographs.
 
     ``belief`` is the edge with its covariance, ``draws`` (n, k) are of its parameters, ``residual``
@@ -78,14 +74,14 @@ class EdgeLadder:
         return self.scores[self.chosen]
 
 
-def climb_edge_ladder(
+def compare_edges(
     photographs: tuple[EdgeCells, ...],
     length_m: float,
     effort: Effort,
     rng: np.random.Generator,
     families: tuple[Family, ...] = FAMILIES,
     progress: Progress | None = None,
-) -> EdgeLadder:
+) -> EdgeComparison:
     """Compare families of edges by their evidence, and fit the chosen one.
 
     Cells are normal about the edge with five kinds of error: their own noise; roughness of the
@@ -107,7 +103,7 @@ def climb_edge_ladder(
         _score(data, family, one.optimum.point, one.evidence)
         for family, one in zip(families, found, strict=True)
     )
-    chosen = _chosen(scores)
+    chosen = _chosen(scores, [evidence.basis for evidence in evidences])
     evidence = evidences[chosen]
     posterior = infer(
         evidence.problem(),
@@ -123,7 +119,7 @@ def climb_edge_ladder(
     belief, natural = _belief(data, families[chosen], draws)
     others = sum(one.evaluations for index, one in enumerate(found) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
-    return EdgeLadder(
+    return EdgeComparison(
         scores,
         chosen,
         belief,
@@ -142,16 +138,18 @@ def _score(data: CellData, family: Family, point: Array, evidence: float) -> Edg
     return EdgeScore(family, evidence, noise, rough, length, between)
 
 
-def _chosen(scores: tuple[EdgeScore, ...]) -> int:
-    """The spline if it is clearly best, else the richest polynomial that is not refuted."""
-    simple = [i for i, score in enumerate(scores) if score.family != "spline"]
-    best = max(range(len(scores)), key=lambda i: scores[i].evidence)
-    if not simple:
-        return best
-    top = max(scores[i].evidence for i in simple)
-    if scores[best].family == "spline" and scores[best].evidence > top + SPLINE_GAIN:
-        return best
-    return max(i for i in simple if scores[i].evidence > top - REFUTED)
+def _chosen(scores: tuple[EdgeScore, ...], bases: Sequence[Basis]) -> int:
+    """The simplest family that the evidence does not distinguish from the best.
+
+    The evidence is the log density of all cells, each predicted from those before it: one unit, as
+    photographs of one blade share its roughness.
+    """
+    rows = compare(
+        [score.family for score in scores],
+        [basis.columns.shape[1] for basis in bases],
+        [Account(np.array([[score.evidence] for score in scores]))],
+    )
+    return next(index for index, row in enumerate(rows) if row.chosen)
 
 
 def _draw(evidence: EdgeEvidence, u: Array, rng: np.random.Generator) -> Array:

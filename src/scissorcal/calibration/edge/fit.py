@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.edge.candidates import (
     MOST_EVALUATIONS,
-    EdgeLadder,
+    EdgeComparison,
     Progress,
-    climb_edge_ladder,
+    compare_edges,
 )
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow, RungRow
@@ -18,13 +18,13 @@ from scissorcal.errors import InputError
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.schema import Recipe
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
 
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
-ALGORITHM = 3
+ALGORITHM = 4
 """Raised whenever a fit of the same photographs would give other numbers."""
 
 PLACES = 41
@@ -69,7 +69,7 @@ def fit_blade(
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    best = climb_edge_ladder(cells, length, effort, rng, progress=progress)
+    best = compare_edges(cells, length, effort, rng, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -102,18 +102,18 @@ def fit_blade(
     return replace(fit, verdicts=_verdicts(fit, best, effort))
 
 
-def _rung_rows(ladder: EdgeLadder) -> tuple[RungRow, ...]:
+def _rung_rows(compared: EdgeComparison) -> tuple[RungRow, ...]:
     return tuple(
         RungRow(
-            rung.family,
-            rung.evidence,
-            index == ladder.chosen,
-            rung.noise_factor,
-            rung.roughness_m,
-            rung.roughness_length_m,
-            rung.between_m,
+            score.family,
+            score.evidence,
+            index == compared.chosen,
+            score.noise_factor,
+            score.roughness_m,
+            score.roughness_length_m,
+            score.between_m,
         )
-        for index, rung in enumerate(ladder.scores)
+        for index, score in enumerate(compared.scores)
     )
 
 
@@ -187,7 +187,7 @@ def _no_height() -> tuple[Array, Array, Band | None]:
 
 
 def _rows(
-    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeLadder
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeComparison
 ) -> tuple[PhotographRow, ...]:
     rows = []
     begin = 0
@@ -217,12 +217,12 @@ def _rows(
     return tuple(rows)
 
 
-def _verdicts(fit: BladeFit, best: EdgeLadder, effort: Effort) -> tuple[Verdict, ...]:
+def _verdicts(fit: BladeFit, best: EdgeComparison, effort: Effort) -> tuple[Verdict, ...]:
     scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
     spoilt = max(row.spoilt_share for row in fit.photographs)
     worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
     checks = [
-        _verdict(
+        judge(
             scope,
             "clear edge",
             spoilt,
@@ -251,17 +251,11 @@ def _agreement(fit: BladeFit, scope: str) -> Verdict:
     """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
     check = "photographs agree"
     if len(fit.photographs) < 2:
-        return Verdict(
-            scope,
-            check,
-            "not_evaluated",
-            None,
-            None,
-            "One photograph says nothing on how far others of the same blade would agree.",
-        )
+        why = "One photograph does not show how far others of the same blade would agree."
+        return not_evaluated(scope, check, why)
     apart = next(rung.between_m for rung in fit.rungs if rung.chosen) / fit.belief.edge.length_m
     if apart > MOST_APART:
-        return _verdict(
+        return judge(
             scope,
             check,
             apart,
@@ -273,7 +267,7 @@ def _agreement(fit: BladeFit, scope: str) -> Verdict:
     spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
     scale = [max(row.away_sd, spread) for row in fit.photographs]
     value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-    return _verdict(
+    return judge(
         scope,
         check,
         float(value),
@@ -283,12 +277,9 @@ def _agreement(fit: BladeFit, scope: str) -> Verdict:
     )
 
 
-def _verdict(scope: str, check: str, value: float, threshold: float, why: str) -> Verdict:
-    status: Status = "pass" if value <= threshold else "fail"
-    return Verdict(scope, check, status, value, threshold, why)
-
-
-def _notes(measured: Sequence[BladeMeasurement], best: EdgeLadder, metric: bool) -> tuple[str, ...]:
+def _notes(
+    measured: Sequence[BladeMeasurement], best: EdgeComparison, metric: bool
+) -> tuple[str, ...]:
     notes = list(dict.fromkeys(one.uncertainty for one in measured))
     if not metric:
         notes.append(

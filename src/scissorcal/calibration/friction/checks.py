@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.terms import NUISANCE, LawParts
 from scissorcal.calibration.parameters import Layout
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge
 
 Array = NDArray[np.float64]
 
@@ -22,14 +22,15 @@ UNMOVED = 1e-9
 NOTHING = 0.02
 """Share of the drive's standard deviation below which Stribeck friction counts as absent."""
 
-CURES = {
+REMEDIES = {
     "inertia": "check the signs of the torque and of the opening, and record a quicker excitation",
     "coulomb": "the torque pushes with the motion: check its sign; or an offset larger than "
     "friction hides in an asymmetric law: set fit.friction.symmetry",
-    "viscous": 'friction falls with the speed: let the ladder have Stribeck (rung = "auto"), check '
+    "viscous": "friction falls with the speed: let candidates with Stribeck compete "
+    '(rung = "auto"), check '
     "for a motor that compensates friction, and record faster sweeps",
     "stribeck": "static friction would be below Coulomb friction: record slower sweeps, or choose "
-    "a rung without Stribeck",
+    "a model without Stribeck",
     "load_share": "friction would fall with the load: check the sign of the handle force",
 }
 
@@ -46,33 +47,29 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     rows = _rated(experiment, values)
     found = [level for row in rows for level in _freed(experiment, row, share)]
     negative = sorted(level for level in found if level.sds_below > CERTAIN)
-    if not negative:
-        why = "No level of friction, nor the inertia, would be negative if it could."
-        return Verdict(SCOPE, "physical", "pass", 0.0, CERTAIN, why)
+    good = "No level of friction, nor the inertia, is negative in a fit without bounds."
     worst = {level.name: level for level in negative}.values()
     listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
-    cures = "; ".join(dict.fromkeys(CURES[one.stem] for one in worst))
-    why = f"Freed from the bounds the data want {listed}, which no joint has: {cures}."
-    value = max(one.sds_below for one in worst)
-    return Verdict(SCOPE, "physical", "fail", value, CERTAIN, why)
+    remedies = "; ".join(dict.fromkeys(REMEDIES[one.stem] for one in worst))
+    bad = f"Without bounds the data give {listed}, which no joint has: {remedies}."
+    value = max((one.sds_below for one in worst), default=0.0)
+    return judge(SCOPE, "physical", value, CERTAIN, good, bad)
 
 
 def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
     """Judge whether the search moved every parameter from where it began."""
-    layout, starts = experiment.layout, experiment.rung(experiment.observed).starts
+    layout, starts = experiment.layout, experiment.candidate(experiment.observed).starts
     apart = np.abs(starts - point) / layout.sd
     stuck = [
         name for name, far in zip(layout.names, apart.min(axis=0), strict=True) if far < UNMOVED
     ]
     value = float(apart.min())
-    if stuck:
-        why = (
-            f"{', '.join(stuck)} ended exactly where the search began, so the data do not move it: "
-            "record motion that depends on it, or choose a rung without it."
-        )
-        return Verdict(SCOPE, "start", "fail", value, UNMOVED, why)
-    why = "Every parameter moved from where the search began."
-    return Verdict(SCOPE, "start", "pass", value, UNMOVED, why)
+    bad = (
+        f"{', '.join(stuck)} ended exactly where the search began, so the data do not move it: "
+        "record motion that depends on it, or choose a model without it."
+    )
+    good = "Every parameter moved from where the search began."
+    return judge(SCOPE, "start", value, UNMOVED, good, bad)
 
 
 def bandwidth_verdict(
@@ -89,18 +86,16 @@ def bandwidth_verdict(
     judged = [i for i, name in enumerate(layout.names) if name not in NUISANCE]
     worst = max(judged, key=lambda i: moved[i])
     value, name = float(moved[worst]), layout.names[worst]
-    status: Status = "pass" if value <= MOVED_LIMIT else "fail"
     why = (
-        f"With windows of {cutoffs_Hz[1]:.3g} Hz in the place of {cutoffs_Hz[0]:.3g}, {name} moves "
+        f"With windows of {cutoffs_Hz[1]:.3g} Hz instead of {cutoffs_Hz[0]:.3g} Hz, {name} moves "
         f"by {value:.1f} of its standard deviations, more than any other parameter."
     )
-    if status == "fail":
-        why += (
-            " So its interval does not say how uncertain it is: the joint moves unevenly faster "
-            "than the encoder can follow, or the law lacks something at that speed. Record "
-            "steadier sweeps, or with a finer encoder, and compare other cutoffs."
-        )
-    return Verdict(SCOPE, "bandwidth", status, value, MOVED_LIMIT, why)
+    remedy = (
+        " So its interval does not say how uncertain it is: the joint moves unevenly faster than "
+        "the encoder can follow, or the model lacks something at that speed. Record steadier "
+        "sweeps, or with a finer encoder, and compare other cutoffs."
+    )
+    return judge(SCOPE, "bandwidth", value, MOVED_LIMIT, why, why + remedy)
 
 
 @dataclass(frozen=True, order=True)
@@ -156,7 +151,7 @@ def _freed(experiment: FrictionExperiment, values: dict[str, float], share: floa
         value = values.get(name, 0.0) + float(moved / unit)
         below = -value / float(sd / unit) if sd > 0 and np.isfinite(unit) else 0.0
         levels.append(_Level(below, name, value, float(sd / unit)))
-    return [level for level in levels if level.stem in CURES]
+    return [level for level in levels if level.stem in REMEDIES]
 
 
 def _slope(experiment: FrictionExperiment, values: Mapping[str, float], name: str) -> Array:

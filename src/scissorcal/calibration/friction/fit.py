@@ -14,8 +14,9 @@ from scissorcal.calibration.between import (
     jackknife,
     widened,
 )
-from scissorcal.calibration.candidates import Climbed, choose, climb, optimum_of
+from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.effort import candidates_for, draft_note
+from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
     physical_verdict,
@@ -42,7 +43,7 @@ from scissorcal.inference import Posterior, Stop, infer, tails_of
 from scissorcal.model.terms import TERMS
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Verdict, not_evaluated
 
 Progress = Callable[[float, str], None]
 
@@ -83,14 +84,14 @@ def fit_friction(
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
-    drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
+    drive = inertia * acceleration + F(opening, rate) + offset + noise, over the candidates coulomb,
     + viscous, + Stribeck, + angle, + load (where one was measured), + presliding, each symmetric or
     not. An asymmetric law has no offset of its
     own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
     alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
-    the handles, and an offset of a sensor is not. The rung that unseen strokes
-    cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
-    for a rotary joint and for a linear one; units follow the recordings' joint. Two or more
+    the handles, and an offset of a sensor is not. The simplest candidate that held-out strokes do
+    not distinguish from the best is taken, unless ``settings`` name one. Works for a rotary joint
+    and for a linear one; units follow the recordings' joint. Two or more
     recordings are also fitted each by itself, and draws widened by what they differ in.
 
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
@@ -107,18 +108,18 @@ def fit_friction(
     _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
     strokes = _strokes(bins)
-    every_law, cogging = _ladder(windows, strokes, settings, joint, prior)
-    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    climbed: list[Climbed] = []
-    for index, candidate in enumerate(ladder):
-        tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
-        climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes, stop))
-    chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
-    chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
-    law = next(design for design in ladder if design.name == chosen.rung.name)
-    tell(0.6, f"friction: inferring {chosen.rung.name}")
+    every_law, cogging = _designs(windows, strokes, settings, joint, prior)
+    designs = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
+    compared: list[FittedCandidate] = []
+    for index, one in enumerate(designs):
+        tell(0.6 * index / len(designs), f"friction: trying {one.name}")
+        compared.append(fit_candidate(one.candidate(bins.drive), bins.series, strokes, stop))
+    chosen = choose(compared, float(np.sqrt(np.mean(bins.drive**2))))
+    chosen = _with_tails(chosen, compared, designs, bins, strokes)
+    law = next(design for design in designs if design.name == chosen.candidate.name)
+    tell(0.6, f"friction: inferring {chosen.candidate.name}")
     posterior = infer(
-        chosen.rung.problem(bins.series),
+        chosen.candidate.problem(bins.series),
         effort,
         rng,
         checkpoint=checkpoint,
@@ -134,7 +135,7 @@ def fit_friction(
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(
-            chosen.rung.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
+            chosen.candidate.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
         ),
     }
     usage = usage_of_windows(recordings, every, sensors.usable)
@@ -142,9 +143,9 @@ def fit_friction(
         what="friction",
         effort=effort,
         posterior=widened(posterior, between, rng),
-        climbed=climbed,
+        compared=compared,
         chosen=chosen,
-        structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
+        structure={**chosen.candidate.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
         bins=bins,
         strokes=strokes,
         measured=bins.drive,
@@ -165,7 +166,7 @@ def fit_friction(
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint),
-            *draft_note(effort, every_law, ladder),
+            *draft_note(effort, every_law, designs),
             *cogging_notes(cogging, posterior, joint),
             usage.sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
@@ -193,24 +194,26 @@ def friction_experiment(
 
 
 def _with_tails(
-    chosen: Climbed,
-    climbed: list[Climbed],
-    ladder: list[FrictionExperiment],
+    chosen: FittedCandidate,
+    compared: list[FittedCandidate],
+    designs: list[FrictionExperiment],
     bins: Bins,
     strokes: NDArray[np.int64],
-) -> Climbed:
+) -> FittedCandidate:
     """Fit the chosen law again with a Student-t noise where its residuals have outliers.
 
-    The fit takes the place of the chosen one in ``climbed``.
+    The fit takes the place of the chosen one in ``compared``.
     """
-    tails = tails_of(chosen.rung.likelihood.standardised(chosen.optimum.point), chosen.share)
+    tails = tails_of(chosen.candidate.likelihood.standardised(chosen.optimum.point), chosen.share)
     if tails > OUTLIERS:
         return chosen
-    place = next(i for i, candidate in enumerate(climbed) if candidate.rung is chosen.rung)
-    robust = replace(ladder[place], tails=tails).rung(bins.drive)
-    again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
-    climbed[place] = replace(again, alike=chosen.alike)
-    return climbed[place]
+    place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
+    robust = replace(designs[place], tails=tails).candidate(bins.drive)
+    again = fit_candidate(
+        replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes
+    )
+    compared[place] = replace(again, equivalent=chosen.equivalent)
+    return compared[place]
 
 
 def _bandwidth(
@@ -218,14 +221,14 @@ def _bandwidth(
     settings: FitFriction,
     sensors: Sensors,
     law: FrictionExperiment,
-    chosen: Climbed,
+    chosen: FittedCandidate,
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
     """Fit the same law once more over shorter windows, from where the fit ended."""
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
-        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+        return not_evaluated("fit.friction", "bandwidth", why)
     other_Hz = next_cutoff(law.windows)
     if other_Hz is None:
         why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
@@ -234,17 +237,17 @@ def _bandwidth(
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
-        return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
+        return not_evaluated("fit.friction", "bandwidth", why)
     there = replace(
         law,
         windows=windows,
         strokes=_strokes(windows.bins),
-        tails=chosen.rung.likelihood.tails,
+        tails=chosen.candidate.likelihood.tails,
         shared=None,
     )
     here = chosen.optimum.point
-    rung = replace(there.rung(there.observed), starts=here[None, :])
-    optimum = optimum_of(rung, there.series)
+    candidate = replace(there.candidate(there.observed), starts=here[None, :])
+    optimum = candidate.optimum(there.series)
     cutoffs = (law.windows.half_at, other_Hz)
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 
@@ -272,8 +275,8 @@ def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint)
     return tuple(notes)
 
 
-def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:
-    tails = chosen.rung.likelihood.tails
+def _tails_if_heavy(chosen: FittedCandidate) -> dict[str, float]:
+    tails = chosen.candidate.likelihood.tails
     return {"tails": tails} if np.isfinite(tails) else {}
 
 
@@ -344,7 +347,7 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
     return np.where(bins.stroke >= 0, bins.stroke, planned + runs).astype(np.int64)
 
 
-def _ladder(
+def _designs(
     windows: Windows,
     strokes: NDArray[np.int64],
     settings: FitFriction,

@@ -8,9 +8,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.candidates import Likelihood, Rung
+from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.friction.moments import ReducedLaw, StrokeMoments
+from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.friction.terms import NUISANCE, friction_layout
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
@@ -103,7 +104,7 @@ class FrictionExperiment:
         """
         return self.basis.drive(values)
 
-    def rung(self, measured: Array) -> Rung:
+    def candidate(self, measured: Array) -> Candidate:
         """Give the law over ``measured`` (n,), ready to be fitted."""
 
         def residuals(u: Array) -> Array:
@@ -112,8 +113,8 @@ class FrictionExperiment:
         def normal(u: Array) -> tuple[Array, Array]:
             return np.asarray(residuals(u) / np.exp(u[-1])), np.full(len(measured), u[-1])
 
-        layout = self.layout
-        return Rung(
+        layout, reduced = self.layout, self._reduced(measured)
+        return Candidate(
             name=self.name,
             key=self.key,
             layout=layout,
@@ -124,7 +125,8 @@ class FrictionExperiment:
                 np.diag(1 / layout.sd**2) if self.prior_precision is None else self.prior_precision
             ),
             blocks=self.strokes,
-            reduced=self._reduced(measured),
+            reduced=reduced,
+            search=search if reduced else None,
         )
 
     def _reduced(self, measured: Array) -> ReducedLaw | None:

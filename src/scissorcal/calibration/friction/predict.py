@@ -257,7 +257,7 @@ class _Folds:
         return (shift + own) ** 2 / (shift**2 / len(self.labels) + own**2 / strokes)
 
     def _reached(self, left_out: Integers) -> Array:
-        rung = self.design.rung(self.design.observed)
+        rung = self.design.candidate(self.design.observed)
         assert rung.reduced is not None
         problem = rung.problem(self.design.series)
         return search_from(

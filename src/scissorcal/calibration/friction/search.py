@@ -1,11 +1,12 @@
 """The optimum of a friction law by least squares over products of its columns."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.fit_candidate import CandidateProblem
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.inference.least_squares import least_squares
@@ -29,34 +30,6 @@ RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
-class ReducedProblem(Problem):
-    """A posterior whose sums over bins come from products by stroke, where the law has them.
-
-    Its prior is normal, with ``prior_mean`` (p,) and ``prior_precision`` (p, p).
-    """
-
-    prior_mean: Array = field(default_factory=lambda: np.zeros(0))
-    prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    reduced: ReducedLaw | None = None
-
-    def log_likelihood(self, point: Array) -> float:
-        """Sum of the likelihood's terms; -inf where it is not finite."""
-        if self.reduced is None:
-            return super().log_likelihood(point)
-        if self.tally is not None:
-            self.tally()
-        total = self.reduced.log_likelihood(point)
-        return total if np.isfinite(total) else -np.inf
-
-    @property
-    def law(self) -> ReducedLaw:
-        """The law over products; ValueError where there is none."""
-        if self.reduced is None:
-            raise ValueError("this posterior is one over bins: search it with find_optimum")
-        return self.reduced
-
-
-@dataclass(frozen=True)
 class LocalOptimum:
     """Where a search from one start ended: point (p,) and log-posterior."""
 
@@ -65,7 +38,7 @@ class LocalOptimum:
     evaluations: int
 
 
-def search(problem: ReducedProblem) -> Optimum:
+def search(problem: CandidateProblem) -> Optimum:
     """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
 
     What depends on a scale has several optima (a search for Dahl's length without a scan ended up
@@ -99,7 +72,7 @@ def search(problem: ReducedProblem) -> Optimum:
     )
 
 
-def search_from(problem: ReducedProblem, start: Array) -> LocalOptimum:
+def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
     """Maximise the log-posterior from one start (p,).
 
     Least squares over the law's coefficients and the best noise for what they leave follow each
@@ -120,14 +93,21 @@ def search_from(problem: ReducedProblem, start: Array) -> LocalOptimum:
     return LocalOptimum(point, value, evaluations)
 
 
-def _least_squares(problem: ReducedProblem, point: Array) -> tuple[Array, int]:
+def _law(problem: CandidateProblem) -> ReducedLaw:
+    """The law over products; TypeError where there is none."""
+    if not isinstance(problem.reduced, ReducedLaw):
+        raise TypeError("this posterior is one over bins: search it with find_optimum")
+    return problem.reduced
+
+
+def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]:
     """Coefficients (p - 1,) of the least squares at the noise of ``point`` (p,), and evaluations.
 
     Squares and slopes come from products of columns. A root of these, p rows however much was
     recorded, has the same squares and slopes as all bins and the prior. Outside the bounds the
     prior alone acts.
     """
-    law, count = problem.law, 0
+    law, count = _law(problem), 0
     mean, precision = problem.prior_mean[:-1], problem.prior_precision[:-1, :-1]
 
     def evaluate(coefficients: Array) -> tuple[Array, Array]:
@@ -149,9 +129,9 @@ def _least_squares(problem: ReducedProblem, point: Array) -> tuple[Array, int]:
     return np.clip(found, problem.lower[:-1], problem.upper[:-1]), count
 
 
-def _with_best_noise(problem: ReducedProblem, point: Array) -> Array:
+def _with_best_noise(problem: CandidateProblem, point: Array) -> Array:
     """The point (p,) with the noise at its best for the squares that the law leaves there."""
-    squares, count = problem.law.squares(point), problem.law.counted
+    squares, count = _law(problem).squares(point), _law(problem).counted
     mean, precision = problem.prior_mean[-1], problem.prior_precision[-1, -1]
     size = 0.5 * np.log(squares / count)
     for _ in range(20):
@@ -165,12 +145,12 @@ def _with_best_noise(problem: ReducedProblem, point: Array) -> Array:
     return reached
 
 
-def _scanned(problem: ReducedProblem) -> list[Array]:
+def _scanned(problem: CandidateProblem) -> list[Array]:
     """Starts at the scales at which the columns, each of them free, leave the fewest squares.
 
     Only laws with Dahl's length need them.
     """
-    law = problem.law
+    law = _law(problem)
     names, basis = law.layout.names, law.moments.basis
     if "presliding_length" not in names:
         return []
@@ -201,7 +181,7 @@ def _scanned(problem: ReducedProblem) -> list[Array]:
     return starts
 
 
-def _grid(problem: ReducedProblem, place: int, spacing: float) -> list[int]:
+def _grid(problem: CandidateProblem, place: int, spacing: float) -> list[int]:
     """Nodes over the prior of a scale's logarithm."""
     middle, reach = problem.prior_mean[place], SCAN_REACH * problem.prior_sd[place]
     count = max(2, round(2 * reach / SCAN_STEP) + 1)
@@ -230,13 +210,13 @@ def _dips(problem: Problem, best: Cluster, other: Cluster) -> bool:
     )
 
 
-def _status(problem: ReducedProblem, point: Array) -> tuple[SearchStatus, tuple[str, ...]]:
+def _status(problem: CandidateProblem, point: Array) -> tuple[SearchStatus, tuple[str, ...]]:
     """How the search ended, and the names of the parameters that it concerns."""
     scale = problem.prior_sd
     bound = np.minimum(point - problem.lower, problem.upper - point) < AT_BOUND * scale
     if np.any(bound):
         return SearchStatus.AT_BOUNDS, picked(problem.names, bound)
-    law = problem.law
+    law = _law(problem)
     height = law.log_likelihood(point)
     silent = np.array(
         [

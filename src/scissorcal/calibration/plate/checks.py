@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.calibration.plate.result import Halves, PlateView
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.geometry.board_pose import BoardPose
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose
@@ -43,42 +43,37 @@ def plate_verdicts(
 
 
 def _one_pose(whole: BoardPose) -> Verdict:
-    if whole.odds >= ODDS:
-        why = "One pose explains the photographs far better than the other that a plane allows."
-        return Verdict(SCOPE, "ambiguity", "pass", min(whole.odds, 1e6), ODDS, why)
-    why = (
-        f"Two poses explain the photographs about alike (odds {whole.odds:.1f}): look at the plate "
-        "less squarely, from nearer, or use the plate board, which is larger than a marker."
+    good = "One pose explains the photographs far better than the other that a plane allows."
+    bad = (
+        f"Two poses explain the photographs about equally well (odds {whole.odds:.1f}): look at "
+        "the plate less squarely, from nearer, or use the plate board, which is larger than a "
+        "marker."
     )
-    return Verdict(SCOPE, "ambiguity", "fail", whole.odds, ODDS, why)
+    return judge(SCOPE, "ambiguity", min(whole.odds, 1e6), ODDS, good, bad)
 
 
 def _at_rest(views: Sequence[PlateView]) -> Verdict:
     if len(views) < 2:
         why = "One photograph alone cannot show whether plate and camera stayed: take several."
-        return Verdict(SCOPE, "at rest", "not_evaluated", None, MOVED, why)
+        return not_evaluated(SCOPE, "at rest", why, MOVED)
     ratios = [view.rms_px / max(view.rms_alone_px, 1e-9) for view in views]
     worst = int(np.argmax(ratios))
-    if ratios[worst] < MOVED:
-        why = f"All {len(views)} photographs show the plate in one place."
-        return Verdict(SCOPE, "at rest", "pass", ratios[worst], MOVED, why)
-    why = (
+    good = f"All {len(views)} photographs show the plate in one place."
+    bad = (
         f"{views[worst].name} shows the plate {views[worst].away_mm:.2g} mm and "
         f"{views[worst].away_deg:.2g} deg away from the common pose: camera or plate moved between "
         "photographs; leave it out, or take all again without touching either."
     )
-    return Verdict(SCOPE, "at rest", "fail", ratios[worst], MOVED, why)
+    return judge(SCOPE, "at rest", ratios[worst], MOVED, good, bad)
 
 
 def _residuals(whole: BoardPose) -> Verdict:
-    why = f"Corners lie {whole.sd_px:.2g} px (sd) from where the pose has them."
-    if whole.sd_px < LEFT_OVER_PX:
-        return Verdict(SCOPE, "residuals", "pass", whole.sd_px, LEFT_OVER_PX, why)
-    why += (
-        " That is more than they are found to: the target may be bent, or the camera's fit may not "
-        "hold here (another focus or zoom?)."
+    why = f"Corners lie {whole.sd_px:.2g} px (sd) from where the pose predicts them."
+    remedy = (
+        " That is more than their detection error: the target may be bent, or the camera's fit may "
+        "not hold here (another focus or zoom?)."
     )
-    return Verdict(SCOPE, "residuals", "fail", whole.sd_px, LEFT_OVER_PX, why)
+    return judge(SCOPE, "residuals", whole.sd_px, LEFT_OVER_PX, why, why + remedy)
 
 
 def _halves(halves: Halves | None) -> Verdict:
@@ -87,36 +82,33 @@ def _halves(halves: Halves | None) -> Verdict:
     limit = float(chi2.isf(0.5 * FALSE_ALARM, 6))
     if halves is None:
         why = "Too few corners were seen to compare two halves of them: show more of the target."
-        return Verdict(SCOPE, "halves", "not_evaluated", None, limit, why)
+        return not_evaluated(SCOPE, "halves", why, limit)
     why = (
         f"Poses from two halves of the corners differ by {halves.rotation_deg:.2g} deg and "
         f"{halves.translation_mm:.2g} mm, "
     )
-    if halves.square < limit:
-        return Verdict(SCOPE, "halves", "pass", halves.square, limit, why + "within their claims.")
-    why += (
-        "more than they claim: the target may be bent, printed out of scale, or the camera's "
-        "fit may not hold here."
+    bad = (
+        "more than their covariances allow: the target may be bent, printed out of scale, or the "
+        "camera's fit may not hold here."
     )
-    return Verdict(SCOPE, "halves", "fail", halves.square, limit, why)
+    good = "within their covariances."
+    return judge(SCOPE, "halves", halves.square, limit, why + good, why + bad)
 
 
 def _size(views: Sequence[PlateView]) -> Verdict:
     least = min(view.side_px for view in views)
-    enough: Status = "pass" if least >= SMALL_PX else "fail"
-    why = f"Squares or markers are {least:.0f} pixels wide where they are smallest."
-    if enough == "fail":
-        why += " Corners are found worse and less often there: go nearer, or print larger."
-    return Verdict(SCOPE, "size", enough, least, SMALL_PX, why)
+    why = f"The smallest squares or markers are {least:.0f} pixels wide."
+    remedy = " Corners are found worse and less often there: go nearer, or print larger."
+    return judge(SCOPE, "size", least, SMALL_PX, why, why + remedy)
 
 
 def _camera(camera: Camera) -> Verdict:
     if camera.covariance is None:
         why = (
-            "Nobody said how well the camera is known, so the pose counts it as exact: run "
+            "The camera has no covariance, so the pose takes it as exact: run "
             "'scissorcal fit camera' on photographs of the camera board."
         )
-        return Verdict(SCOPE, "camera", "not_evaluated", None, None, why)
+        return not_evaluated(SCOPE, "camera", why)
     why = "What is unknown of the camera is in the pose's covariance."
     return Verdict(SCOPE, "camera", "pass", None, None, why)
 
@@ -124,10 +116,10 @@ def _camera(camera: Camera) -> Verdict:
 def _rig(rig: RigPose | None) -> Verdict:
     if rig is None:
         why = (
-            "The rig's frame is not known to the camera, so the plate is known before the camera "
-            "only: photograph the rig markers at several advances and openings."
+            "The camera's place in the rig is not known, so the plate's pose is relative to the "
+            "camera only: photograph the rig markers at several advances and openings."
         )
-        return Verdict(SCOPE, "rig frame", "not_evaluated", None, None, why)
+        return not_evaluated(SCOPE, "rig frame", why)
     if rig.untold:
         why = (
             f"The rig's motion left open: {', '.join(rig.untold)}. Photograph the rig markers at "
@@ -135,12 +127,10 @@ def _rig(rig: RigPose | None) -> Verdict:
         )
         return Verdict(SCOPE, "rig frame", "fail", float(len(rig.untold)), 0.0, why)
     off = rig.rms_px / np.sqrt(2.0)
-    if not off < LEFT_OVER_PX:
-        why = (
-            f"The card's corners lie {off:.2g} px (sd) from where its stances have them: look at "
-            "the advances (mm) and openings (deg) that were given, and whether the camera stayed "
-            "and the card is fixed to the blade that moves."
-        )
-        return Verdict(SCOPE, "rig frame", "fail", float(off), LEFT_OVER_PX, why)
-    why = f"The rig's frame is known from its markers (rms {rig.rms_px:.2f} px)."
-    return Verdict(SCOPE, "rig frame", "pass", 0.0, 0.0, why)
+    bad = (
+        f"The card's corners lie {off:.2g} px (sd) from where its stances predict them: look at "
+        "the advances (mm) and openings (deg) that were given, and whether the camera stayed and "
+        "the card is fixed to the blade that moves."
+    )
+    good = f"The rig's frame is known from its markers (rms {rig.rms_px:.2f} px)."
+    return judge(SCOPE, "rig frame", float(off), LEFT_OVER_PX, good, bad)

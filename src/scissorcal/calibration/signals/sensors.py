@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -275,12 +275,10 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
 def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
     if worst == 0.0:
         why = "No sensor reached an end of its range, and none was silent around zero."
-        return Verdict(scope, "sensors", "pass", 0.0, SPOILT_LIMIT, why)
-    status: Status = "pass" if worst <= SPOILT_LIMIT else "fail"
+        return judge(scope, "sensors", 0.0, SPOILT_LIMIT, why)
     why = f"{named} in {worst:.1%} of the samples; they are left out."
-    if status == "fail":
-        why += (
-            " That is too many for what is left to stand for the whole: record again with a "
-            "sensor of a larger range, or slower and with gentler turns."
-        )
-    return Verdict(scope, "sensors", status, worst, SPOILT_LIMIT, why)
+    remedy = (
+        " Too few samples are left to stand for the whole: record again with a sensor of a larger "
+        "range, or slower and with gentler turns."
+    )
+    return judge(scope, "sensors", worst, SPOILT_LIMIT, why, why + remedy)

@@ -17,7 +17,7 @@ from scissorcal.calibration.verify.summary import (
     summarise_sensitivity,
     summarise_simulated,
 )
-from scissorcal.calibration.verify.verdicts import FALSE_ALARM, RANKS_SHARE, judge
+from scissorcal.calibration.verify.verdicts import FALSE_ALARM, RANKS_SHARE, verify_verdicts
 
 Array = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ def assess(
         sensitivity=sensitivity,
         not_done=tuple(not_done),
         false_alarm=FALSE_ALARM,
-        verdicts=judge(fit.what, checks, calibration, halves, sensitivity, not_done),
+        verdicts=verify_verdicts(fit.what, checks, calibration, halves, sensitivity, not_done),
     )
 
 

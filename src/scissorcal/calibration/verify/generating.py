@@ -59,7 +59,7 @@ def generating_prior(
 
     "recipe": the recipe's own prior, for simulated fits and refits.
     """
-    rung = experiment.rung(experiment.observed)
+    rung = experiment.candidate(experiment.observed)
     prior = rung.prior_precision
     if kind == "recipe":
         return Generating(kind, 1.0, rung.prior_mean, prior)
@@ -78,7 +78,7 @@ def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
     to in the terms of the likelihood is not known beforehand. Thousands of bins tell it well,
     whatever the prior.
     """
-    own = experiment.rung(experiment.observed)
+    own = experiment.candidate(experiment.observed)
     names = experiment.layout.names
     kept = [i for i, name in enumerate(names) if name not in NOISE_SIZES]
     mean = generating.mean if generating.kind == "local" else own.prior_mean

@@ -61,9 +61,9 @@ class Study:
     between: Array | None = None
 
     @property
-    def rung(self) -> str:
+    def law(self) -> str:
         """The fit's law in words."""
-        return self.experiment.rung(self.experiment.observed).name
+        return self.experiment.candidate(self.experiment.observed).name
 
     @property
     def wanted(self) -> list[int]:
@@ -133,7 +133,7 @@ def _shown(study: Study, fit: FitResult, chosen: NDArray[np.int64]) -> list[Arra
         u = unconstrained_draws(study.experiment, fit, chosen)
     except MissingError:
         u = None
-    own = study.experiment.rung(study.experiment.observed)
+    own = study.experiment.candidate(study.experiment.observed)
     if u is not None and fit.rung == own.name:
         return list(quantities(study, u).T)
     names = [parameter.name for parameter in fit.parameters]
@@ -176,7 +176,7 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     assert study.split is not None
     experiment = study.experiment
     keep = study.split.first if index == 0 else study.split.second
-    rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
+    rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
     series = unbroken(experiment.series, keep)
     posterior = infer(rung.problem(series, keep), study.effort, rng, count=study.draws)
     residuals = rung.likelihood.standardised(posterior.optimum.point)
@@ -192,7 +192,7 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
 def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     """Sensitivities of the fit's own posterior to the powers of its prior and likelihood."""
     experiment = study.experiment
-    rung = replace(experiment.rung(experiment.observed), starts=study.start[None, :])
+    rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
     posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
     shown = quantities(study, posterior.draws)
     wanted = study.wanted

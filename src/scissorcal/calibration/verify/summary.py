@@ -70,7 +70,7 @@ def summarise_simulated(
         quantities=quantities,
         band=RankBand(each, _plain(band.z), _plain(band.low), _plain(band.high)),
         escalated=float(np.mean([rung > higher for rung in reached])),
-        other_law=float(np.mean([record["law"] != study.rung for record in sound])),
+        other_law=float(np.mean([record["law"] != study.law for record in sound])),
         unreliable=float(np.mean([_unreliable(record) for record in sound])),
         broken=tuple(record["broken"] for record in records if "broken" in record),
         effective=float(np.median([record["effective"] for record in sound])),
@@ -88,7 +88,7 @@ def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Gen
         )
         for half, r in enumerate(records)
     )
-    prior = experiment.rung(experiment.observed).prior_precision
+    prior = experiment.candidate(experiment.observed).prior_precision
     found = compare(first, second, prior)
     centre = 0.5 * (first.mean + second.mean)
     step = SLOPE_STEP * np.sqrt(np.diag(first.covariance + second.covariance))

@@ -11,7 +11,7 @@ from scissorcal.calibration.verify.result import (
     Sensitivity,
 )
 from scissorcal.calibration.verify.study import EFFORT
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
 FALSE_ALARM = 0.01
 """Probability that any of the statistical verdicts fails although all is right."""
@@ -25,7 +25,7 @@ UNRELIABLE_LIMIT = 0.05
 """Share of simulated fits that may break or fail their own diagnostics."""
 
 
-def judge(
+def verify_verdicts(
     what: str,
     checks: Sequence[Check],
     calibration: Calibration | None,
@@ -48,7 +48,7 @@ def judge(
 
 def _calibration(scope: str, found: Calibration | None, because: str) -> list[Verdict]:
     if found is None:
-        return [Verdict(scope, "calibration", "not_evaluated", None, RANKS_SHARE, because)]
+        return [not_evaluated(scope, "calibration", because, RANKS_SHARE)]
     return [_ranks(scope, found), _refits(scope, found)]
 
 
@@ -56,24 +56,22 @@ def _ranks(scope: str, found: Calibration) -> Verdict:
     check, limit = "calibration", found.band.alpha
     if found.fits < FEWEST_FITS:
         why = f"{found.fits} simulated fits tell little; {FEWEST_FITS} are needed, better 200."
-        return Verdict(scope, check, "not_evaluated", None, limit, why)
+        return not_evaluated(scope, check, why, limit)
     worst = min(found.quantities, key=lambda quantity: quantity.ecdf_p)
-    if worst.ecdf_p >= limit:
-        why = (
-            f"In {found.fits} fits to simulated data the truth's ranks are uniform for all "
-            f"{len(found.quantities)} quantities ({worst.name} least so, p = {worst.ecdf_p:.2g})."
-        )
-        return Verdict(scope, check, "pass", worst.ecdf_p, limit, why)
+    good = (
+        f"In {found.fits} fits to simulated data the truth's ranks are uniform for all "
+        f"{len(found.quantities)} quantities ({worst.name} least so, p = {worst.ecdf_p:.2g})."
+    )
     wrong = [quantity for quantity in found.quantities if quantity.ecdf_p < limit]
-    mend = (
+    remedy = (
         "They are on the safe side; a longer recording narrows them."
         if all(quantity.width < 1.0 - abs(quantity.shift) for quantity in wrong)
-        else "Do not rely on these intervals: record more strokes, or choose a simpler rung or a "
+        else "Do not rely on these intervals: record more strokes, or choose a simpler model or a "
         "higher effort."
     )
     how = "; ".join(_how_wrong(quantity) for quantity in wrong)
-    why = f"In {found.fits} fits to simulated data {how}. {mend}"
-    return Verdict(scope, check, "fail", worst.ecdf_p, limit, why)
+    bad = f"In {found.fits} fits to simulated data {how}. {remedy}"
+    return judge(scope, check, worst.ecdf_p, limit, good, bad)
 
 
 def _how_wrong(quantity: RankedQuantity) -> str:
@@ -93,54 +91,51 @@ def _how_wrong(quantity: RankedQuantity) -> str:
 def _refits(scope: str, found: Calibration) -> Verdict:
     every = found.fits + len(found.broken)
     share = (found.unreliable * found.fits + len(found.broken)) / every
-    status: Status = "pass" if share <= UNRELIABLE_LIMIT else "fail"
     why = (
         f"{share:.1%} of {every} simulated fits broke or failed their own diagnostics, "
         f"{found.escalated:.1%} went to a higher effort, {found.other_law:.1%} took another law."
     )
     if found.broken:
         why += f" One ended with: {found.broken[0]}"
-    return Verdict(scope, "refits", status, share, UNRELIABLE_LIMIT, why)
+    return judge(scope, "refits", share, UNRELIABLE_LIMIT, why)
 
 
 def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
     checks = ("halves", "halves-effort")
     if found is None or found.p_value is None or found.effort_p_value is None:
         why = because if found is None else "Each half holds too little to be judged by itself."
-        return [Verdict(scope, name, "not_evaluated", None, HALVES_SHARE, why) for name in checks]
+        return [not_evaluated(scope, name, why, HALVES_SHARE) for name in checks]
     largest = max((row for row in found.rows if row.z is not None), key=lambda r: abs(r.z or 0.0))
     size = f"{largest.name} differs most, by {abs(largest.z or 0.0):.1f} standard deviations"
     p, effort_p = found.p_value, found.effort_p_value
     by_recording = found.split.startswith(BY_RECORDING)
-    if p >= HALVES_SHARE:
-        why = f"Two halves of the data agree within what each claims (p = {p:.2g}; {size})."
-        if p > 1.0 - HALVES_SHARE:
-            why += (
-                " They agree better than chance would have it: what the law lacks repeats in every "
-                "stroke, and the intervals allow for it as if it were noise."
-            )
-        if not by_recording:
-            why += " How much recordings differ is not known, as there is only one."
-        one = Verdict(scope, checks[0], "pass", p, HALVES_SHARE, why)
-    else:
-        units = "recordings" if by_recording else "strokes"
-        why = (
-            f"Two halves of the data differ by more than each claims (p = {p:.2g}; {size}): the "
-            f"law or the rig changes between {units}. Look at the residuals by stroke, and repeat "
-            "some."
+    good = f"Two halves of the data agree within their claimed errors (p = {p:.2g}; {size})."
+    if p > 1.0 - HALVES_SHARE:
+        good += (
+            " They agree better than expected: a lack of fit repeats in every stroke, and the "
+            "intervals allow for it as if it were noise."
         )
-        one = Verdict(scope, checks[0], "fail", p, HALVES_SHARE, why)
-    what = (
-        f"the halves' predictions differ by {found.effort_difference:.2%} of the effort's rms "
-        f"where {found.effort_expected:.2%} is expected (p = {effort_p:.2g})"
+    if not by_recording:
+        good += " How much recordings differ is not known, as there is only one."
+    units = "recordings" if by_recording else "strokes"
+    bad = (
+        f"Two halves of the data differ by more than their claimed errors (p = {p:.2g}; {size}): "
+        f"the law or the rig changes between {units}. Look at the residuals by stroke, and repeat "
+        "some."
     )
-    status: Status = "pass" if effort_p >= HALVES_SHARE else "fail"
-    return [one, Verdict(scope, checks[1], status, effort_p, HALVES_SHARE, f"{what.capitalize()}.")]
+    what = (
+        f"The halves' predictions differ by {found.effort_difference:.2%} of the effort's rms "
+        f"where {found.effort_expected:.2%} is expected (p = {effort_p:.2g})."
+    )
+    return [
+        judge(scope, checks[0], p, HALVES_SHARE, good, bad),
+        judge(scope, checks[1], effort_p, HALVES_SHARE, what),
+    ]
 
 
 def _prior(scope: str, found: Sensitivity | None, because: str) -> Verdict:
     if found is None:
-        return Verdict(scope, "prior", "not_evaluated", None, None, because)
+        return not_evaluated(scope, "prior", because)
     worst = max(found.rows, key=lambda row: row.prior)
     effort = next(row for row in found.rows if row.name == EFFORT)
     conflict = [row.name for row in found.rows if row.diagnosis == "prior-data conflict"]

@@ -140,8 +140,8 @@ def _rungs(section: CameraSection) -> Panel:
         "Distortion", "Free parameters", "Rms unseen [px]", "Behind the best", "=Outcome"
     )
     table = Table(
-        "From cheap to rich, judged on photographs left out; behind the best in log-likelihood by "
-        "photograph. The cheapest that cannot be told from the best is used.",
+        "Simplest first, compared on held-out photographs; behind the best in their log density. "
+        "The simplest that is not distinguishable from the best is used.",
         heads,
         rows,
     )

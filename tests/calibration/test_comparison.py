@@ -1,24 +1,20 @@
-"""Rungs: told apart where strokes tell them apart, and only there; PSIS-LOO against refits."""
+"""Candidates are distinguishable where strokes say so, and only there; PSIS-LOO against refits."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from scipy.stats import wilcoxon
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.candidates import (
-    Climbed,
+from scissorcal.calibration.candidates import is_positive
+from scissorcal.calibration.comparison import candidate_rows, choose, comparison_text
+from scissorcal.calibration.fit_candidate import (
+    Candidate,
+    FittedCandidate,
     Likelihood,
-    Rung,
-    beaten,
-    choose,
-    climb,
-    signed_rank_chance,
+    fit_candidate,
 )
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.calibration.rung_table import rung_table
-from scissorcal.calibration.selection import selection_sentence
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint
@@ -29,7 +25,7 @@ STROKES, BINS = 12, 40
 
 def line(
     outcome: np.ndarray, columns: np.ndarray, name: str, strokes: np.ndarray, sd: float = 0.5
-) -> Rung:
+) -> Candidate:
     """A linear law with normal noise of known size, whose leave-out densities are exact."""
     count = columns.shape[1]
     layout = Layout(
@@ -42,7 +38,7 @@ def line(
     def normal(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return residuals(u) / sd, np.full(len(outcome), np.log(sd))
 
-    return Rung(
+    return Candidate(
         name=name,
         key={},
         layout=layout,
@@ -85,71 +81,70 @@ def test_psis_loo_over_strokes_equals_the_closed_form(seed):
     x, square, strokes = design(rng)
     columns = np.column_stack([np.ones_like(x), x, square])
     outcome = 1.0 + 2.0 * x + 0.5 * rng.standard_normal(len(x))
-    found = climb(line(outcome, columns, "quadratic", strokes), strokes, strokes)
+    found = fit_candidate(line(outcome, columns, "quadratic", strokes), strokes, strokes)
     assert np.all(found.left_out.reliable)
     expected = exact_leave_out(outcome, columns, strokes, found.share)
     assert found.left_out.scores.sum() == pytest.approx(expected, abs=0.1)
 
 
-def climbed_pair(bend: float, seed: int) -> list[Climbed]:
+def fitted_pair(bend: float, seed: int) -> list[FittedCandidate]:
     rng = np.random.default_rng(seed)
     x, square, strokes = design(rng)
     outcome = 1.0 + 2.0 * x + bend * square + 0.5 * rng.standard_normal(len(x))
     straight = np.column_stack([np.ones_like(x), x])
     laws = (("line", straight), ("parabola", np.column_stack([straight, square])))
-    return [climb(line(outcome, c, name, strokes), strokes, strokes) for name, c in laws]
+    return [fit_candidate(line(outcome, c, name, strokes), strokes, strokes) for name, c in laws]
 
 
-def test_rungs_that_predict_alike_are_one_class_and_the_cheapest_is_used():
-    climbed = climbed_pair(0.0, 1)
-    chosen = choose(climbed)
-    assert chosen.rung.name == "line"
-    assert chosen.alike == ("line", "parabola")
-    assert [row["equivalent"] for row in rung_table(climbed, chosen)] == [True, True]
-    assert [row["chosen"] for row in rung_table(climbed, chosen)] == [True, False]
+def test_equivalent_candidates_are_one_class_and_the_simplest_is_used():
+    fitted = fitted_pair(0.0, 1)
+    chosen = choose(fitted)
+    assert chosen.name == "line"
+    assert chosen.equivalent == ("line", "parabola")
+    assert [row["equivalent"] for row in candidate_rows(fitted, chosen)] == [True, True]
+    assert [row["chosen"] for row in candidate_rows(fitted, chosen)] == [True, False]
 
 
-def test_a_rung_that_strokes_tell_apart_is_out_of_the_class():
-    climbed = climbed_pair(0.2, 1)
-    chosen = choose(climbed)
-    assert chosen.rung.name == "parabola"
-    rows = rung_table(climbed, chosen)
+def test_a_distinguishable_candidate_is_not_equivalent():
+    fitted = fitted_pair(0.2, 1)
+    chosen = choose(fitted)
+    assert chosen.name == "parabola"
+    rows = candidate_rows(fitted, chosen)
     assert [row["equivalent"] for row in rows] == [False, True]
     assert rows[1]["loo"] > rows[0]["loo"]
     assert rows[1]["loo_se"] > 0
 
 
-def test_a_difference_that_nobody_feels_is_no_difference():
-    climbed = climbed_pair(0.2, 1)
-    assert choose(climbed, signal_rms=1e3).alike == ("line", "parabola")
+def test_a_difference_too_small_to_feel_leaves_candidates_equivalent():
+    fitted = fitted_pair(0.2, 1)
+    assert choose(fitted, signal_rms=1e3).equivalent == ("line", "parabola")
 
 
 def test_the_simple_truth_is_seldom_rejected():
     """The test's own level is 5 % and it wants 3 nats besides: at most 2 of 20 (99 %)."""
-    rejected = sum(choose(climbed_pair(0.0, seed)).rung.name != "line" for seed in range(20))
+    rejected = sum(choose(fitted_pair(0.0, seed)).name != "line" for seed in range(20))
     assert rejected <= 2
 
 
-def test_a_single_rung_is_not_compared():
-    climbed = climbed_pair(0.0, 2)[:1]
-    (row,) = rung_table(climbed, choose(climbed))
+def test_a_single_candidate_is_not_compared():
+    fitted = fitted_pair(0.0, 2)[:1]
+    (row,) = candidate_rows(fitted, choose(fitted))
     assert row["equivalent"]
     assert np.isnan(row["loo"])
 
 
-@pytest.mark.parametrize("count", [6, 13, 40])
-def test_the_chance_of_signed_ranks_is_scipys(count):
-    gained = np.random.default_rng(count).normal(0.2, 1.0, count)
-    expected = wilcoxon(gained, alternative="greater", method="exact").pvalue
-    assert signed_rank_chance(gained) == pytest.approx(expected, rel=1e-12)
-
-
-def test_one_lucky_stroke_beats_nothing():
+def test_one_stroke_alone_gives_no_evidence():
     gained = np.full(12, -0.1)
     gained[3] = 50.0
-    assert not beaten(gained)
-    assert beaten(np.full(12, 0.5))
-    assert not beaten(np.full(12, 0.1)), "consistent, but less than 3 nats"
+    assert not is_positive(gained)
+    assert is_positive(np.full(12, 0.5))
+    assert not is_positive(np.full(12, 0.1)), "consistent, but less than 3 nats"
+
+
+def test_units_in_which_candidates_do_not_differ_are_no_evidence_against_the_best():
+    """A camera's distortion shows in photographs of the corners only."""
+    gained = np.array([4.0, 10.0, 9.0, 5.0, 5.0, 11.0, -0.2, 0.1, -0.1, -0.2, 0.0, -0.1])
+    assert is_positive(gained)
 
 
 def test_a_stroke_that_alone_decides_a_parameter_is_called_unreliable():
@@ -158,11 +153,11 @@ def test_a_stroke_that_alone_decides_a_parameter_is_called_unreliable():
     only = np.where(strokes == 5, rng.standard_normal(len(strokes)), 0.0)
     columns = np.column_stack([np.ones(len(strokes)), only])
     outcome = 1.0 + 3.0 * only + 0.5 * rng.standard_normal(len(strokes))
-    found = climb(line(outcome, columns, "one stroke's", strokes), strokes, strokes)
+    found = fit_candidate(line(outcome, columns, "one stroke's", strokes), strokes, strokes)
     assert np.flatnonzero(~found.left_out.reliable).tolist() == [5]
 
 
-def test_a_fit_names_what_cannot_be_told_apart_and_what_would_tell_it():
+def test_a_fit_names_equivalent_candidates_and_what_would_distinguish_them():
     recording = friction_recording(Truth(), np.random.default_rng(1))
     ladder = FitFriction(critic=False)
     found = fit_friction((recording,), ladder, effort="standard", rng=np.random.default_rng(3))
@@ -172,17 +167,17 @@ def test_a_fit_names_what_cannot_be_told_apart_and_what_would_tell_it():
     for name in alike:
         assert name in found.selection
     assert "is used" in found.selection
-    assert "would tell them apart" in found.selection
+    assert "would distinguish them" in found.selection
     assert "rad/s" in found.selection
     named = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
     alone = fit_friction((recording,), named, effort="draft", rng=np.random.default_rng(3))
-    assert "named in the recipe" in alone.selection
+    assert "The recipe names coulomb + viscous" in alone.selection
 
 
 def test_segments_of_a_path_are_counted_and_not_timed():
     """A cut's segments have no length in seconds: no sentence may say "nan s"."""
-    climbed = climbed_pair(0.02, 1)
-    chosen = choose(climbed)
+    fitted = fitted_pair(0.02, 1)
+    chosen = choose(fitted)
     count = STROKES * BINS
     numbers, zeros = np.zeros(count, dtype=np.int64), np.zeros(count)
     segments = Bins(
@@ -201,16 +196,16 @@ def test_segments_of_a_path_are_counted_and_not_timed():
         rate_floor=0.0,
     )
     contact = np.full(count, np.nan)
-    said = selection_sentence(climbed, chosen, segments, contact, Joint())
-    assert "more segments of the path there would tell them apart" in said
+    said = comparison_text(fitted, chosen, segments, contact, Joint())
+    assert "more segments of the path there would distinguish them" in said
     assert "nan" not in said
     timed = dataclasses.replace(segments, bin_s=0.005)
-    assert "s more of motion" in selection_sentence(climbed, chosen, timed, contact, Joint())
+    assert "s more of motion" in comparison_text(fitted, chosen, timed, contact, Joint())
 
 
-def test_bad_strokes_do_not_break_the_comparison():
-    """Where no density is finite the rung is kept out of PSIS-LOO, not the fit stopped."""
-    climbed = climbed_pair(0.2, 1)
-    broken = dataclasses.replace(climbed[1], information=np.full((3, 3), 1e-30))
+def test_strokes_without_a_density_do_not_break_the_comparison():
+    """Where no density is finite the candidate is left out of PSIS-LOO; the fit goes on."""
+    fitted = fitted_pair(0.2, 1)
+    broken = dataclasses.replace(fitted[1], information=np.full((3, 3), 1e-30))
     assert broken.left_out.scores.shape == (STROKES,)
-    assert choose([climbed[0], broken]).rung.name == "parabola"
+    assert choose([fitted[0], broken]).name == "parabola"

@@ -1,0 +1,214 @@
+"""Compare fitted candidates on held-out strokes, in rows and in words, and say what to measure."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.candidates import (
+    POSITIVE_EVIDENCE,
+    RELIABLE_UNITS,
+    Account,
+    CandidateRow,
+    compare,
+    comparison_sentence,
+    standard_error,
+)
+from scissorcal.calibration.fit_candidate import FittedCandidate
+from scissorcal.calibration.psis_loo import RELIABLE
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.recording.recording import Joint
+
+Array = NDArray[np.float64]
+
+NEGLIGIBLE = 0.0175
+"""Share of the signal below which an error does not matter: a quarter of the 7 % that people
+just notice in a force (Jones 2000, Kinesthetic sensing)."""
+
+PLACES = 5
+"""Stretches of speed, and of contact or opening, among which the place of most difference lies."""
+FEWEST_BINS = 10
+
+
+def choose(fitted: Sequence[FittedCandidate], signal_rms: float = 0.0) -> FittedCandidate:
+    """Take the simplest candidate that is not distinguishable from the best.
+
+    ``fitted`` stands simplest first. Held-out strokes are judged twice (see
+    :func:`~.candidates.compare`): by fits without them, and by the posterior without them (PSIS-LOO
+    over whole strokes, as far as its k-hats are good). Candidates whose error is larger by less
+    than `NEGLIGIBLE` of ``signal_rms`` are equivalent too. That needs a ``signal_rms``, and suits
+    candidates that differ in their mean only. The result has ``equivalent`` filled in.
+    """
+    rows = _rows(fitted, signal_rms)
+    (index,) = (index for index, row in enumerate(rows) if row.chosen)
+    return replace(fitted[index], equivalent=tuple(row.name for row in rows if row.equivalent))
+
+
+def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
+    """The candidate with the highest log density of unseen strokes.
+
+    Its share of independent bins is the one by which all candidates are compared.
+    """
+    return max(fitted, key=lambda one: float(one.scores.sum()))
+
+
+def _rows(fitted: Sequence[FittedCandidate], signal_rms: float) -> tuple[CandidateRow, ...]:
+    best = best_of(fitted)
+    accounts = [Account(np.stack([one.scores for one in fitted]) * best.share)]
+    if len(fitted) > 1:
+        scores = np.stack([one.left_out.scores for one in fitted]) * best.share
+        accounts.append(Account(scores, np.stack([one.left_out.reliable for one in fitted])))
+    limit = (NEGLIGIBLE * signal_rms) ** 2
+    return compare(
+        [one.name for one in fitted],
+        [len(one.optimum.point) for one in fitted],
+        accounts,
+        [signal_rms > 0 and one.held_out_rms**2 - best.held_out_rms**2 <= limit for one in fitted],
+    )
+
+
+def candidate_rows(
+    fitted: Sequence[FittedCandidate], chosen: FittedCandidate
+) -> tuple[dict[str, Any], ...]:
+    """Rows for the report and the file, simplest first.
+
+    Those of :class:`~.candidates.CandidateRow`, and bic, held_out_rms, held_out_score, loo, loo_se,
+    loo_k_hat. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
+    independent, the same share for every candidate. ``loo`` is the log density of all strokes, each
+    by the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
+    stroke's tail index; they are NaN for a single candidate, as there is nothing to compare.
+    ``key`` and ``values`` (by name, at the best point) are what a candidate's law is drawn from.
+    """
+    share = best_of(fitted).share
+    compared = len(fitted) > 1
+    rows = []
+    for row, one in zip(_rows(fitted, 0.0), fitted, strict=True):
+        used = one.name == chosen.name
+        row = replace(row, chosen=used, equivalent=used or one.name in chosen.equivalent)
+        count = float(np.log(one.observations * share))
+        natural = one.candidate.layout.natural(one.optimum.point)
+        rows.append(
+            {
+                **asdict(row),
+                "bic": -2 * one.log_likelihood * share + row.parameters * count,
+                "held_out_rms": one.held_out_rms,
+                "held_out_score": row.score,
+                **_loo(one, share if compared else float("nan")),
+                "key": dict(one.candidate.key),
+                "values": {name: float(value) for name, value in natural.items()},
+            }
+        )
+    return tuple(rows)
+
+
+def _loo(one: FittedCandidate, share: float) -> dict[str, float]:
+    if not np.isfinite(share):
+        return {"loo": share, "loo_se": share, "loo_k_hat": share}
+    found = one.left_out
+    return {
+        "loo": float(found.scores.sum()) * share,
+        "loo_se": standard_error(found.scores * share),
+        "loo_k_hat": float(found.k_hats.max()),
+    }
+
+
+def comparison_text(
+    fitted: Sequence[FittedCandidate],
+    chosen: FittedCandidate,
+    bins: Bins,
+    contact: Array,
+    joint: Joint,
+) -> str:
+    """Say which candidates are equivalent, which is used, and what would distinguish them.
+
+    ``contact`` (n,) is where the material is met, NaN for empty motion. The place named is where,
+    within the recorded motion, the predictions of the candidate used and of any equivalent one lie
+    furthest apart, and the time (the number of segments, where those are of the path and not of
+    time) is what it would take there for 3 nats.
+    """
+    if len(fitted) == 1:
+        return f"The recipe names {chosen.name}; it was compared with no other candidate."
+    rows = [
+        replace(row, chosen=row.name == chosen.name, equivalent=row.name in chosen.equivalent)
+        for row in _rows(fitted, 0.0)
+    ]
+    text = comparison_sentence(rows, "strokes")
+    doubt = _unreliable(fitted)
+    others = [one for one in fitted if one.name in chosen.equivalent and one.name != chosen.name]
+    if not others:
+        return text + doubt
+    found = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)
+    return f"{text} {_advice(found, chosen, bins, joint)}{doubt}"
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where two candidates differ: ranges of speed and place, and nats that one bin there is worth.
+
+    ``difference`` is the rms of their difference there, in the unit of the effort.
+    """
+
+    other: str
+    speed: tuple[float, float]
+    place: tuple[float, float]
+    by_contact: bool
+    difference: float
+    nats: float
+
+
+def _apart(chosen: FittedCandidate, other: FittedCandidate, bins: Bins, contact: Array) -> _Place:
+    residuals = [c.candidate.likelihood.residuals(c.optimum.point) for c in (chosen, other)]
+    difference = residuals[0] - residuals[1]
+    variance = float(np.mean(residuals[0] ** 2))
+    speed = np.abs(bins.rate)
+    by_contact = bool(np.any(np.isfinite(contact)))
+    place = contact if by_contact else bins.opening
+    known = np.isfinite(place)
+    speeds, places = (_ranges(values[known]) for values in (speed, place))
+    best = _Place(other.name, (0.0, 0.0), (0.0, 0.0), by_contact, 0.0, 0.0)
+    for low, high in pairwise(speeds):
+        for near, far in pairwise(places):
+            here = known & (speed >= low) & (speed <= high) & (place >= near) & (place <= far)
+            if np.count_nonzero(here) < FEWEST_BINS:
+                continue
+            squared = float(np.mean(difference[here] ** 2))
+            nats = 0.5 * chosen.share * squared / variance
+            if nats > best.nats:
+                span, reach = (float(low), float(high)), (float(near), float(far))
+                best = _Place(best.other, span, reach, by_contact, float(np.sqrt(squared)), nats)
+    return best
+
+
+def _ranges(values: Array) -> Array:
+    return np.unique(np.quantile(values, np.linspace(0.0, 1.0, PLACES + 1)))
+
+
+def _advice(place: _Place, chosen: FittedCandidate, bins: Bins, joint: Joint) -> str:
+    if place.nats <= 0.0:
+        return "Their predictions are the same over the recorded motion."
+    unit = "m" if place.by_contact else joint.position_unit
+    where = "contact" if place.by_contact else "opening"
+    count = POSITIVE_EVIDENCE / place.nats
+    more = f"{count * bins.bin_s:.2g} s more of motion"
+    if not np.isfinite(bins.bin_s):
+        more = f"{max(1, round(count))} more segments of the path"
+    return (
+        f"{chosen.name} and {place.other} differ most, by {place.difference:.2g} "
+        f"{joint.effort_unit} (rms), at {place.speed[0]:.2g} to {place.speed[1]:.2g} "
+        f"{joint.position_unit}/s and {where} {place.place[0]:.2g} to {place.place[1]:.2g} {unit}: "
+        f"if one of them is true, about {more} there would distinguish them."
+    )
+
+
+def _unreliable(fitted: Sequence[FittedCandidate]) -> str:
+    """Where PSIS-LOO did not count."""
+    good = float(np.mean(best_of(fitted).left_out.reliable))
+    if good >= RELIABLE_UNITS:
+        return ""
+    return (
+        f" PSIS-LOO was not used: for {1 - good:.0%} of the strokes its k-hat is {RELIABLE:.2f} or "
+        "more, as single strokes decide a parameter; record more strokes of each kind."
+    )
