@@ -1,10 +1,10 @@
-"""What each rung of effort costs: effective samples per second, optimum and Hessian included.
+"""What each effort costs: effective samples per second, optimum and Hessian included.
 
     python benchmarks/inference.py [--case stribeck|sblri|nist] [--data ../shared/data] [--seed 0]
 
-One log-posterior at a time is given to every rung of the ladder, to the rung that integrates what
-is linear, to emcee's default (32 walkers, stretch moves) and, where the extra `bench` is
-installed, to NumPyro's NUTS (4 chains, 500 steps of warm-up and 1000 kept, double precision).
+One log-posterior at a time is given to every effort, to emcee's default (32 walkers, stretch
+moves) and, where the extra `bench` is installed, to NumPyro's NUTS (4 chains, 500 steps of warm-up
+and 1000 kept, double precision).
 Effective samples are those of the worst parameter: 1 / sum of squared weights for importance
 sampling, bulk ESS (Vehtari et al. 2021) for chains. They are given per second of processor time of
 this process and its threads, which a busy machine does not blur as it does the wall time; imports
@@ -35,7 +35,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference import Posterior, Problem, infer
-from scissorcal.inference.linear import LinearProblem, infer_linear
 
 Array = NDArray[np.float64]
 
@@ -47,11 +46,10 @@ REFERENCE_STEPS = 8_000
 
 @dataclass(frozen=True)
 class Case:
-    """One posterior, as numpy over all parameters, collapsed, and as a function for JAX."""
+    """One posterior, as numpy and as a function for JAX."""
 
     name: str
     problem: Problem
-    linear: LinearProblem
     in_jax: Callable[[Any, Any], Any]
 
 
@@ -103,10 +101,9 @@ def run(case: Case, seed: int) -> None:
     """Measure every method on one case and print the table."""
     reference = long_reference(case.problem, seed)
     rows = [
-        rung(case.problem, "draft", seed),
-        rung(case.problem, "standard", seed),
-        collapsed(case, seed),
-        rung(case.problem, "thorough", seed),
+        by_effort(case.problem, "draft", seed),
+        by_effort(case.problem, "standard", seed),
+        by_effort(case.problem, "thorough", seed),
         emcee_default(case.problem, seed),
         *nuts(case, seed),
     ]
@@ -158,24 +155,13 @@ def nist_table(folder: Path) -> None:
     )
 
 
-def rung(problem: Problem, effort: Any, seed: int) -> Row:
-    """One rung of the ladder, from the search on."""
+def by_effort(problem: Problem, effort: Any, seed: int) -> Row:
+    """One effort, from the search on."""
     clock = Clock()
     found = infer(problem, effort, np.random.default_rng(seed), count=4000)
     wall, cpu = clock.read()
     effective = np.nan if effort == "draft" else found.effective
     return Row(effort, wall, cpu, found.evaluations, effective, found.draws, remark_of(found))
-
-
-def collapsed(case: Case, seed: int) -> Row:
-    """Standard effort on the nonlinear parameters alone."""
-    clock = Clock()
-    found = infer_linear(case.linear, "standard", np.random.default_rng(seed), count=4000)
-    wall, cpu = clock.read()
-    order = [found.names.index(name) for name in case.problem.names]
-    draws = found.draws[:, order]
-    name = "standard, linear part integrated"
-    return Row(name, wall, cpu, found.evaluations, found.effective, draws, remark_of(found))
 
 
 def remark_of(found: Posterior) -> str:
@@ -305,7 +291,7 @@ def stribeck(rng: np.random.Generator) -> Case:
 
     return Case(
         "stribeck",
-        *both(
+        linear_posterior(
             effort,
             design,
             ("offset", "coulomb", "stribeck", "viscous"),
@@ -335,7 +321,7 @@ def sblri(archive: Path) -> Case:
 
     return Case(
         "sblri",
-        *both(
+        linear_posterior(
             y,
             lambda theta: (np.zeros(len(y)), X),
             tuple(f"beta{i}" for i in range(1, 6)),
@@ -349,7 +335,7 @@ def sblri(archive: Path) -> Case:
     )
 
 
-def both(
+def linear_posterior(
     measured: Array,
     design: Callable[[Array], tuple[Array, Array]],
     linear_names: tuple[str, ...],
@@ -358,27 +344,13 @@ def both(
     log_prior: Callable[[Array], float],
     spread: Array,
     starts: Array,
-) -> tuple[Problem, LinearProblem]:
-    """The same posterior over all parameters, linear ones first, and as a linear problem.
+) -> Problem:
+    """The posterior of a model that is linear in its first parameters.
 
     The last of ``names`` is the logarithm of the noise's standard deviation.
     """
     mean, sd = linear_prior
     q = len(mean)
-    linear = LinearProblem(
-        names=names,
-        linear_names=linear_names,
-        measured=measured,
-        design_at=design,
-        log_sd_at=lambda theta: theta[-1],
-        linear_mean=mean,
-        linear_covariance=np.diag(sd**2),
-        log_prior=log_prior,
-        prior_sd=spread,
-        starts=starts,
-        lower=starts[0] - 8 * spread,
-        upper=starts[0] + 8 * spread,
-    )
 
     def standardised(u: Array) -> tuple[Array, Array]:
         _, columns = design(u[q:])
@@ -393,7 +365,7 @@ def both(
 
     scale = np.concatenate([sd, spread])
     at = np.column_stack([np.tile(mean, (len(starts), 1)), starts])
-    whole = Problem(
+    return Problem(
         names=(*linear_names, *names),
         log_prior=prior_of_all,
         log_likelihood_terms=terms,
@@ -405,7 +377,6 @@ def both(
         standardised=standardised,
         independent=True,
     )
-    return whole, linear
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ POSITIVE_EVIDENCE = 3.0
 """Log density, counting independent observations only, that the best candidate must gain: a factor
 of 20 (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572, call this strong)."""
 
-FALSE_ALARM = 0.05
 FEWEST_UNITS = 6
 """With fewer units their spread is hardly known, and the evidence alone decides."""
 
@@ -60,11 +59,12 @@ def compare(
 
     Candidates stand simplest first. The best has the highest log density of held-out units in the
     first account. Another one is distinguishable from it where every account says so: the best
-    gains `POSITIVE_EVIDENCE` in sum, and by more than the standard error of paired differences over
-    units allows (Vehtari, Gelman and Gabry 2017, doi:10.1007/s11222-016-9696-4, section 5.2; at
-    `FALSE_ALARM`, where there are units enough). An account in which too few units are reliable for
-    both does not count, the first always does. ``negligible`` marks candidates whose error exceeds
-    the best one's by too little to matter: these are equivalent in any case.
+    gains `POSITIVE_EVIDENCE` in sum, and more than one standard error of the paired differences
+    over units (the one-standard-error rule of Breiman, Friedman, Olshen and Stone 1984, chapter 3,
+    on the densities of Vehtari, Gelman and Gabry 2017, doi:10.1007/s11222-016-9696-4). An account
+    in which too few units are reliable for both does not count, the first always does.
+    ``negligible`` marks candidates whose error exceeds the best one's by too little to matter:
+    these are equivalent in any case.
     """
     scores = accounts[0].scores
     best = int(np.argmax(scores.sum(axis=1)))
@@ -126,13 +126,11 @@ def _rejects(account: Account, best: int, index: int) -> bool:
 def is_positive(gained: Array) -> bool:
     """Whether log density gained by unit (units,) is strong evidence, and more than its spread.
 
-    The sum is tested against its standard error over units by Student's t. A unit in which two
-    candidates predict the same then says nothing for or against either, and one unit alone cannot
-    decide: it widens the standard error as well.
+    The sum must exceed one standard error over units. A single unit reaches that limit and never
+    exceeds it, so that one unit alone decides nothing; a unit in which two candidates predict the
+    same says nothing for or against either.
     """
-    from scipy.special import stdtrit
-
     total = float(gained.sum())
-    if total < POSITIVE_EVIDENCE or len(gained) < FEWEST_UNITS:
-        return total >= POSITIVE_EVIDENCE
-    return total > float(stdtrit(len(gained) - 1, 1.0 - FALSE_ALARM)) * standard_error(gained)
+    if total < POSITIVE_EVIDENCE:
+        return False
+    return len(gained) < FEWEST_UNITS or total > standard_error(gained)

@@ -3,9 +3,8 @@
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
 from scissorcal.inference.counting import Counter, Stop
-from scissorcal.inference.curvature import gradient, hessian, natural_step
+from scissorcal.inference.curvature import gradient, hessian
 from scissorcal.inference.infer import infer
-from scissorcal.inference.information import likelihood_information
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
 from scissorcal.inference.pareto import smooth_weights
 from scissorcal.inference.posterior import Effort, Posterior
@@ -30,10 +29,8 @@ __all__ = [
     "gradient",
     "hessian",
     "infer",
-    "likelihood_information",
     "ljung_box",
     "log_density",
-    "natural_step",
     "robust_covariance_of_scores",
     "smooth_weights",
     "tails_of",

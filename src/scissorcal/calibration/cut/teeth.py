@@ -242,12 +242,6 @@ def _gain(pairs: Sequence[Complex]) -> float:
     return float(abs(sum(complex(pair.sum()) for pair in own)) ** 2 / max(chance, 1e-300))
 
 
-def coherent_gain(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """Power that keeps its phase at a frequency over what noise would leave."""
-    found = _pairs_of(signals, frequency)
-    return _gain(found) if found else 0.0
-
-
 def coherent_power(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """Power that keeps its phase, summed over strokes."""
     found = _pairs_of(signals, frequency)
