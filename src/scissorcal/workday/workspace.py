@@ -38,6 +38,11 @@ class Workspace:
         return self.root / "captures"
 
     @property
+    def exclusions_path(self) -> Path:
+        """Which recordings fits do not use, and why."""
+        return self.captures_dir / "excluded.json"
+
+    @property
     def report_html(self) -> Path:
         return self.root / "report" / "report.html"
 
