@@ -97,8 +97,8 @@ def _from_camera(
     workspace: "Workspace", source: str, views: int, seed: int, *, card: bool
 ) -> "PlateCapture":
     from scissorcal.vision.live import pick_at_rest
+    from scissorcal.vision.sim.sim_camera import render_card_photographs, render_plate_photographs
     from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
     from scissorcal.workday.runs.plate import capture_plate
 
     with tempfile.TemporaryDirectory() as scratch:
