@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from scissorcal.calibration.plate.track import read_track
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.pose import Pose as Found
@@ -19,7 +20,6 @@ from scissorcal.vision.sim.sim_camera import (
     render_plate_photographs,
     sim_plate_scene,
 )
-from scissorcal.workday.runs.track import read_track
 from tests.cli.conftest import Cli
 
 

@@ -12,7 +12,7 @@ from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.workday.runs.track import TrackSummary
+    from scissorcal.calibration.plate.track import TrackSummary
 
 _SIM_FRAMES = 24
 
