@@ -146,7 +146,7 @@ def test_stances_are_checked_line_by_line(
     for text, words in (
         ("file,advance_mm\nrig-01.jpg,3\n", "needs a first line"),
         ("file,advance_mm,opening_deg\nrig-01.jpg,3,wide\n", "line 2"),
-        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no line among the stances"),
+        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no stance: add a line"),
     ):
         table.write_text(text)
         said = cli("capture", "plate", "-i", cards(album)[0], "--stances", table)

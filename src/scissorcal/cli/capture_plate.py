@@ -63,7 +63,8 @@ def plate(
       plate-01.jpg: 24 of 24 corners of the plate board, 62 px a side
       ...
     """
-    from scissorcal.workday.runs.plate import capture_plate, read_stances
+    from scissorcal.vision.stances import read_stances
+    from scissorcal.workday.runs.plate import capture_plate
 
     if bool(images) == bool(source):
         raise click.UsageError("Give photographs with --image, or a camera or video with --camera.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from pydantic import BaseModel
 
+from scissorcal.calibration.plate.fit import plate_target
 from scissorcal.calibration.plate.track import (
     TrackHead,
     TrackRow,
@@ -19,7 +20,7 @@ from scissorcal.errors import InputError
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.track import STATES, track
 from scissorcal.workday.runs.camera import require_camera
-from scissorcal.workday.runs.plate import plate_target, workspace_rig
+from scissorcal.workday.runs.plate import workspace_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
