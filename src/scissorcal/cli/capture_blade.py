@@ -77,10 +77,12 @@ def blade(
         pivot_px=pivot,
     )
     if source == "sim":
-        from scissorcal.workday.demo.sim_photographs import render_blade_photographs
+        from scissorcal.vision.sim.sim_camera import render_blade_photographs
+        from scissorcal.workday.demo.sim_photographs import specimen_blade
 
         with tempfile.TemporaryDirectory() as scratch:
-            made = render_blade_photographs(workspace.recipe(), Path(scratch), seed, both=both)
+            shape = specimen_blade(workspace.recipe())
+            made = render_blade_photographs(shape, Path(scratch), seed, both=both)
             done = capture_blade(workspace, made, setup, note)
     else:
         done = capture_blade(workspace, (*images, *more), setup, note)

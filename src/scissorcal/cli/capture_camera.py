@@ -101,8 +101,8 @@ def camera(
 
 
 def _rendered(board: "Board", folder: Path, seed: int, views: int) -> Sequence[Path]:
+    from scissorcal.vision.sim.sim_camera import render_board_photographs
     from scissorcal.vision.targets.boards import Chessboard
-    from scissorcal.workday.demo.sim_photographs import render_board_photographs
 
     if isinstance(board, Chessboard):
         raise click.UsageError("Only printed boards with markers are rendered: leave --board out.")

@@ -63,7 +63,8 @@ def plate(
       plate-01.jpg: 24 of 24 corners of the plate board, 62 px a side
       ...
     """
-    from scissorcal.workday.runs.plate import capture_plate, read_stances
+    from scissorcal.vision.stances import read_stances
+    from scissorcal.workday.runs.plate import capture_plate
 
     if bool(images) == bool(source):
         raise click.UsageError("Give photographs with --image, or a camera or video with --camera.")
@@ -97,8 +98,8 @@ def _from_camera(
     workspace: "Workspace", source: str, views: int, seed: int, *, card: bool
 ) -> "PlateCapture":
     from scissorcal.vision.live import pick_at_rest
+    from scissorcal.vision.sim.sim_camera import render_card_photographs, render_plate_photographs
     from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
     from scissorcal.workday.runs.plate import capture_plate
 
     with tempfile.TemporaryDirectory() as scratch:

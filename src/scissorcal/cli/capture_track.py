@@ -12,7 +12,7 @@ from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.workday.runs.track import TrackSummary
+    from scissorcal.calibration.plate.track import TrackSummary
 
 _SIM_FRAMES = 24
 
@@ -49,7 +49,7 @@ def track(source: str, seconds: float | None, seed: int, folder: Path | None) ->
       ...
     """
     from scissorcal.vision.live import frames_of
-    from scissorcal.workday.demo.sim_plate import render_frames
+    from scissorcal.vision.sim.sim_camera import render_frames
     from scissorcal.workday.runs.track import track_plate
 
     workspace = open_workspace(folder)

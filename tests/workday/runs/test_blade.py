@@ -4,7 +4,8 @@ import pytest
 
 from scissorcal.calibration.edge.store import load_blade
 from scissorcal.errors import InputError, MissingError
-from scissorcal.workday.demo.sim_photographs import render_blade_photographs
+from scissorcal.vision.sim.sim_camera import render_blade_photographs
+from scissorcal.workday.demo.sim_photographs import specimen_blade
 from scissorcal.workday.photographs import BladeSetup, photo_captures
 from scissorcal.workday.runs.blade import blade_path, capture_blade, fit_workspace_blade
 from scissorcal.workday.workspace import create_workspace
@@ -18,7 +19,7 @@ def workspace(tmp_path_factory):
 @pytest.fixture(scope="module")
 def photographs(workspace, tmp_path_factory):
     folder = tmp_path_factory.mktemp("photographs")
-    return render_blade_photographs(workspace.recipe(), folder, seed=1, count=2)
+    return render_blade_photographs(specimen_blade(workspace.recipe()), folder, seed=1, count=2)
 
 
 def test_nothing_captured_is_said(tmp_path):
@@ -67,7 +68,9 @@ def test_open_scissors_do_not_mix_with_a_blade_alone(workspace, photographs):
 
 def test_both_blades_of_virtual_scissors(tmp_path):
     lab = create_workspace(tmp_path / "pair", "paper-80gsm")
-    made = render_blade_photographs(lab.recipe(), tmp_path, seed=2, count=1, both=True)
+    made = render_blade_photographs(
+        specimen_blade(lab.recipe()), tmp_path, seed=2, count=1, both=True
+    )
     capture_blade(lab, made, BladeSetup(both=True), lambda _: None)
     result = fit_workspace_blade(lab, effort="draft").result
     assert [blade.name for blade in result.blades] == ["left", "right"]

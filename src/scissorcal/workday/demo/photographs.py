@@ -44,12 +44,14 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
     They show the specimen's own blade, and targets at places that only the renderer knows.
     """
-    from scissorcal.vision.targets.boards import CAMERA_BOARD
-    from scissorcal.workday.demo.sim_photographs import (
+    from scissorcal.vision.sim.sim_camera import (
         render_blade_photographs,
         render_board_photographs,
+        render_card_photographs,
+        render_plate_photographs,
     )
-    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
+    from scissorcal.vision.targets.boards import CAMERA_BOARD
+    from scissorcal.workday.demo.sim_photographs import specimen_blade
 
     wanted = [item.name for item in requirements(recipe).photographs]
     for index, what in enumerate(wanted):
@@ -64,7 +66,7 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
                 made = render_board_photographs(CAMERA_BOARD, folder, seed, "board")
                 capture_camera(workspace, made, CAMERA_BOARD, tell)
             elif what == "blade":
-                made = render_blade_photographs(recipe, folder, seed)
+                made = render_blade_photographs(specimen_blade(recipe), folder, seed)
                 capture_blade(workspace, made, BladeSetup(), tell)
             else:
                 made = render_plate_photographs(recipe, folder, seed)
@@ -139,7 +141,7 @@ def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judg
     import numpy as np
 
     from scissorcal.vision.geometry.pose import Pose, difference
-    from scissorcal.workday.demo.sim_plate import sim_plate_scene
+    from scissorcal.vision.sim.sim_camera import sim_plate_scene
 
     fit, rendered = require_plate(workspace), sim_plate_scene(recipe, seed).rig_plate
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)

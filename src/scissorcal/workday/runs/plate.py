@@ -1,9 +1,8 @@
 """A workspace's plate: photographs of its target and of the rig's card, and its pose."""
 
-import csv
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.vision.stances import Stances, stance_of
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, RIG_MARKERS, MarkedBoard
 from scissorcal.workday.photographs import (
     PhotoCapture,
@@ -28,13 +28,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.recipe.schema import Recipe
     from scissorcal.vision.geometry.camera import Camera
-    from scissorcal.vision.geometry.pose import Pose
     from scissorcal.vision.geometry.rig_frame import RigPose
-    from scissorcal.vision.photo import Photo
-    from scissorcal.vision.targets.detect import Detection
-
-Stances = Mapping[str, tuple[float, float]]
-"""Where the rig stood in each photograph, by its name: advance in mm, opening in deg."""
 
 AXES_M = 0.03
 """How long the axes of the plate's frame are drawn."""
@@ -76,6 +70,7 @@ def capture_plate(
     reason. Raises InputError, and keeps nothing, where that leaves none.
     """
     from scissorcal.vision.photo import read_photo
+    from scissorcal.vision.targets.detect import find_any_board
 
     kind: Literal["plate", "rig"] = "plate" if stances is None else "rig"
     boards: tuple[MarkedBoard, ...] = (
@@ -87,10 +82,10 @@ def capture_plate(
     with PhotoWriter(workspace, kind) as writer:
         for path in paths:
             try:
-                stance = None if stances is None else _stance_of(path, stances)
+                stance = None if stances is None else stance_of(path, stances)
                 photo = read_photo(path, colour=False)
                 refuse_known(photo, before, writer)
-                detection = _found(photo, boards)
+                detection = find_any_board(photo, boards)
             except InputError as error:
                 refused.append(str(error))
                 tell(f"left out: {error}")
@@ -109,36 +104,6 @@ def capture_plate(
     return PlateCapture(capture, boards[0].name, tuple(taken), tuple(refused))
 
 
-def read_stances(path: Path) -> Stances:
-    """Read where the rig stood: a CSV file with columns file, advance_mm, opening_deg.
-
-    Raises InputError naming the line that is wrong.
-    """
-    try:
-        rows = list(csv.DictReader(path.read_text("utf-8-sig").splitlines()))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {error}.") from None
-    wanted = {"file", "advance_mm", "opening_deg"}
-    if not rows or not wanted <= set(rows[0]):
-        raise InputError(
-            f"{path} needs a first line 'file,advance_mm,opening_deg' and a line for each "
-            "photograph below it."
-        )
-    found: dict[str, tuple[float, float]] = {}
-    for number, row in enumerate(rows, start=2):
-        try:
-            stance = float(row["advance_mm"]), float(row["opening_deg"])
-        except (TypeError, ValueError):
-            stance = (float("nan"), float("nan"))
-        if not (np.isfinite(stance[0]) and np.isfinite(stance[1])):
-            raise InputError(
-                f"{path}, line {number}: advance_mm and opening_deg must be numbers, such as "
-                "'rig-01.jpg,30,25'."
-            )
-        found[Path(row["file"]).name] = stance
-    return found
-
-
 def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOutcome:
     """Fit the plate's pose to the newest photographs of it, where anything changed.
 
@@ -146,7 +111,7 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
     of the rig's card the pose is in the rig's frame too. Writes fits/plate.json and an overlay of
     each photograph. Raises MissingError where there is no camera or no photograph yet.
     """
-    from scissorcal.calibration.plate.fit import fit_plate
+    from scissorcal.calibration.plate.fit import fit_plate, plate_target
     from scissorcal.calibration.plate.store import load_plate, save_plate
 
     recipe = workspace.recipe()
@@ -205,33 +170,21 @@ def plate_inputs_hash(workspace: Workspace, recipe: "Recipe") -> str:
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def plate_target(recipe: "Recipe") -> "Pose":
-    """T_plate_target of the recipe: printed y runs down and z into the sheet, so it is turned."""
-    from scissorcal.vision.geometry.pose import Pose
-
-    x, y = (1e-3 * value for value in recipe.plate.place_mm)
-    turned = Pose.from_rotation_vector([0.0, 0.0, np.radians(recipe.plate.turn_deg)], [x, y, 0.0])
-    return turned.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
-
-
 def workspace_rig(workspace: Workspace, camera: "Camera", recipe: "Recipe") -> "RigPose | None":
     """Locate the rig from the newest photographs of its card, None where there are none.
 
     Raises VerdictError where they do not tell where it stands.
     """
-    from scissorcal.vision.geometry.board_pose import Corners
-    from scissorcal.vision.geometry.rig_frame import CardView, locate_rig
+    from scissorcal.vision.geometry.rig_frame import card_view, locate_rig
 
     captures = photo_captures(workspace, "rig")[-1:]
     views = []
     for capture in captures:
         _refuse_other_camera(capture, camera)
         for photo in capture.index.photographs:
+            stance = photo.advance_mm or 0.0, photo.opening_deg or 0.0
             found = detection_of(capture, photo)
-            frame = np.zeros(len(found.ids), dtype=np.int64)
-            corners = Corners(found.pixels, found.points, frame, found.ids)
-            angle = np.radians(photo.opening_deg or 0.0) / recipe.rig.moving_blades
-            views.append(CardView(corners, 1e-3 * (photo.advance_mm or 0.0), float(angle)))
+            views.append(card_view(found, stance, recipe.rig.moving_blades))
     if not views:
         return None
     middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
@@ -239,25 +192,6 @@ def workspace_rig(workspace: Workspace, camera: "Camera", recipe: "Recipe") -> "
         return locate_rig(tuple(views), camera, middle)
     except ValueError as error:
         raise VerdictError(f"{captures[0].folder}: {error}.") from None
-
-
-def _found(photo: "Photo", boards: Sequence[MarkedBoard]) -> "Detection":
-    from scissorcal.vision.targets.detect import find_board
-
-    for board in boards[:-1]:
-        try:
-            return find_board(photo, board)
-        except InputError:
-            continue
-    return find_board(photo, boards[-1])
-
-
-def _stance_of(path: Path, stances: Stances) -> tuple[float, float]:
-    if path.name not in stances:
-        raise InputError(
-            f"{path.name} has no line among the stances: add 'file,advance_mm,opening_deg' for it."
-        )
-    return stances[path.name]
 
 
 def _photos(capture: PhotoCapture) -> list["PlatePhoto"]:
@@ -287,6 +221,7 @@ def _draw(
     path: Path,
 ) -> tuple[Path, ...]:
     """Draw residuals over each photograph beside the fit's file; earlier ones are removed."""
+    from scissorcal.calibration.plate.fit import plate_target
     from scissorcal.vision.overlay import residual_overlay, write_picture
     from scissorcal.vision.photo import read_photo
 
