@@ -4,15 +4,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from scissorcal.workday.geometry import fit_state
+from scissorcal.workday.reported_geometry import report_geometry
 
 from scissorcal.calibration.camera.store import save_camera
 from scissorcal.calibration.edge.store import save_blade
 from scissorcal.calibration.plate.store import save_plate
 from scissorcal.errors import MissingError
-from scissorcal.workday.geometry import fit_state
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
 from scissorcal.workday.plan import make_plan
-from scissorcal.workday.reported_geometry import report_geometry
 from scissorcal.workday.runs.blade import blade_inputs_hash, blade_path
 from scissorcal.workday.runs.camera import camera_path
 from scissorcal.workday.runs.plate import plate_inputs_hash, plate_path

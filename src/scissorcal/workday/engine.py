@@ -251,9 +251,7 @@ class Engine:
         name = self.workspace.relative(path)
 
         def told(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
-            return StepState(
-                step.name, state, found, why, command, optional=step.optional, **more
-            )
+            return StepState(step.name, state, found, why, command, optional=step.optional, **more)
 
         if not path.is_file():
             return told("missing", "not there yet")
@@ -298,9 +296,7 @@ class Engine:
         if facts["inputs"] not in {self.identity(step.name, effort) for effort in efforts}:
             return _CHANGED.get(step.kind, "its inputs or settings changed since")
         if step.kind == "package":
-            signed = self.state("report sign")
-            review = self.facts("report sign")["review"] if signed.state in ("done", "failed") else None
-            if facts["review"] != review:
+            if facts["review"] != self.review():
                 return "it carries another review than there is now"
         return ""
 
@@ -316,7 +312,11 @@ class Engine:
         files = (self.workspace.relative(newest),)
         try:
             facts = self.index.facts(newest, "rendering", rendering)
-            package = self.facts("package build")["content"] if self.file("package build").is_file() else ""
+            package = (
+                self.facts("package build")["content"]
+                if self.file("package build").is_file()
+                else ""
+            )
         except InputError as error:
             return StepState(step.name, "failed", str(error), files=files, **told)
         if facts["package"] != package:

@@ -59,7 +59,9 @@ def plate_fit(path: Path) -> Facts:
     from scissorcal.calibration.plate.store import load_plate
 
     fit = load_plate(path)
-    return _facts(fit.inputs_hash, f"{len(fit.views)} photographs of the {fit.target}", fit.verdicts)
+    return _facts(
+        fit.inputs_hash, f"{len(fit.views)} photographs of the {fit.target}", fit.verdicts
+    )
 
 
 def trust_check(path: Path) -> Facts:
@@ -139,8 +141,6 @@ def photographs(path: Path) -> Facts:
             "photographs again."
         ) from None
     return {"content": file_digest(path), "photographs": count}
-
-
 
 
 def _facts(inputs: str, label: str, verdicts: Iterable[Verdict]) -> Facts:

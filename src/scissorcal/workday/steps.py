@@ -15,7 +15,6 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.workday import facts
 from scissorcal.workday.workspace import Workspace
 
-
 Kind = Literal["recordings", "photographs", "fit", "verify", "report", "sign", "package", "render"]
 Read = Callable[[Path], dict[str, Any]]
 Why = Callable[[Requirements], str]

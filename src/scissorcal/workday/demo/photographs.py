@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.recipe.requirements import GeometryKind, requirements
-from scissorcal.workday.geometry import GeometryFit, fit_geometry
+from scissorcal.recipe.requirements import requirements
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import BladeSetup
-from scissorcal.workday.runs.blade import blade_path, capture_blade
+from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.camera import capture_camera
-from scissorcal.workday.runs.plate import capture_plate, require_plate
+from scissorcal.workday.runs.fit import FitOutcome, fit_workspace, load_result
+from scissorcal.workday.runs.plate import capture_plate
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -78,16 +79,10 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
 def fit_photographs(
     workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress
-) -> tuple[GeometryFit, ...]:
+) -> tuple[FitOutcome, ...]:
     """Fit what the scene requires of its photographs, in order."""
-    needs = requirements(recipe)
-    fits: list[GeometryFit] = []
-    kinds: tuple[GeometryKind, ...] = ("camera", "blade", "plate")
-    for what in kinds:
-        if needs.needs_geometry(what):
-            progress(len(fits) / len(needs.geometry), f"fitting the {what}")
-            fits.append(fit_geometry(workspace, what, seed=seed))
-    return tuple(fits)
+    wanted = [item.name for item in requirements(recipe).geometry]
+    return fit_workspace(workspace, wanted, seed=seed, progress=progress) if wanted else ()
 
 
 def judge_photographs(
@@ -109,9 +104,7 @@ def judge_photographs(
 def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeometry]:
     import numpy as np
 
-    from scissorcal.calibration.edge.store import load_blade
-
-    fit = load_blade(blade_path(workspace)).blades[0]
+    fit = load_result(Engine.of(workspace), "blade").blades[0]
     edges = fit.belief.with_values(fit.draws)
     blade, length = specimen.blade, fit.belief.edge.length_m
     rows = []
@@ -143,7 +136,10 @@ def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judg
     from scissorcal.vision.geometry.pose import Pose, difference
     from scissorcal.vision.sim.sim_camera import sim_plate_scene
 
-    fit, rendered = require_plate(workspace), sim_plate_scene(recipe, seed).rig_plate
+    fit, rendered = (
+        load_result(Engine.of(workspace), "plate"),
+        sim_plate_scene(recipe, seed).rig_plate,
+    )
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)
     if fit.rig_plate is None or fit.rig_plate.covariance is None:
         return []

@@ -5,25 +5,25 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.recordings import used_recordings
-from scissorcal.workday.runs.friction import draw, finished, load, save
+from scissorcal.workday.runs.friction import finished, load, save
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.model import EdgeBelief
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Request
+    from scissorcal.workday.runs.fit import Made, Request
 
-__all__ = ["draw", "edge_of_photographs", "fit", "load", "save"]
+__all__ = ["edge_of_photographs", "fit", "load", "save"]
 
 STREAM = 1
 
 
-def fit(engine: "Engine", request: "Request") -> "FitResult":
+def fit(engine: "Engine", request: "Request") -> "Made":
     """Fit the response, fracture and taper to the used recordings of cuts."""
     import numpy as np
 
     from scissorcal.calibration.cut.fit import fit_cut
-    from scissorcal.workday.runs.fit import load_result
+    from scissorcal.workday.runs.fit import Made, load_result
 
     request.progress(0.0, "cut: reading recordings")
     friction: FitResult = load_result(engine, "friction")
@@ -46,7 +46,7 @@ def fit(engine: "Engine", request: "Request") -> "FitResult":
         last_chosen=request.last_model or None,
         stop=request.stop,
     )
-    return finished(result, request)
+    return Made(finished(result, request))
 
 
 def edge_of_photographs(engine: "Engine") -> "tuple[EdgeBelief | None, tuple[Verdict, ...]]":

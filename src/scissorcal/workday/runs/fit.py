@@ -1,7 +1,7 @@
 """Fit what a workspace's scene requires, in order, and only where something changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -38,17 +38,20 @@ class Request:
     stop: Stop
 
 
+@dataclass(frozen=True)
+class Made:
+    """A result, and how to draw its pictures into a folder; None where the report draws it."""
+
+    result: Any
+    draw: Callable[[Path], None] | None = None
+
+
 class FitModule(Protocol):
-    """What a module of runs/ gives for its fit.
+    """What a module of runs/ gives for its fit: the computation, and its file."""
 
-    ``fit`` computes, ``load`` and ``save`` are its file, ``draw`` draws pictures beside the file
-    and gives their paths.
-    """
-
-    def fit(self, engine: Engine, request: Request) -> Any: ...
+    def fit(self, engine: Engine, request: Request) -> Made: ...
     def load(self, path: Path) -> Any: ...
     def save(self, result: Any, path: Path) -> object: ...
-    def draw(self, engine: Engine, result: Any, path: Path) -> object: ...
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ def load_result(engine: Engine, what: str) -> Any:
 def available(engine: Engine, names: Sequence[str] = ()) -> tuple[str, ...]:
     """The fits that the scene requires and that are neither missing nor stale nor unreadable."""
     steps = [step for step in steps_of("fit") if not names or step.what in names]
-    return tuple(step.what for step in steps if engine.state(step.name).content and _usable(engine, step))
+    return tuple(step.what for step in steps if _usable(engine, step))
 
 
 def share_of(progress: Progress | None, index: int, count: int) -> Progress:
@@ -175,8 +178,6 @@ def _must_run_first(engine: Engine, item: str) -> bool:
 
 
 def _fit(engine: Engine, step: Step, request: Request, again: bool) -> FitOutcome:
-    from dataclasses import replace
-
     module, path = _module(step), engine.file(step.name)
     stored = _stored(engine, step, again)
     current = stored.get("inputs") == request.inputs_hash or stored.get("imported")
@@ -188,13 +189,14 @@ def _fit(engine: Engine, step: Step, request: Request, again: bool) -> FitOutcom
     _refuse_without_data(engine, capture)
     checkpoint = path.with_name(f"{step.what}-{request.inputs_hash[:12]}.chains")
     last = str(stored.get("model", ""))
-    result = module.fit(engine, replace(request, checkpoint=checkpoint, last_model=last))
-    save_version(engine, step.name, lambda file: module.save(result, file))
-    module.draw(engine, result, path)
-    checkpoint.unlink(missing_ok=True)
-    return FitOutcome(
-        step.what, result, path, pictures_beside(path), False, engine.state(step.name)
-    )
+    made = module.fit(engine, replace(request, checkpoint=checkpoint, last_model=last))
+    save_version(engine, step.name, lambda file: module.save(made.result, file))
+    if made.draw:
+        made.draw(path.with_suffix(""))
+    state = engine.state(step.name)
+    if state.state != "incomplete":
+        checkpoint.unlink(missing_ok=True)
+    return FitOutcome(step.what, made.result, path, pictures_beside(path), False, state)
 
 
 def _stored(engine: Engine, step: Step, again: bool) -> dict[str, Any]:

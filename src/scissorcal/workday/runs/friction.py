@@ -10,17 +10,18 @@ from scissorcal.workday.recordings import used_recordings
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Request
+    from scissorcal.workday.runs.fit import Made, Request
 
 STREAM = 0
 """Which stream of random numbers of a seed is this fit's."""
 
 
-def fit(engine: "Engine", request: "Request") -> "FitResult":
+def fit(engine: "Engine", request: "Request") -> "Made":
     """Fit friction to the used recordings of empty motion."""
     import numpy as np
 
     from scissorcal.calibration.friction.fit import fit_friction
+    from scissorcal.workday.runs.fit import Made
 
     request.progress(0.0, "friction: reading recordings")
     result = fit_friction(
@@ -33,7 +34,7 @@ def fit(engine: "Engine", request: "Request") -> "FitResult":
         last_chosen=request.last_model or None,
         stop=request.stop,
     )
-    return finished(result, request)
+    return Made(finished(result, request))
 
 
 def finished(result: "FitResult", request: "Request") -> "FitResult":
@@ -60,7 +61,3 @@ def save(result: "FitResult", path: Path) -> None:
     from scissorcal.calibration.store import save_fit
 
     save_fit(result, path)
-
-
-def draw(engine: "Engine", result: "FitResult", path: Path) -> None:
-    """No pictures: the report draws this fit."""

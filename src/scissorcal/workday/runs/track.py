@@ -19,8 +19,9 @@ from scissorcal.calibration.plate.track import (
 from scissorcal.errors import InputError
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.track import STATES, track
-from scissorcal.workday.runs.camera import require_camera
-from scissorcal.workday.runs.plate import workspace_rig
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.plate import locate_workspace_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -44,11 +45,11 @@ def track_plate(
     all of it. Ends after ``seconds``, with the pictures, or by an interrupt from the keyboard.
     Raises InputError, and keeps nothing, where no picture showed the target.
     """
-    fitted = require_camera(workspace)
-    recipe = workspace.recipe()
-    located = workspace_rig(workspace, fitted.camera, recipe)
+    engine = Engine.of(workspace)
+    fitted = load_result(engine, "camera")
+    located = locate_workspace_rig(engine, fitted.camera)
     rig = None if located is None or located.untold else located
-    back = plate_target(recipe).inverse()
+    back = plate_target(engine.recipe).inverse()
     head = TrackHead(
         source=Path(source).name,
         started_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
