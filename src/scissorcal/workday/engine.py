@@ -14,7 +14,7 @@ from scissorcal.errors import InputError
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.facts import UNFINISHED, photographs
+from scissorcal.workday.facts import UNFINISHED, photographs, rendering
 from scissorcal.workday.index import FileIndex
 from scissorcal.workday.recordings import (
     RecordingRow,
@@ -123,12 +123,19 @@ class Engine:
             }
         )
 
+    def review(self) -> dict[str, Any] | None:
+        """The signature that stands under the report, as stored; None where there is none."""
+        if self.state("report sign").state not in ("done", "failed"):
+            return None
+        found: dict[str, Any] = self.facts("report sign")["review"]
+        return found
+
     def recordings(self, kind: CaptureKind) -> tuple[RecordingRow, ...]:
         """The recordings of one kind, with the use that fits make of them."""
         return list_recordings(self.workspace, self.recipe, kind, self.index)
 
     def _content(self, item: str) -> str:
-        """Content of an input; nothing where the scene does not need it, or it is not waited for."""
+        """Content of an input; nothing where it is not needed, or missing and not waited for."""
         state = self.state(_plain(item))
         if state.state == "excluded" or (item.endswith("?") and state.state in WAITING):
             return ""
@@ -295,34 +302,29 @@ class Engine:
         efforts = EFFORTS if step.by_effort else ("",)
         if facts["inputs"] not in {self.identity(step.name, effort) for effort in efforts}:
             return _CHANGED.get(step.kind, "its inputs or settings changed since")
-        if step.kind == "package":
-            if facts["review"] != self.review():
-                return "it carries another review than there is now"
+        if step.kind == "package" and facts["review"] != self.review():
+            return "it carries another review than there is now"
         return ""
 
     def _of_render(self, step: Step, why: str) -> StepState:
         """A rendering is done where the newest one is of the package that is there."""
-        from scissorcal.workday.facts import rendering
-
         recordings = self.workspace.recordings("render")
-        told = {"why": why, "command": step.command, "optional": True}
+
+        def told(state: State, found: str, command: str = step.command) -> StepState:
+            files = tuple(self.workspace.relative(path) for path in recordings)
+            return StepState(step.name, state, found, why, command, files, optional=True)
+
         if not recordings:
-            return StepState(step.name, "missing", "not rendered yet", **told)
-        newest = recordings[-1]
-        files = (self.workspace.relative(newest),)
+            return told("missing", "not rendered yet")
+        path = self.file("package build")
         try:
-            facts = self.index.facts(newest, "rendering", rendering)
-            package = (
-                self.facts("package build")["content"]
-                if self.file("package build").is_file()
-                else ""
-            )
+            facts = self.index.facts(recordings[-1], "rendering", rendering)
+            package = self.facts("package build")["content"] if path.is_file() else ""
         except InputError as error:
-            return StepState(step.name, "failed", str(error), files=files, **told)
+            return told("failed", str(error))
         if facts["package"] != package:
-            return StepState(step.name, "stale", "of another package", files=files, **told)
-        found = _count(len(recordings), "recording")
-        return StepState(step.name, "done", found, why, files=files, optional=True)
+            return told("stale", "of another package")
+        return told("done", _count(len(recordings), "recording"), "")
 
 
 _CHANGED = {

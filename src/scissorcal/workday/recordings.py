@@ -96,10 +96,7 @@ def completeness_counts(
     row: RecordingRow, recipe: Recipe, kind: CaptureKind, index: FileIndex
 ) -> Mapping[str, Any]:
     """Count what one recording holds of the recipe's plan; see `device.completeness`."""
-    settings = digest(
-        [recipe.capture.model_dump(), recipe.scene.model_dump(), recipe.rig.model_dump()]
-        + [recipe.material.model_dump(), recipe.fit.cut.reference_indentation_mm]
-    )
+    settings = digest(recipe.model_dump(include={"capture", "scene", "rig", "material", "fit"}))
 
     def count(path: Path) -> dict[str, Any]:
         from scissorcal.device.completeness import count_recorded

@@ -32,10 +32,12 @@ class Step:
     ``why`` gives what the scene needs the step for, empty where it needs none. ``inputs`` names
     steps: a step is stale while one of them is missing or stale; one that ends in "?" counts where
     it has a result and is not waited for. ``settings`` are the parts of the recipe that the result
-    depends on, ``version`` is raised whenever the same inputs would give another result. ``by_effort``
-    says that the result depends on the effort. ``file`` is where the result lies, ``read`` gives its
-    facts, ``run`` names the module that makes it (`workday.runs.fit.FitModule`). ``verified_by`` names the
-    step that checks it, ``optional`` steps are never what comes next.
+    depends on; ``version`` is raised whenever the same inputs would give another result.
+    ``by_effort`` says that the result depends on the effort. ``file`` is where the result lies,
+    ``read`` gives its facts, ``run`` names the module of a fit (`workday.runs.fit.FitModule`).
+    ``verified_by`` names the step that checks it. ``optional`` steps are never what comes next.
+    ``photographs`` are the folders that a capture of photographs fills, the first one required;
+    with ``newest_only`` earlier folders do not count.
     """
 
     name: str

@@ -114,13 +114,9 @@ def run_demo(
                 "The process that captured was killed, most likely for want of memory: free some, "
                 f"remove {folder} and run the demo again."
             ) from error
-    outcomes = fit_workspace(
-        workspace,
-        RIG_FITS[recipe.rig.joint],
-        effort=effort,
-        seed=seed,
-        progress=_part(tell, 0.4, 0.85),
-    )
+    what = RIG_FITS[recipe.rig.joint]
+    tell_fits = _part(tell, 0.4, 0.85)
+    outcomes = fit_workspace(workspace, what, effort=effort, seed=seed, progress=tell_fits)
     engine = Engine.of(workspace)
     tell(0.85, "building the package")
     built = build_workspace_package(engine, seed=seed, allow_failed=True)

@@ -136,10 +136,8 @@ def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judg
     from scissorcal.vision.geometry.pose import Pose, difference
     from scissorcal.vision.sim.sim_camera import sim_plate_scene
 
-    fit, rendered = (
-        load_result(Engine.of(workspace), "plate"),
-        sim_plate_scene(recipe, seed).rig_plate,
-    )
+    fit = load_result(Engine.of(workspace), "plate")
+    rendered = sim_plate_scene(recipe, seed).rig_plate
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)
     if fit.rig_plate is None or fit.rig_plate.covariance is None:
         return []

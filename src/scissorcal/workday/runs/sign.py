@@ -62,11 +62,8 @@ def standing_review(engine: Engine) -> "Review | None":
     """The signature under the workspace's report, None where there is none or it is void."""
     from scissorcal.package import Review
 
-    if engine.state("report sign").state not in ("done", "failed"):
-        return None
-    if not engine.file("report sign").is_file():
-        return None
-    return Review.model_validate(engine.facts("report sign")["review"])
+    found = engine.review()
+    return None if found is None else Review.model_validate(found)
 
 
 def _write(path: Path, text: str) -> None:
