@@ -1,13 +1,14 @@
 """``scissorcal fit``"""
 
 import time
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
+import typer
 
+from scissorcal.cli.fit_request import FitRequest
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.options import Folder, Seed, positive
 from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
 
@@ -20,44 +21,38 @@ if TYPE_CHECKING:
 GRACE_S = 180.0
 """A fit that stops at its limit still measures curvature and scores; it is ended by force later."""
 
-EffortWord = Literal["draft", "standard", "thorough"]
 
-
-@click.command("fit")
-@click.argument(
-    "what", type=click.Choice(["friction", "cut", "camera", "blade", "plate", "all"]), default="all"
-)
-@click.option(
-    "--effort",
-    type=click.Choice(["draft", "standard", "thorough"]),
-    default=None,
-    help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of walkers, "
-    "goes on where it was interrupted. The recipe's if not given.",
-)
-@click.option("--force", is_flag=True, help="Fit again even where nothing changed.")
-@click.option(
-    "--max-minutes",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=10.0,
-    show_default=True,
-    help="Time after which each fit ends with what it has, and says that it is not finished.",
-)
-@seed_option
-@workspace_option
 @command
 def fit(
-    what: Literal["friction", "cut", "camera", "blade", "plate", "all"],
-    effort: EffortWord | None,
-    force: bool,
-    max_minutes: float,
-    seed: int,
-    folder: Path | None,
+    what: Annotated[
+        Literal["friction", "cut", "camera", "blade", "plate", "all"],
+        typer.Argument(help="What to fit; all: what the scene requires."),
+    ] = "all",
+    effort: Annotated[
+        Literal["draft", "standard", "thorough"] | None,
+        typer.Option(
+            help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of "
+            "walkers, continues where it was interrupted. The recipe's if not given."
+        ),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Fit again even where nothing changed.")
+    ] = False,
+    max_minutes: Annotated[
+        float,
+        typer.Option(
+            callback=positive,
+            help="Time after which each fit stops with the result it has; it is then unfinished.",
+        ),
+    ] = 10.0,
+    seed: Seed = 0,
+    folder: Folder = None,
 ) -> Answer:
     """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
 
-    A fit whose recordings, photographs and settings have not changed is not done again. Camera
-    and plate have one effort. How long it took and the time left are shown; no fit goes on for
-    more than --max-minutes (a stage that is under way is brought to its end).
+    A fit whose recordings, photographs and settings are unchanged is not repeated. --effort does
+    not apply to camera and plate. Each fit shows the time used and left, and stops after
+    --max-minutes (the stage that is running is finished first).
 
     \b
     Example:
@@ -70,47 +65,32 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
-    limit_s = 60.0 * max_minutes
-    if what == "camera" or what == "blade" or what == "plate":
-        return _geometry(what, folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
-    if what == "all":
-        from scissorcal.recipe.requirements import requirements
+    request = FitRequest(folder, effort, seed, force, 60.0 * max_minutes)
+    if what != "all":
+        return _FITS[what](request)
+    from scissorcal.recipe.requirements import requirements
 
-        needed = requirements(open_workspace(folder).recipe()).geometry
-        before = [
-            (
-                item.name,
-                _geometry(
-                    item.name, folder, effort=effort, seed=seed, force=force, limit_s=limit_s
-                ),
-            )
-            for item in needed
-        ]
-        last = _fits((), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
-        return _together(before, last)
-    return _fits((what,), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
+    needed = requirements(open_workspace(folder).recipe()).geometry
+    before = [(item.name, _FITS[item.name](request)) for item in needed]
+    return _together(before, _fit_laws((), request))
 
 
-def _geometry(
-    what: str,
-    folder: Path | None,
-    *,
-    effort: EffortWord | None,
-    seed: int,
-    force: bool,
-    limit_s: float,
-) -> Answer:
-    if what == "camera":
-        from scissorcal.cli.fit_camera import fit_camera
+def _fit_camera(request: FitRequest) -> Answer:
+    from scissorcal.cli.fit_camera import fit_camera
 
-        return fit_camera(folder, seed=seed, force=force, limit_s=limit_s)
-    if what == "blade":
-        from scissorcal.cli.fit_blade import fit_blade
+    return fit_camera(request)
 
-        return fit_blade(folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
+
+def _fit_blade(request: FitRequest) -> Answer:
+    from scissorcal.cli.fit_blade import fit_blade
+
+    return fit_blade(request)
+
+
+def _fit_plate(request: FitRequest) -> Answer:
     from scissorcal.cli.fit_plate import fit_plate
 
-    return fit_plate(folder, force=force)
+    return fit_plate(request)
 
 
 def _together(before: "list[tuple[str, Answer]]", last: Answer) -> Answer:
@@ -124,25 +104,17 @@ def _together(before: "list[tuple[str, Answer]]", last: Answer) -> Answer:
     )
 
 
-def _fits(
-    wanted: "tuple[Literal['friction', 'cut'], ...]",
-    folder: Path | None,
-    *,
-    effort: EffortWord | None,
-    seed: int,
-    force: bool,
-    limit_s: float,
-) -> Answer:
+def _fit_laws(wanted: "tuple[Literal['friction', 'cut'], ...]", request: FitRequest) -> Answer:
     from scissorcal.workday.runs.fit import fit_workspace
 
-    ends_s = time.monotonic() + limit_s
-    with progress(limit_s, grace_s=GRACE_S) as tell:
+    ends_s = time.monotonic() + request.limit_s
+    with progress(request.limit_s, grace_s=GRACE_S) as tell:
         outcomes = fit_workspace(
-            open_workspace(folder),
+            open_workspace(request.folder),
             wanted,
-            effort=effort,
-            seed=seed,
-            force=force,
+            effort=request.effort,
+            seed=request.seed,
+            force=request.force,
             progress=tell,
             stop=lambda: time.monotonic() > ends_s,
         )
@@ -186,6 +158,16 @@ def _fits(
         verdicts=[verdict for outcome in outcomes for verdict in outcome.result.verdicts],
         files=[outcome.path for outcome in outcomes if not outcome.cached],
     )
+
+
+_FITS: Mapping[str, Callable[[FitRequest], Answer]] = {
+    "friction": lambda request: _fit_laws(("friction",), request),
+    "cut": lambda request: _fit_laws(("cut",), request),
+    "camera": _fit_camera,
+    "blade": _fit_blade,
+    "plate": _fit_plate,
+}
+"""What can be fitted, and by which function."""
 
 
 def _text(outcome: "FitOutcome") -> str:

@@ -1,8 +1,8 @@
 """What ``scissorcal fit blade`` says."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from scissorcal.cli.fit_request import FitRequest
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.output import Answer, table
 from scissorcal.cli.progress import progress
@@ -12,21 +12,18 @@ if TYPE_CHECKING:
     from scissorcal.workday.runs.blade import BladeOutcome
 
 
-def fit_blade(
-    folder: Path | None,
-    *,
-    effort: Literal["draft", "standard", "thorough"] | None,
-    seed: int,
-    force: bool,
-    limit_s: float | None = None,
-) -> Answer:
+def fit_blade(request: FitRequest) -> Answer:
     """Fit a workspace's blade, where its photographs changed, and say what its edge is."""
     from scissorcal.calibration.edge.result import blade_facts
     from scissorcal.workday.runs.blade import fit_workspace_blade
 
-    with progress(limit_s) as tell:
+    with progress(request.limit_s) as tell:
         outcome = fit_workspace_blade(
-            open_workspace(folder), effort=effort, seed=seed, force=force, progress=tell
+            open_workspace(request.folder),
+            effort=request.effort,
+            seed=request.seed,
+            force=request.force,
+            progress=tell,
         )
     result = outcome.result
     facts = {

@@ -1,8 +1,8 @@
 """What ``scissorcal fit camera`` says."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.cli.fit_request import FitRequest
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.output import Answer, table
 from scissorcal.cli.progress import progress
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 _WORST = 3
 
 
-def fit_camera(
-    folder: Path | None, *, seed: int, force: bool, limit_s: float | None = None
-) -> Answer:
+def fit_camera(request: FitRequest) -> Answer:
     """Fit a workspace's camera, where its photographs changed, and say how well it is known."""
     from scissorcal.workday.runs.camera import fit_workspace_camera
 
-    workspace = open_workspace(folder)
-    with progress(limit_s) as tell:
-        outcome = fit_workspace_camera(workspace, seed=seed, force=force, progress=tell)
+    workspace = open_workspace(request.folder)
+    with progress(request.limit_s) as tell:
+        outcome = fit_workspace_camera(
+            workspace, seed=request.seed, force=request.force, progress=tell
+        )
     files = () if outcome.cached else (outcome.path, *outcome.pictures)
     return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
 

@@ -1,8 +1,8 @@
 """What ``scissorcal fit plate`` says."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.cli.fit_request import FitRequest
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.output import Answer, table
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from scissorcal.workday.runs.plate import PlateOutcome
 
 
-def fit_plate(folder: Path | None, *, force: bool) -> Answer:
+def fit_plate(request: FitRequest) -> Answer:
     """Fit a workspace's plate, where its photographs changed, and say where it stands."""
     from scissorcal.workday.runs.plate import fit_workspace_plate
 
-    outcome = fit_workspace_plate(open_workspace(folder), force=force)
+    outcome = fit_workspace_plate(open_workspace(request.folder), force=request.force)
     files = () if outcome.cached else (outcome.path, *outcome.pictures)
     return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
 

@@ -1,25 +1,20 @@
 """``scissorcal plan``"""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import workspace_option
+from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
 
 if TYPE_CHECKING:
     from scissorcal.workday.plan import Plan
 
 
-@click.command("plan")
-@workspace_option
 @command
-def plan(folder: Path | None) -> Answer:
-    """What the scene requires: what is done, missing or stale, and what comes next.
+def plan(folder: Folder = None) -> Answer:
+    """Show what the scene requires: what is done, missing or stale, and the next command.
 
-    Stale means that what it was made from has changed since, by content.
+    Stale: its inputs have changed in content since it was made.
 
     \b
     Example:

@@ -1,11 +1,11 @@
 """``scissorcal recording``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
-from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.lazy import group
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ _COMMANDS = {
 }
 
 
-@click.group("recording", cls=LazyGroup, lazy=_COMMANDS)
+@group(_COMMANDS)
 def recording() -> None:
     """Look into recordings.
 
@@ -28,10 +28,10 @@ def recording() -> None:
     """
 
 
-@click.command("show")
-@click.argument("path", type=click.Path(path_type=Path, dir_okay=False))
 @command
-def show(path: Path) -> Answer:
+def show(
+    path: Annotated[Path, typer.Argument(dir_okay=False, help="The recording (.mcap).")],
+) -> Answer:
     """Show what the recording at PATH holds.
 
     A capture that was interrupted (PATH.part) is recovered first.

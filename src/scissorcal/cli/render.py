@@ -3,56 +3,36 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
+from scissorcal.cli.options import Device, Folder, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.render import Rendered
 
 
-@click.command("render")
-@device_option
-@click.option(
-    "--package",
-    "package_path",
-    type=click.Path(path_type=Path),
-    help="The package to render; the workspace's if not given.",
-)
-@click.option(
-    "--seconds",
-    type=click.FloatRange(min=0, min_open=True),
-    default=30.0,
-    show_default=True,
-    help="How long to render, by the rig's clock.",
-)
-@click.option("--strokes", type=click.IntRange(1), default=4, show_default=True, help="sim only.")
-@click.option(
-    "--rate-rad-per-s",
-    type=click.FloatRange(min=0, min_open=True),
-    default=0.3,
-    show_default=True,
-    help="Speed of the virtual hand; sim only.",
-)
-@click.option("--no-record", is_flag=True, help="Keep no recording.")
-@yes_option
-@seed_option
-@workspace_option
 @command
 def render(
-    device: str,
-    package_path: Path | None,
-    seconds: float,
-    strokes: int,
-    rate_rad_per_s: float,
-    no_record: bool,
-    yes: bool,
-    seed: int,
-    folder: Path | None,
+    device: Device,
+    package_path: Annotated[
+        Path | None,
+        typer.Option("--package", help="The package to render; the workspace's if not given."),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(callback=positive, help="How long to render, by the rig's clock.")
+    ] = 30.0,
+    strokes: Annotated[int, typer.Option(min=1, help="Strokes of the virtual hand.")] = 4,
+    rate_rad_per_s: Annotated[
+        float, typer.Option(callback=positive, help="Speed of the virtual hand.")
+    ] = 0.3,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    folder: Folder = None,
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
 
