@@ -131,6 +131,12 @@ def test_a_shell_completes_commands_and_choices(shell: str, words: str, expected
     assert expected in done.stdout, done.stderr
 
 
+def test_an_option_in_front_of_a_subcommand_is_refused(cli: Cli) -> None:
+    said = cli("report", "--anew", "compare", "a", "b")
+    assert said.code == 2
+    assert "after the subcommand" in said.err
+
+
 def test_version(cli: Cli) -> None:
     assert scissorcal.__version__ in cli("--version").out
 

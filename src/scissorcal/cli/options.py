@@ -40,7 +40,7 @@ Images = Annotated[
 
 MoreImages = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="[FILE]...", help="More photographs: what --image *.jpg expands to."),
+    typer.Argument(metavar="FILE", help="More photographs: what --image *.jpg expands to."),
 ]
 
 

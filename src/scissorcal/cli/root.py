@@ -9,6 +9,7 @@ import typer
 
 import scissorcal
 from scissorcal.cli.lazy import group
+from scissorcal.errors import ScissorcalError
 
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What libraries of linear algebra read once, when they are loaded: after the command has begun."""
@@ -78,7 +79,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     try:
         main = typer.main.get_command(scissorcal_command).main
         code = main(given, prog_name="scissorcal", standalone_mode=False)
-    except typer.TyperException as error:
+    except (typer.TyperException, ScissorcalError) as error:
         code = _refuse_usage(error, "--json" in given)
     except typer.Abort:
         typer.echo("Interrupted.", err=True)
@@ -92,19 +93,25 @@ def run(arguments: Sequence[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _refuse_usage(error: typer.TyperException, as_json: bool) -> int:
+def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) -> int:
     """Say what is wrong with the words of the command line, and return the exit code.
 
     Where an option or argument is missing, its help says what to give.
     """
-    if isinstance(error, typer.BadParameter) and not error.message:
-        error.message = getattr(error.param, "help", None) or ""
-    error.show()  # type: ignore[attr-defined]  # every error of the parser has it
+    if isinstance(error, typer.BadParameter):
+        error.message = error.message.removeprefix("Value error, ")
+        error.message = error.message or getattr(error.param, "help", None) or ""
+    if isinstance(error, typer.TyperException):
+        error.show()  # type: ignore[attr-defined]  # every error of the parser has it
+        sentence = error.format_message()
+    else:
+        sentence = str(error)
+        typer.echo(f"Error: {sentence}", err=True)
     if as_json:
         from scissorcal.cli.output import Answer, print_envelope
 
         context = getattr(error, "ctx", None)
         name = context.command_path.partition(" ")[2] if context else ""
-        answer = Answer({"error": error.format_message(), "exit_code": error.exit_code})
+        answer = Answer({"error": sentence, "exit_code": error.exit_code})
         print_envelope(name, answer, error.exit_code, 0.0)
     return error.exit_code
