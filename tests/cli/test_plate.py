@@ -285,7 +285,7 @@ def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> N
     assert cli("capture", "plate", "-i", "a.jpg", "--camera", "0").code == 2
     said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
     assert said.code == 2
-    assert "Nobody knows where the rig stood" in said.err
+    assert "The rig's stances are not known" in said.err
 
 
 def test_a_track_is_json_line_by_line(cli: Cli, workspace: Path, album: Path, video: Path) -> None:

@@ -1,7 +1,7 @@
 """Fit what a workspace's scene requires, in order, and only where something changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -79,37 +79,90 @@ def fit_workspace(
     force: bool = False,
     progress: Progress | None = None,
     stop: Stop | None = None,
-    told: Callable[[FitOutcome], None] | None = None,
 ) -> tuple[FitOutcome, ...]:
     """Run the fits in ``wanted`` ("camera", "blade", "plate", "friction", "cut"), or all required.
 
     A fit whose identity equals that of the stored one is read back; ``force`` does those in
     ``wanted`` again all the same. Fits that a wanted one builds on are run first where they are
     missing or stale. ``effort`` is the recipe's where not given. The result that was there is kept
-    (`workday.history`). ``told`` hears of each fit as it is done.
+    (`workday.history`).
 
     Raises InputError where the scene does not require what is wanted, MissingError where nothing
     was captured, and what the fits themselves raise.
     """
     engine = Engine.of(workspace)
-    steps = _in_order(engine, [f"fit {what}" for what in wanted])
-    chosen: Effort = effort or engine.recipe.fit.effort
-    outcomes = []
-    for index, step in enumerate(steps):
-        request = Request(
-            chosen,
-            seed,
-            engine.identity(step.name, chosen),
-            Path(),
-            "",
-            share_of(progress, index, len(steps)),
-            stop or (lambda: False),
+    steps = steps_to_fit(engine, wanted)
+    return tuple(
+        fit_step(
+            engine,
+            step,
+            effort=effort,
+            seed=seed,
+            force=force and (not wanted or step.what in wanted),
+            progress=share_of(progress, index, len(steps)),
+            stop=stop,
         )
-        again = force and (not wanted or step.what in wanted)
-        outcomes.append(_fit(engine, step, request, again))
-        if told:
-            told(outcomes[-1])
-    return tuple(outcomes)
+        for index, step in enumerate(steps)
+    )
+
+
+def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
+    """The fits to run, in order: those wanted, or all required, and stale ones they build on.
+
+    Raises InputError where the scene does not require what is wanted.
+    """
+    needed = [step for step in steps_of("fit") if engine.state(step.name).state != "excluded"]
+    for what in wanted:
+        if what not in [step.what for step in needed]:
+            listed = " and ".join(step.what for step in needed)
+            raise InputError(
+                f"{engine.workspace.recipe_path}: this scene requires no fit of {what}. It "
+                f"requires: {listed}."
+            )
+    names = {f"fit {what}" for what in wanted} or {step.name for step in needed}
+    for step in reversed(needed):
+        if step.name in names:
+            names |= {item for item in step.inputs if _must_run_first(engine, item)}
+    return [step for step in needed if step.name in names]
+
+
+def fit_step(
+    engine: Engine,
+    step: Step,
+    *,
+    effort: "Effort | None" = None,
+    seed: int = 0,
+    force: bool = False,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> FitOutcome:
+    """Run one fit, or read it back where its identity is the stored one's, unless ``force``."""
+    chosen: Effort = effort or engine.recipe.fit.effort
+    identity = engine.identity(step.name, chosen)
+    module, path = _module(step), engine.file(step.name)
+    stored = _stored(engine, step, force)
+    current = stored.get("inputs") == identity or stored.get("imported")
+    if stored and current and not force and engine.state(step.name).state != "stale":
+        state = engine.state(step.name)
+        return FitOutcome(step.what, module.load(path), path, pictures_beside(path), True, state)
+    _refuse_without_data(engine, BY_NAME[step.inputs[0]])
+    request = Request(
+        effort=chosen,
+        seed=seed,
+        inputs_hash=identity,
+        checkpoint=path.with_name(f"{step.what}-{identity[:12]}.chains"),
+        last_model=str(stored.get("model", "")),
+        progress=progress or (lambda done, sentence: None),
+        stop=stop or (lambda: False),
+    )
+    made = module.fit(engine, request)
+    save_version(engine, step.name, lambda file: module.save(made.result, file))
+    if made.draw:
+        made.draw(path.with_suffix(""))
+    state = engine.state(step.name)
+    if state.state != "incomplete":
+        request.checkpoint.unlink(missing_ok=True)
+    return FitOutcome(step.what, made.result, path, pictures_beside(path), False, state)
 
 
 def load_result(engine: Engine, what: str) -> Any:
@@ -155,58 +208,19 @@ def _usable(engine: Engine, step: Step) -> bool:
     return state.state not in ("missing", "stale", "excluded") and bool(state.content)
 
 
-def _in_order(engine: Engine, wanted: Sequence[str]) -> list[Step]:
-    """The steps to run: those wanted, or all required, with the inputs that are not current."""
-    needed = [step for step in steps_of("fit") if engine.state(step.name).state != "excluded"]
-    for name in wanted:
-        if BY_NAME[name] not in needed:
-            listed = " and ".join(step.what for step in needed)
-            raise InputError(
-                f"{engine.workspace.recipe_path}: this scene requires no fit of "
-                f"{BY_NAME[name].what}. It requires: {listed}."
-            )
-    names = set(wanted) or {step.name for step in needed}
-    for step in reversed(needed):
-        if step.name in names:
-            names |= {item for item in step.inputs if _must_run_first(engine, item)}
-    return [step for step in needed if step.name in names]
-
-
 def _must_run_first(engine: Engine, item: str) -> bool:
     step = BY_NAME[item.rstrip("?")]
     return step.kind == "fit" and engine.state(step.name).state in ("missing", "stale")
 
 
-def _fit(engine: Engine, step: Step, request: Request, again: bool) -> FitOutcome:
-    module, path = _module(step), engine.file(step.name)
-    stored = _stored(engine, step, again)
-    current = stored.get("inputs") == request.inputs_hash or stored.get("imported")
-    if stored and current and not again and engine.state(step.name).state != "stale":
-        return FitOutcome(
-            step.what, module.load(path), path, pictures_beside(path), True, engine.state(step.name)
-        )
-    capture = BY_NAME[step.inputs[0]]
-    _refuse_without_data(engine, capture)
-    checkpoint = path.with_name(f"{step.what}-{request.inputs_hash[:12]}.chains")
-    last = str(stored.get("model", ""))
-    made = module.fit(engine, replace(request, checkpoint=checkpoint, last_model=last))
-    save_version(engine, step.name, lambda file: module.save(made.result, file))
-    if made.draw:
-        made.draw(path.with_suffix(""))
-    state = engine.state(step.name)
-    if state.state != "incomplete":
-        checkpoint.unlink(missing_ok=True)
-    return FitOutcome(step.what, made.result, path, pictures_beside(path), False, state)
-
-
-def _stored(engine: Engine, step: Step, again: bool) -> dict[str, Any]:
+def _stored(engine: Engine, step: Step, force: bool) -> dict[str, Any]:
     """Facts of the stored result; one that cannot be read counts as none where it is made again."""
     if not engine.file(step.name).is_file():
         return {}
     try:
         return engine.facts(step.name)
     except InputError:
-        if again:
+        if force:
             return {}
         raise
 
