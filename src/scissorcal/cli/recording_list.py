@@ -33,11 +33,11 @@ def list_(folder: Folder = None) -> Answer:
     found: list[RecordingRow] = []
     lacking = {}
     for kind in ("friction", "cut"):
-        rows = engine.recordings(kind)  # type: ignore[arg-type]
+        rows = engine.recordings(kind)
         found += rows
         used = [row for row in rows if row.use == "used"]
         if used:
-            lacking[kind] = engine.missing(kind, used)  # type: ignore[arg-type]
+            lacking[kind] = engine.missing(kind, used)
     engine.index.save()
     lines = [["recording", "seconds", "use", "why"]]
     lines += [[row.path.name, f"{row.seconds:.1f}", row.use, row.why] for row in found]

@@ -7,12 +7,13 @@ inputs have now, it is stale.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
-from scissorcal.recipe.requirements import CaptureKind, requirements
+from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, photographs, rendering
 from scissorcal.workday.index import FileIndex
@@ -69,6 +70,10 @@ class Engine:
     index: FileIndex
     _states: dict[str, StepState] = field(default_factory=dict)
 
+    @cached_property
+    def _needs(self) -> Requirements:
+        return requirements(self.recipe)
+
     @classmethod
     def of(cls, workspace: Workspace) -> "Engine":
         """The engine of a workspace as its files are now. InputError where its recipe is wrong."""
@@ -82,9 +87,13 @@ class Engine:
 
     def states(self) -> tuple[StepState, ...]:
         """The states of all steps that the scene needs, in the order of the day."""
-        found = tuple(self.state(step.name) for step in STEPS)
+        found = tuple(self.state(step.name) for step in STEPS if self.needed(step.name))
         self.index.save()
-        return tuple(state for state in found if state.state != "excluded")
+        return found
+
+    def needed(self, name: str) -> bool:
+        """Whether the scene needs the step. Photographs may be fitted where it does not."""
+        return bool(BY_NAME[name].why(self._needs))
 
     def refresh(self) -> None:
         """Forget what was worked out, after a result was written."""
@@ -119,7 +128,7 @@ class Engine:
                 "version": step.version,
                 "settings": step.settings(self.recipe),
                 "effort": effort if step.by_effort else "",
-                "inputs": {_plain(item): self._content(item) for item in step.inputs},
+                "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
             }
         )
 
@@ -134,23 +143,35 @@ class Engine:
         """The recordings of one kind, with the use that fits make of them."""
         return list_recordings(self.workspace, self.recipe, kind, self.index)
 
-    def _content(self, item: str) -> str:
-        """Content of an input; nothing where it is not needed, or missing and not waited for."""
+    def _counts(self, step: Step, item: str) -> bool:
+        """Whether an input counts: the scene needs it, or it does not need the step either."""
+        return self.needed(_plain(item)) or not self.needed(step.name)
+
+    def _content(self, step: Step, item: str) -> str:
+        """Content of an input; nothing where it does not count, or is optional and missing."""
         state = self.state(_plain(item))
-        if state.state == "excluded" or (item.endswith("?") and state.state in WAITING):
+        if not self._counts(step, item) or (item.endswith("?") and state.state in WAITING):
             return ""
         return state.content
 
     def _find(self, step: Step) -> StepState:
-        why = step.why(requirements(self.recipe))
-        if not why:
+        why = step.why(self._needs)
+        if not why and not self._is_there(step):
             return StepState(step.name, "excluded", "the scene does not need it")
         find: Callable[[Step, str], StepState] = {
             "recordings": self._of_recordings,
             "photographs": self._of_photographs,
             "render": self._of_render,
         }.get(step.kind, self._of_result)
-        return find(step, why)
+        return find(step, why or "not needed by this scene")
+
+    def _is_there(self, step: Step) -> bool:
+        """Whether there are photographs of something, or a fit to them."""
+        if step.kind == "photographs":
+            return bool(self._photographs(step))
+        if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "photographs":
+            return False
+        return self.file(step.name).is_file() or bool(self._photographs(BY_NAME[step.inputs[0]]))
 
     def _of_recordings(self, step: Step, why: str) -> StepState:
         kind: CaptureKind = "friction" if step.what == "friction" else "cut"
@@ -216,11 +237,7 @@ class Engine:
         return tuple(notes)
 
     def _of_photographs(self, step: Step, why: str) -> StepState:
-        paths: list[Path] = []
-        for kind in step.photographs:
-            own = sorted(self.workspace.captures_dir.glob(f"{kind}-*/capture.json"))
-            own = [path for path in own if not path.parent.name.endswith(".part")]
-            paths += own[-1:] if step.newest_only else own
+        paths = self._photographs(step)
         try:
             read = [self.index.facts(path, "photographs", photographs) for path in paths]
         except InputError as error:
@@ -237,6 +254,15 @@ class Engine:
             files=tuple(self.workspace.relative(path.parent) for path in paths),
             content=digest([facts["content"] for facts in read]),
         )
+
+    def _photographs(self, step: Step) -> list[Path]:
+        """Index files of the folders of photographs that count for a step."""
+        paths: list[Path] = []
+        for kind in step.photographs:
+            own = sorted(self.workspace.captures_dir.glob(f"{kind}-*/capture.json"))
+            own = [path for path in own if not path.parent.name.endswith(".part")]
+            paths += own[-1:] if step.newest_only else own
+        return paths
 
     def _without_photographs(self, step: Step, why: str) -> StepState:
         """A camera may come from a file, which then takes the place of photographs."""
@@ -297,7 +323,7 @@ class Engine:
         waiting = [item for item in step.inputs if not item.endswith("?") and step.kind != "verify"]
         for item in waiting:
             state = self.state(item)
-            if state.state in WAITING:
+            if state.state in WAITING and self._counts(step, item):
                 return f"{item} is {state.state}"
         efforts = EFFORTS if step.by_effort else ("",)
         if facts["inputs"] not in {self.identity(step.name, effort) for effort in efforts}:

@@ -57,7 +57,7 @@ def edge_of_photographs(engine: "Engine") -> "tuple[EdgeBelief | None, tuple[Ver
     """
     from scissorcal.workday.runs.fit import load_result
 
-    if engine.state("fit blade").state == "excluded":
+    if not engine.needed("fit blade"):
         return None, ()
     blade = load_result(engine, "blade")
     return blade.belief, blade.verdicts

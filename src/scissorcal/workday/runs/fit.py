@@ -111,19 +111,20 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
 
     Raises InputError where the scene does not require what is wanted.
     """
-    needed = [step for step in steps_of("fit") if engine.state(step.name).state != "excluded"]
+    needed = [step for step in steps_of("fit") if engine.needed(step.name)]
     for what in wanted:
-        if what not in [step.what for step in needed]:
+        step = BY_NAME[f"fit {what}"]
+        if step not in needed and BY_NAME[step.inputs[0]].kind == "recordings":
             listed = " and ".join(step.what for step in needed)
             raise InputError(
                 f"{engine.workspace.recipe_path}: this scene requires no fit of {what}. It "
                 f"requires: {listed}."
             )
     names = {f"fit {what}" for what in wanted} or {step.name for step in needed}
-    for step in reversed(needed):
+    for step in reversed(steps_of("fit")):
         if step.name in names:
             names |= {item for item in step.inputs if _must_run_first(engine, item)}
-    return [step for step in needed if step.name in names]
+    return [step for step in steps_of("fit") if step.name in names]
 
 
 def fit_step(
@@ -205,12 +206,18 @@ def pictures_beside(path: Path) -> tuple[Path, ...]:
 
 def _usable(engine: Engine, step: Step) -> bool:
     state = engine.state(step.name)
-    return state.state not in ("missing", "stale", "excluded") and bool(state.content)
+    current = state.state not in ("missing", "stale", "excluded") and bool(state.content)
+    return current and engine.needed(step.name)
 
 
 def _must_run_first(engine: Engine, item: str) -> bool:
     step = BY_NAME[item.rstrip("?")]
-    return step.kind == "fit" and engine.state(step.name).state in ("missing", "stale")
+    return (
+        step.kind == "fit"
+        and not item.endswith("?")
+        and engine.needed(step.name)
+        and engine.state(step.name).state in ("missing", "stale")
+    )
 
 
 def _stored(engine: Engine, step: Step, force: bool) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def build_workspace_package(
 
     from scissorcal.package import build_package, check_package, open_package, put_review
 
-    if engine.state("package build").state == "excluded":
+    if not engine.needed("package build"):
         raise InputError(
             f"{engine.workspace.recipe_path}: a linear joint carries no blades (rig.joint), so "
             "there is no package to build; 'scissorcal report' shows its fit."
@@ -82,8 +82,7 @@ def _fits(engine: Engine) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for item in BY_NAME["package build"].inputs:
         what = BY_NAME[item].what
-        needed = engine.state(item).state != "excluded"
-        found[what] = load_result(engine, what) if needed else None
+        found[what] = load_result(engine, what) if engine.needed(item) else None
     return found
 
 
@@ -101,8 +100,6 @@ def _refuse_failed(engine: Engine) -> None:
 
 def _void(engine: Engine) -> tuple[str, ...]:
     state = engine.state("report sign")
-    if state.state not in ("stale", "failed") or not state.content:
-        return ()
-    if state.state == "failed":
+    if state.state != "stale":
         return ()
     return (f"The signature under the report is void and was left out: {state.found}.",)

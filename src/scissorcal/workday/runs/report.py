@@ -77,22 +77,13 @@ def write_workspace_report(
 def _refuse_stale(engine: Engine) -> None:
     for step in steps_of("fit"):
         state = engine.state(step.name)
-        if state.state == "stale":
+        if state.state == "stale" and engine.needed(step.name):
             raise MissingError(
                 f"The {step.name.replace('fit', 'fit of')} is stale ({state.found}): run "
                 f"'{step.command}' first."
             )
-        if state.state == "failed" and not engine_reads(engine, step.name):
+        if state.state == "failed" and not state.content:
             raise InputError(f"{state.found}: run '{state.command}' first.")
-
-
-def engine_reads(engine: Engine, name: str) -> bool:
-    """Whether the result of a step can be read."""
-    try:
-        engine.facts(name)
-    except InputError:
-        return False
-    return True
 
 
 def _rig_fits(engine: Engine) -> "dict[str, FitResult]":
@@ -120,7 +111,7 @@ def _geometry(engine: Engine) -> "Geometry":
     missing = {}
     for kind in kinds:
         state = engine.state(f"fit {kind}")
-        if state.state != "excluded" and kind not in there:
+        if engine.needed(f"fit {kind}") and kind not in there:
             capture = engine.state(f"capture {kind}")
             first = f"`{capture.command}`, then " if capture.state == "missing" else ""
             missing[kind] = f"The scene requires it: {state.found}. Run {first}`{state.command}`."
@@ -141,7 +132,7 @@ def _package_sheets(engine: Engine) -> "list[FactSheet]":
     from scissorcal.package import REVIEW_CHECK, check_package, open_package
     from scissorcal.report import sheet_from_mapping
 
-    if engine.state("package build").state == "excluded":
+    if not engine.needed("package build"):
         return []
     path = engine.file("package build")
     if not path.is_file():
