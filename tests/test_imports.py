@@ -11,12 +11,13 @@ import pytest
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "<root>"}
+LEAVES = {"errors", "verdicts", "identity", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "verdicts": set(),
+    "identity": set(),
     "kernel": set(),
     "model": set(),
     "inference": set(),

@@ -120,7 +120,7 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     assert said.code == 0
     assert said.envelope["result"]["style"] == "Kalibr"
     assert said.envelope["verdicts"][0]["status"] == "not_evaluated"
-    assert "Brought in from kalibr.yaml" in cli("fit", "camera").out
+    assert "Imported from kalibr.yaml" in cli("fit", "camera").out
 
 
 @pytest.mark.parametrize(

@@ -7,19 +7,19 @@ import cv2
 import numpy as np
 import pytest
 
+from scissorcal.calibration.plate.track import read_track
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.pose import Pose as Found
 from scissorcal.vision.geometry.pose import difference
 from scissorcal.vision.sim import Pose, chained
-from scissorcal.workday.demo.sim_photographs import sim_lens
-from scissorcal.workday.demo.sim_plate import (
+from scissorcal.vision.sim.sim_camera import (
+    SIM_LENS,
     render_card_photographs,
     render_frames,
     render_plate_photographs,
     sim_plate_scene,
 )
-from scissorcal.workday.runs.track import read_track
 from tests.cli.conftest import Cli
 
 
@@ -36,7 +36,7 @@ def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     stances = render_card_photographs(recipe, folder, 0)
     rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
     (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
-    lens = sim_lens()
+    lens = SIM_LENS
     store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
     store.write("image_width", lens.width)
     store.write("image_height", lens.height)
@@ -51,7 +51,7 @@ def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def video(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten pictures at 10 Hz of a plate that slides; the fourth is empty, the eighth black."""
     path = tmp_path_factory.mktemp("video") / "plate.avi"
-    lens = sim_lens()
+    lens = SIM_LENS
     writer = cv2.VideoWriter(
         str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (lens.width, lens.height)
     )
@@ -146,7 +146,7 @@ def test_stances_are_checked_line_by_line(
     for text, words in (
         ("file,advance_mm\nrig-01.jpg,3\n", "needs a first line"),
         ("file,advance_mm,opening_deg\nrig-01.jpg,3,wide\n", "line 2"),
-        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no line among the stances"),
+        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no stance: add a line"),
     ):
         table.write_text(text)
         said = cli("capture", "plate", "-i", cards(album)[0], "--stances", table)
@@ -285,7 +285,7 @@ def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> N
     assert cli("capture", "plate", "-i", "a.jpg", "--camera", "0").code == 2
     said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
     assert said.code == 2
-    assert "Nobody knows where the rig stood" in said.err
+    assert "The rig's stances are not known" in said.err
 
 
 def test_a_track_is_json_line_by_line(cli: Cli, workspace: Path, album: Path, video: Path) -> None:

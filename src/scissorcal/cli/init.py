@@ -1,23 +1,24 @@
 """``scissorcal init``"""
 
 from pathlib import Path
+from typing import Annotated
 
-import click
+import typer
 
 from scissorcal.cli.output import Answer, command
 
 
-@click.command("init")
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--recipe",
-    default="paper-80gsm",
-    show_default=True,
-    help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), or a "
-    "recipe file (.toml).",
-)
 @command
-def init(folder: Path, recipe: str) -> Answer:
+def init(
+    folder: Annotated[Path, typer.Argument(file_okay=False, help="The new workspace.")],
+    recipe: Annotated[
+        str,
+        typer.Option(
+            help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), "
+            "or a recipe file (.toml)."
+        ),
+    ] = "paper-80gsm",
+) -> Answer:
     """Start a workspace in FOLDER from a recipe.
 
     The recipe is copied to FOLDER/recipe.toml, to be edited: your rig, your material, your scene.

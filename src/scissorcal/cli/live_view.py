@@ -5,7 +5,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import click
+import typer
 
 from scissorcal.cli.output import is_interactive
 from scissorcal.errors import InputError
@@ -53,17 +53,17 @@ class LiveView:
         self._drawn_s, self._finished = now, done >= 1.0
         head = f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}"
         if self._live is None:
-            click.echo(f"{head}; {coverage.sentence()}" if coverage else head, err=True)
+            typer.echo(f"{head}; {coverage.sentence()}" if coverage else head, err=True)
         else:
             self._live.update(_drawing(done, head, coverage), refresh=True)
 
     def confirm(self, request: str) -> None:
         """Ask a person for what must be done, and wait until it is.
 
-        Raises InputError where nobody is there to be asked, click.Abort where they give up.
+        Raises InputError where nobody is there to be asked, typer.Abort where they give up.
         """
         if not self._ask:
-            click.echo(f"{request} (--yes: taken as done)", err=True)
+            typer.echo(f"{request} (--yes: taken as done)", err=True)
             return
         if not is_interactive():
             raise InputError(
@@ -71,7 +71,7 @@ class LiveView:
                 "it is done."
             )
         self._stop()
-        click.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
+        typer.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
         self._start()
 
     def _start(self) -> None:

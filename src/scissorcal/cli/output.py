@@ -5,27 +5,35 @@ one object alone, and the text goes to stderr with everything else that people r
 """
 
 import functools
+import inspect
 import json
 import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Annotated, Any
 
-import click
+import typer
 
 from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
 
-P = ParamSpec("P")
-
 VERDICT_FAILED = 3
 UNEXPECTED = 1
 INTERRUPTED = 130
 _MARKS = {"pass": ("pass", "green"), "fail": ("FAIL", "red"), "not_evaluated": ("----", "yellow")}
+
+
+_JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+_TRACEBACK = Annotated[bool, typer.Option("--traceback", help="Show where an error arose.")]
+
+
+_as_json: ContextVar[bool] = ContextVar("as_json", default=False)
+"""Whether the running command was given ``--json``."""
 
 
 @dataclass(frozen=True)
@@ -42,30 +50,28 @@ class Answer:
     files: Sequence[Path] = field(default=())
 
 
-def command(function: Callable[P, Answer]) -> Callable[..., None]:
-    """Make a click callback of a function that returns an `Answer`.
+def command(function: Callable[..., Answer]) -> Callable[..., None]:
+    """Make a command of a function that returns an `Answer`.
 
     Adds ``--json`` and ``--traceback``, prints the answer, and ends with the exit code that belongs
     to it. An error that scissorcal raises on purpose is its sentence and its exit code. On a group
     it is what the group does without a subcommand.
     """
 
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-    @click.option("--traceback", "show_traceback", is_flag=True, help="Show where an error arose.")
-    @click.pass_context
     @functools.wraps(function)
     def callback(
-        context: click.Context, /, *args: Any, as_json: bool, show_traceback: bool, **options: Any
+        context: typer.Context, as_json: bool, show_traceback: bool, **options: Any
     ) -> None:
         if context.invoked_subcommand is not None:
             return
         name = context.command_path.partition(" ")[2]
         began = time.perf_counter()
+        running = _as_json.set(as_json)
         try:
-            answer = function(*args, **options)
+            answer = function(**options)
         except ScissorcalError as error:
             code, answer = error.exit_code, _refusal(error, error.exit_code, show_traceback)
-        except click.ClickException:
+        except (typer.Abort, typer.Exit, typer.TyperException):
             raise
         except KeyboardInterrupt:
             code, answer = INTERRUPTED, _refusal("Interrupted.", INTERRUPTED, False)
@@ -74,10 +80,29 @@ def command(function: Callable[P, Answer]) -> Callable[..., None]:
         else:
             code = VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0
             _say(answer, as_json)
+        finally:
+            _as_json.reset(running)
         if as_json:
             print_envelope(name, answer, code, time.perf_counter() - began)
-        context.exit(code)
+        raise typer.Exit(code)
 
+    return _with_shared_options(callback, function)
+
+
+def _with_shared_options(
+    callback: Callable[..., None], function: Callable[..., Answer]
+) -> Callable[..., None]:
+    """Give ``callback`` the parameters of ``function`` and those that every command has."""
+    kind = inspect.Parameter.KEYWORD_ONLY
+    own = inspect.signature(function, eval_str=True).parameters.values()
+    parameters = [
+        inspect.Parameter("context", kind, annotation=typer.Context),
+        *(parameter.replace(kind=kind) for parameter in own),
+        inspect.Parameter("as_json", kind, default=False, annotation=_JSON),
+        inspect.Parameter("show_traceback", kind, default=False, annotation=_TRACEBACK),
+    ]
+    callback.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    callback.__annotations__ = {item.name: item.annotation for item in parameters}
     return callback
 
 
@@ -91,17 +116,17 @@ def print_envelope(name: str, answer: Answer, code: int, seconds: float) -> None
         files=[str(path) for path in answer.files],
         seconds=round(seconds, 3),
     )
-    click.echo(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False))
+    typer.echo(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False))
 
 
 def note(sentence: str) -> None:
     """Tell people something on the side, on stderr."""
-    click.echo(sentence, err=True)
+    typer.echo(sentence, err=True)
 
 
 def stdout_is_for_json() -> bool:
     """Whether the running command was given ``--json``, so that stdout is the object's alone."""
-    return bool(click.get_current_context().params.get("as_json"))
+    return _as_json.get()
 
 
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
@@ -132,7 +157,7 @@ def verdict_lines(verdicts: Sequence[Verdict]) -> str:
         return ""
     lines = table(rows).splitlines()
     return "\n".join(
-        click.style(line[:4], fg=_MARKS[verdict.status][1]) + line[4:]
+        typer.style(line[:4], fg=_MARKS[verdict.status][1]) + line[4:]
         for line, verdict in zip(lines, verdicts, strict=True)
     )
 
@@ -141,13 +166,13 @@ def _say(answer: Answer, as_json: bool) -> None:
     parts = [answer.text.rstrip(), verdict_lines(answer.verdicts)]
     text = "\n\n".join(part for part in parts if part)
     if text:
-        click.echo(text, err=as_json)
+        typer.echo(text, err=as_json)
 
 
 def _refusal(error: ScissorcalError | str, code: int, show_traceback: bool) -> Answer:
     if show_traceback:
         note(traceback.format_exc())
-    click.echo(f"{click.style('Error:', fg='red')} {error}", err=True)
+    typer.echo(f"{typer.style('Error:', fg='red')} {error}", err=True)
     kept = error.kept if isinstance(error, ScissorcalError) else ()
     return Answer({"error": str(error), "exit_code": code}, files=kept)
 

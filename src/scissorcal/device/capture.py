@@ -1,6 +1,6 @@
 """Capture friction and cuts: drive the rig, or let a hand move it, and record what it does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -171,6 +171,13 @@ def identity_facts(identity: Identity) -> dict[str, Any]:
     facts = identity._asdict()
     del facts["nonce_echo"]
     return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
+
+
+def identity_of(facts: Mapping[str, Any]) -> Identity:
+    """The identity that a recording's facts state, as `identity_facts` wrote them."""
+    known = {name: facts[name] for name in Identity._fields if name in facts}
+    known["schema_hash"] = int(str(facts["schema_hash"]), 16)
+    return Identity(**{**known, "nonce_echo": 0})
 
 
 class _Drive:

@@ -79,6 +79,8 @@ def build_package(
     tolerance: float = TOLERANCE,
     review: Review | None = None,
     plate: PlateFit | None = None,
+    inputs_hash: str = "",
+    allow_failed: bool = False,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
@@ -94,6 +96,8 @@ def build_package(
     """
     cut, friction = _wanted(recipe, friction, cut)
     record = _provenance(recipe, cut, friction, plate)
+    if inputs_hash:
+        record = record.model_copy(update={"inputs_hash": inputs_hash})
     draws = pick_draws(cut, friction, rng)
     model = central_model(_centre(cut), _centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)

@@ -44,6 +44,7 @@ def build_report(
     sheets: Sequence[FactSheet] = (),
     checks: Mapping[str, VerifyResult] | None = None,
     geometry: Geometry | None = None,
+    inputs_hash: str = "",
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
 
@@ -88,6 +89,7 @@ def build_report(
         created=created,
         version=__version__,
     )
+    document = replace(document, inputs_hash=inputs_hash)
     document = _with_earlier_time(document, Path(output_dir) / "report.json")
     views = [draw_fit(material) for material in materials]
     page = whole_page(document, views, draw_scene(document, recipe, fits), geometry)

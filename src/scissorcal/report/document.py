@@ -110,6 +110,7 @@ class ReportDocument:
     sheets: tuple[SheetSection, ...]
     left_out: tuple[LeftOut, ...]
     provenance: Provenance
+    inputs_hash: str = ""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
-from scissorcal.vision.targets.detect import Detection, find_board
+from scissorcal.vision.targets.detect import Detection, find_any_board
 
 Array = NDArray[np.float64]
 
@@ -120,12 +120,10 @@ def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
     """Find the first of several boards that a picture shows, or None."""
     height, width = image.shape[:2]
     photo = Photo(image, width, height, 1, (0, 0), 1, "", name)
-    for board in boards:
-        try:
-            return find_board(photo, board, explain=False)
-        except InputError:
-            continue
-    return None
+    try:
+        return find_any_board(photo, boards, explain=False)
+    except InputError:
+        return None
 
 
 def _moved(one: Detection | None, other: Detection | None) -> float:

@@ -28,7 +28,7 @@ SOURCES: Mapping[str, str] = {
     "report.schema.json": "scissorcal.report.twin:schema_text",
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
-    "track.schema.json": "scissorcal.workday.runs.track:track_schema",
+    "track.schema.json": "scissorcal.calibration.plate.track:track_schema",
     "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or

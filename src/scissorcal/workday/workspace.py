@@ -38,6 +38,11 @@ class Workspace:
         return self.root / "captures"
 
     @property
+    def exclusions_path(self) -> Path:
+        """Which recordings fits do not use, and why."""
+        return self.captures_dir / "excluded.json"
+
+    @property
     def report_html(self) -> Path:
         return self.root / "report" / "report.html"
 
@@ -70,18 +75,12 @@ class Workspace:
             path = self.captures_dir / f"{kind}-{stamp}-{number}.mcap"
         return path
 
-    def fit_path(self, what: FitKind) -> Path:
+    def fit_path(self, what: str) -> Path:
         return self.root / "fits" / f"{what}.nc"
 
-    def verify_path(self, what: FitKind) -> Path:
-        return self.root / "fits" / f"{what}.verify.json"
-
     def verify_partial_path(self, what: FitKind) -> Path:
+        """Where a trust check keeps each of its fits as it is done."""
         return self.root / "fits" / f"{what}.verify.partial.jsonl"
-
-    def checkpoint_path(self, what: FitKind, inputs_hash: str) -> Path:
-        """Where a thorough fit of these inputs keeps how far it got."""
-        return self.root / "fits" / f"{what}-{inputs_hash[:12]}.chains"
 
     def package_path(self, recipe: "Recipe") -> Path:
         return self.root / "package" / f"{recipe.name}.zip"

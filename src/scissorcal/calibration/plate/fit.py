@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.boards import PRINT_SCALE_SD
 from scissorcal.vision.targets.detect import Detection
+
+if TYPE_CHECKING:
+    from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
@@ -90,6 +94,14 @@ def fit_plate(
         inputs_hash=inputs_hash,
         sources=tuple(photo.name for photo in photos),
     )
+
+
+def plate_target(recipe: "Recipe") -> Pose:
+    """T_plate_target of the recipe: printed y runs down and z into the sheet, hence the half turn
+    about x."""
+    x, y = (1e-3 * value for value in recipe.plate.place_mm)
+    turn = Pose.from_rotation_vector([0.0, 0.0, np.radians(recipe.plate.turn_deg)], [x, y, 0.0])
+    return turn.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
 
 
 def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose:

@@ -16,6 +16,7 @@ from scissorcal.vision.geometry.board_pose import (
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
 from scissorcal.vision.targets.boards import PRINT_SCALE_SD
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,13 @@ class CardView:
     corners: Corners
     advance_m: float
     blade_angle_rad: float
+
+
+def card_view(detection: Detection, stance: tuple[float, float], moving_blades: int) -> CardView:
+    """The card as detected in one photograph; ``stance`` is advance (mm) and opening (deg)."""
+    frame = np.zeros(len(detection.ids), dtype=np.int64)
+    corners = Corners(detection.pixels, detection.points, frame, detection.ids)
+    return CardView(corners, 1e-3 * stance[0], float(np.radians(stance[1]) / moving_blades))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Find a target in a photograph: its corners to a fraction of a pixel, or why it is not there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,6 +92,19 @@ def find_board(
         )
     whole = photo.whole(pixels)
     return Detection(board, ids, whole, _side_px(board, ids, whole))
+
+
+def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = True) -> Detection:
+    """Find the first of several boards that a photograph shows.
+
+    Raises InputError as `find_board` does for the last one, where none is seen.
+    """
+    for board in boards[:-1]:
+        try:
+            return find_board(photo, board, explain=False)
+        except InputError:
+            continue
+    return find_board(photo, boards[-1], explain=explain)
 
 
 def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None = None) -> Markers:

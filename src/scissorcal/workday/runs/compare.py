@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import scissorcal
 from scissorcal.errors import InputError, MissingError
-from scissorcal.workday.runs.fit import current_fits
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
 
 if TYPE_CHECKING:
@@ -70,9 +71,11 @@ def load_side(path: Path) -> "Side":
 def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
     from scissorcal.report import facts_of, side_of
 
-    recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True)
-    return side_of(facts_of(recipe, list(fits.values())), source)
+    engine = Engine.of(workspace)
+    fits = [load_result(engine, what) for what in available(engine, ("friction", "cut"))]
+    if not fits:
+        raise MissingError(f"{source} has no current fit: run 'scissorcal fit' there first.")
+    return side_of(facts_of(engine.recipe, fits), source)
 
 
 def _side_of_fit(path: Path) -> "Side":

@@ -1,0 +1,148 @@
+"""What the file of each result says: which inputs it was made from, and what failed.
+
+One function a kind of file; each gives plain values, which the index keeps. Every one has
+``inputs`` (identity of what it was made from), ``label`` (its result in a few words) and
+``failed`` (names of failed checks).
+"""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from scissorcal.errors import InputError
+from scissorcal.identity import file_digest
+from scissorcal.verdicts import Verdict
+
+Facts = dict[str, Any]
+
+UNFINISHED = "unfinished:"
+"""Prefix of the inputs of a fit that ran out of time."""
+
+
+def rig_fit(path: Path) -> Facts:
+    """Facts of a fit of friction or of a cut."""
+    from scissorcal.calibration.store import load_fit
+
+    fit = load_fit(path)
+    label = f"{fit.rung} ({fit.effort})"
+    facts = _facts(fit.inputs_hash, label, fit.verdicts)
+    return {
+        **facts,
+        "what": fit.what,
+        "model": fit.rung,
+        "effort": fit.effort,
+        "little_used": list(fit.diagnostics.get("little_used", ())),
+    }
+
+
+def camera_fit(path: Path) -> Facts:
+    """Facts of a camera; ``imported`` where a file gave it."""
+    from scissorcal.calibration.camera.store import load_camera
+
+    fit = load_camera(path)
+    facts = _facts(fit.inputs_hash, fit.rung, fit.verdicts)
+    return {**facts, "imported": fit.origin == "imported"}
+
+
+def blade_fit(path: Path) -> Facts:
+    """Facts of a blade's edge."""
+    from scissorcal.calibration.edge.store import load_blade
+
+    fit = load_blade(path)
+    families = ", ".join(sorted({blade.family for blade in fit.blades}))
+    return _facts(fit.inputs_hash, families, fit.verdicts)
+
+
+def plate_fit(path: Path) -> Facts:
+    """Facts of a plate's pose."""
+    from scissorcal.calibration.plate.store import load_plate
+
+    fit = load_plate(path)
+    return _facts(
+        fit.inputs_hash, f"{len(fit.views)} photographs of the {fit.target}", fit.verdicts
+    )
+
+
+def trust_check(path: Path) -> Facts:
+    """Facts of a trust check; its inputs are the fit that it checked."""
+    from scissorcal.calibration.verify.store import load_verify
+
+    check = load_verify(path)
+    done = {"ranks": check.calibration, "halves": check.halves, "prior": check.sensitivity}
+    label = ", ".join(name for name, part in done.items() if part is not None)
+    return _facts(check.fit_hash, label or "nothing checked", check.verdicts)
+
+
+def report(path: Path) -> Facts:
+    """Facts of a report by its JSON twin."""
+    try:
+        twin = json.loads(path.read_text(encoding="utf-8"))
+        inputs = str(twin["inputs_hash"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} cannot be read ({error}): run 'scissorcal report'.") from None
+    if not path.with_suffix(".html").is_file():
+        raise InputError(f"{path.with_suffix('.html')} is gone: run 'scissorcal report'.")
+    return {"inputs": inputs, "label": "shows the current fits", "failed": []}
+
+
+def signature(path: Path) -> Facts:
+    """Facts of a signature; its inputs are the report that was signed."""
+    from pydantic import ValidationError
+
+    from scissorcal.package import Review
+
+    try:
+        review = Review.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        raise InputError(
+            f"{path} cannot be read: sign the report again with 'scissorcal report sign'."
+        ) from None
+    return {
+        "inputs": review.report_sha256,
+        "label": review.words,
+        "failed": ["rejected"] if review.decision == "reject" else [],
+        "review": review.model_dump(mode="json"),
+    }
+
+
+def package(path: Path) -> Facts:
+    """Facts of a model package."""
+    from scissorcal.package import open_package
+
+    manifest = open_package(path).manifest
+    return {
+        "inputs": manifest.provenance.inputs_hash,
+        "label": f"error bound {manifest.bound.stated_Nm:.2g} N m",
+        "failed": list(getattr(manifest.provenance, "failed_checks", ())),
+        "content": manifest.content_hash,
+        "review": manifest.review.model_dump(mode="json") if manifest.review else None,
+    }
+
+
+def rendering(path: Path) -> Facts:
+    """Facts of a rendering: the content of the package that was rendered."""
+    from scissorcal.recording import read_attachments
+
+    for attached in read_attachments(path):
+        if attached.name == "package-manifest.json":
+            return {"package": json.loads(attached.data)["content_hash"]}
+    return {"package": ""}
+
+
+def photographs(path: Path) -> Facts:
+    """Facts of a folder of photographs by its index file."""
+    try:
+        index = json.loads(path.read_text(encoding="utf-8"))
+        count = len(index["photographs"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} cannot be read ({error}): remove {path.parent.name} and capture its "
+            "photographs again."
+        ) from None
+    return {"content": file_digest(path), "photographs": count}
+
+
+def _facts(inputs: str, label: str, verdicts: Iterable[Verdict]) -> Facts:
+    failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
+    return {"inputs": inputs, "label": label, "failed": failed}
