@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, works_in
 
 
 @command
@@ -34,6 +34,7 @@ def init(
     from scissorcal.workday.workspace import create_workspace
 
     workspace = create_workspace(folder, recipe)
+    works_in(workspace)
     loaded = workspace.recipe()
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"

@@ -14,13 +14,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
+
+if TYPE_CHECKING:
+    from scissorcal.workday.workspace import Workspace
 
 VERDICT_FAILED = 3
 UNEXPECTED = 1
@@ -32,8 +35,15 @@ _JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object on st
 _TRACEBACK = Annotated[bool, typer.Option("--traceback", help="Show where an error arose.")]
 
 
-_as_json: ContextVar[bool] = ContextVar("as_json", default=False)
-"""Whether the running command was given ``--json``."""
+@dataclass
+class _Running:
+    """The running command: what it was given, and the workspace that it opened."""
+
+    as_json: bool = False
+    workspace: "Workspace | None" = None
+
+
+_running: ContextVar[_Running | None] = ContextVar("running", default=None)
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,8 @@ def command(function: Callable[..., Answer]) -> Callable[..., None]:
             return
         name = context.command_path.partition(" ")[2]
         began = time.perf_counter()
-        running = _as_json.set(as_json)
+        running = _Running(as_json)
+        token = _running.set(running)
         try:
             answer = function(**options)
         except ScissorcalError as error:
@@ -81,7 +92,7 @@ def command(function: Callable[..., Answer]) -> Callable[..., None]:
             code = VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0
             _say(answer, as_json)
         finally:
-            _as_json.reset(running)
+            _running.reset(token)
         if as_json:
             print_envelope(name, answer, code, time.perf_counter() - began)
         raise typer.Exit(code)
@@ -126,7 +137,15 @@ def note(sentence: str) -> None:
 
 def stdout_is_for_json() -> bool:
     """Whether the running command was given ``--json``, so that stdout is the object's alone."""
-    return _as_json.get()
+    running = _running.get()
+    return running is not None and running.as_json
+
+
+def works_in(workspace: "Workspace") -> None:
+    """Note the workspace that the running command opened."""
+    running = _running.get()
+    if running is not None:
+        running.workspace = workspace
 
 
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
