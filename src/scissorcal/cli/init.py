@@ -27,9 +27,8 @@ def init(
     Example:
       $ scissorcal init my-paper --recipe paper-80gsm
       my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.)
-      Edit my-paper/recipe.toml, then:
-        cd my-paper
-        scissorcal plan
+      Edit my-paper/recipe.toml, then go there: cd my-paper
+      next: scissorcal plan
     """
     from scissorcal.workday.workspace import create_workspace
 
@@ -38,7 +37,8 @@ def init(
     loaded = workspace.recipe()
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
-        f"Edit {folder / workspace.recipe_path.name}, then:\n  cd {folder}\n  scissorcal plan"
+        f"Edit {folder / workspace.recipe_path.name}, then go there: cd {folder}\n"
+        "next: scissorcal plan"
     )
     result = {"workspace": workspace.root, "recipe": loaded.name}
     return Answer(result, text, files=[workspace.recipe_path])
