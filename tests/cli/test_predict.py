@@ -61,7 +61,7 @@ def test_a_table_of_motion_alone_is_enough(
     bare.write_text("\n".join(cells) + "\n")
     said = cli("predict", "friction", bare, "-w", fitted.root, "--plot", tmp_path / "bare.png")
     assert said.code == 0
-    assert "nothing to compare with" in said.out
+    assert "no effort to compare with" in said.out
     by_motion = cli("predict", "friction", bare, "-w", fitted.root, "--json").envelope["result"]
     assert by_motion["share_inside"] is None
 

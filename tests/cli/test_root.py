@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,12 +12,12 @@ from typer.core import TyperCommand
 
 import scissorcal
 from scissorcal.cli.lazy import LazyGroup
-from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.output import Answer, table
 from scissorcal.cli.root import scissorcal_command
 from scissorcal.errors import DeviceError, InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.verdicts import Verdict
 
-from .conftest import Cli
+from .conftest import Cli, run_instead
 
 
 def all_commands() -> Iterator[tuple[str, TyperCommand]]:
@@ -30,13 +30,6 @@ def all_commands() -> Iterator[tuple[str, TyperCommand]]:
         else:
             assert isinstance(found, TyperCommand)
             yield path, found
-
-
-def run_instead(function: Callable[[], Answer], patch: pytest.MonkeyPatch) -> None:
-    """Make every command of the group ``scissorcal`` be ``function``."""
-    app = typer.Typer(rich_markup_mode=None)
-    app.command("plan")(command(function))
-    patch.setattr(LazyGroup, "load", lambda *_: typer.main.get_command(app))
 
 
 COMMANDS = dict(all_commands())

@@ -33,7 +33,7 @@ def test_it_prints_tables_and_verdicts(
         "noise: white ",
         "effort_rms",
         "two halves: whole strokes of a kind, alternating by speed",
-        "sensitivity to the powers of prior and likelihood",
+        "power-scaling sensitivity to prior and likelihood",
         "----  verify.friction  calibration",
         "pass  verify.friction  halves-effort",
     ):

@@ -15,11 +15,11 @@ from scissorcal.device.capture import (
     open_writer,
     servo_config,
 )
-from scissorcal.device.coverage import CoverageGrid
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
+from scissorcal.device.recorder import Recorder
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError
@@ -69,8 +69,8 @@ def test_friction_is_swept_as_planned_and_recorded_whole(tmp_path: Path) -> None
     link = link_for(recipe)
     told: list[tuple[float, str, float]] = []
 
-    def progress(done: float, sentence: str, coverage: CoverageGrid) -> None:
-        told.append((done, sentence, coverage.share))
+    def progress(done: float, sentence: str, recorder: Recorder) -> None:
+        told.append((done, sentence, recorder.coverage.share))
 
     recording, report = captured(tmp_path, link, recipe, "friction", progress=progress)
     plan = friction_plan(recipe, link.identity, advance=link.rig.advance)

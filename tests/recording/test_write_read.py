@@ -230,7 +230,7 @@ def test_a_full_disk_is_named_and_what_was_written_is_kept(
             for start in range(0, 3000, 20):
                 writer.append(samples[start : start + 20])
 
-    with pytest.raises(ScissorcalError, match=r"a\.mcap\.part could not be written: No space"):
+    with pytest.raises(ScissorcalError, match=r"disk is full: .*a\.mcap\.part"):
         capture()
     with pytest.raises(ScissorcalError, match="was not finished"):
         writer.close()

@@ -108,7 +108,7 @@ def _capture(
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:
-            note(f"What was recorded until then is kept in {workspace.relative(path)}.")
+            note(f"The samples recorded until then are kept in {workspace.relative(path)}.")
         if isinstance(error, ScissorcalError):
             error.kept = tuple(kept)
         raise
@@ -130,7 +130,7 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
     latency = report.motion.latency
     if latency is not None:
         lines.append(
-            f"answered a frame within {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
+            f"reply to a frame: {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
             f"{latency.worst:.0f} us (worst)"
         )
     return "\n".join(lines)

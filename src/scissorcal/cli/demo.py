@@ -99,11 +99,11 @@ def _text(found: "DemoResult") -> str:
         "",
         table(rows, right=[2, 3, 4, 5]),
         "",
-        f"{sum(inside)} of {len(inside)} intervals (90 %) hold the truth",
-        f"rendered torque is off by {100 * found.torque_error:.2f} % (rms over the scene)",
+        f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
+        f"rendered torque error {100 * found.torque_error:.2f} % (rms over the scene)",
         f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
         "",
-        f"look at {_shown(found.workspace / 'report' / 'report.html')}",
+        f"report: {_shown(found.workspace / 'report' / 'report.html')}",
     ]
     return "\n".join(lines)
 

@@ -105,8 +105,8 @@ def import_(
     notes = list(recording.notes)
     if rig and rig.joint != recording.joint.kind:
         notes.append(
-            f"The recipe says {rig.joint} joint: to be asked for what a {recording.joint.kind} one "
-            f'needs, set joint = "{recording.joint.kind}" in its [rig].'
+            f'The recipe has a {rig.joint} joint: set joint = "{recording.joint.kind}" in its '
+            f"[rig] to plan for a {recording.joint.kind} one."
         )
     lines = [
         f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, works_in
 
 
 @command
@@ -27,17 +27,18 @@ def init(
     Example:
       $ scissorcal init my-paper --recipe paper-80gsm
       my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.)
-      Edit my-paper/recipe.toml, then:
-        cd my-paper
-        scissorcal plan
+      Edit my-paper/recipe.toml, then go there: cd my-paper
+      next: scissorcal plan
     """
     from scissorcal.workday.workspace import create_workspace
 
     workspace = create_workspace(folder, recipe)
+    works_in(workspace)
     loaded = workspace.recipe()
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
-        f"Edit {folder / workspace.recipe_path.name}, then:\n  cd {folder}\n  scissorcal plan"
+        f"Edit {folder / workspace.recipe_path.name}, then go there: cd {folder}\n"
+        "next: scissorcal plan"
     )
     result = {"workspace": workspace.root, "recipe": loaded.name}
     return Answer(result, text, files=[workspace.recipe_path])

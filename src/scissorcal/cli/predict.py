@@ -93,7 +93,7 @@ def _text(what: str, outcome: "PredictionOutcome") -> str:
     lines = [head, width, band.sentence]
     inside = _number(found.share_inside)
     if inside is None:
-        lines.append("measured: nothing to compare with in this file")
+        lines.append("measured: this file holds no effort to compare with")
     else:
         import numpy as np
 

@@ -78,7 +78,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         main = typer.main.get_command(scissorcal_command).main
-        code = main(given, prog_name="scissorcal", standalone_mode=False)
+        code = main(given, prog_name="scissorcal", standalone_mode=False, obj=given)
     except (typer.TyperException, ScissorcalError) as error:
         code = _refuse_usage(error, "--json" in given)
     except typer.Abort:
@@ -88,9 +88,18 @@ def run(arguments: Sequence[str] | None = None) -> None:
         sys.stderr.close()
         code = 1
     except OSError as error:
-        typer.echo(f"Error: The answer could not be written: {error.strerror}.", err=True)
-        code = 1
+        code = _refuse_write(error)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse_write(error: OSError) -> int:
+    """Say which file could not be written, or that stdout took no answer; return the exit code."""
+    from scissorcal.cli.failures import user_error
+
+    known = user_error(error, None) if error.filename else None
+    sentence = known or f"The answer could not be written: {error.strerror}."
+    typer.echo(f"Error: {sentence}", err=True)
+    return known.exit_code if known else 1
 
 
 def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) -> int:

@@ -69,14 +69,13 @@ def verify(
 ) -> Answer:
     """Check whether a fit's intervals mean what they say.
 
-    sbc: raw recordings are simulated over your own motion, with the noise of your own sensors, from
-    parameters around your fit, and the whole fit is run on them. The intervals must hold the
-    truth as often as they say. halves: your strokes are parted into two halves, which must differ
-    by no more than each claims. prior: how much the result owes to the recipe's prior.
+    sbc (simulation-based calibration): recordings are simulated with your motion and sensor noise,
+    from parameters around your fit, and fitted again. The intervals must contain the truth as often
+    as they state. halves: your strokes are split into two halves, whose fits must agree within
+    their intervals. prior: the sensitivity of the result to the recipe's prior.
 
-    Every fit is kept as it is done: stop the command when you like, and give it again to go on.
-    A failed verdict ends it with exit code 3; all together fail in 1 % of the cases although
-    nothing is wrong.
+    Each fit is stored when it is done: the command can be interrupted and repeated to continue. A
+    failed verdict gives exit code 3; the false alarm rate of all checks together is 1 %.
 
     \b
     Example:
@@ -88,12 +87,12 @@ def verify(
       inertia       52.0%    90.5%   0.98   0.03  0.71
       ...
       two halves: whole strokes of a kind, alternating by speed
-      parameter  unit        one half  the other        sd     z
-      inertia    kg m^2     9.492e-05  0.0001172  2.93e-05   0.8
+      parameter  unit      first half  second half        sd     z
+      inertia    kg m^2     9.492e-05    0.0001172  2.93e-05   0.8
       ...
     \b
-    Width is the factor by which intervals are too narrow (above 1) or too wide, shift how far they
-    lie beside the truth, p the probability of such ranks where they are right.
+    width: factor by which intervals are too narrow (above 1) or too wide; shift: their offset from
+    the truth; p: probability of such ranks if the intervals are right.
     """
     from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 
@@ -146,13 +145,13 @@ def _calibration(found: "Calibration") -> str:
     fifty, ninety = found.quantities[0].coverage
     head = (
         f"{found.fits} fits to simulated data (truths: {found.generating}; noise: {found.noise}); "
-        f"right are {fifty.low:.0%} to {fifty.high:.0%} and {ninety.low:.0%} to {ninety.high:.0%}"
+        f"expected {fifty.low:.0%} to {fifty.high:.0%} and {ninety.low:.0%} to {ninety.high:.0%}"
     )
     return f"{head}\n{table(rows, right=range(1, 6))}"
 
 
 def _halves(found: "Halves") -> str:
-    rows = [["parameter", "unit", "one half", "the other", "sd", "z"]]
+    rows = [["parameter", "unit", "first half", "second half", "sd", "z"]]
     for row in found.rows:
         numbers = [f"{number:.4g}" for number in (row.first, row.second, row.sd)]
         rows.append([row.name, row.unit, *numbers, "-" if row.z is None else f"{row.z:.1f}"])
@@ -164,5 +163,5 @@ def _sensitivity(found: "Sensitivity") -> str:
     rows += [
         [row.name, f"{row.prior:.3f}", f"{row.likelihood:.3f}", row.diagnosis] for row in found.rows
     ]
-    head = f"sensitivity to the powers of prior and likelihood; above {found.threshold:g} matters"
+    head = f"power-scaling sensitivity to prior and likelihood (limit {found.threshold:g})"
     return f"{head}\n{table(rows, right=(1, 2))}"

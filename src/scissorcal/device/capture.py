@@ -20,8 +20,8 @@ from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
 
-CaptureProgress = Callable[[float, str, CoverageGrid], None]
-"""Called with the share done (0 to 1), a sentence, and the coverage so far."""
+CaptureProgress = Callable[[float, str, Recorder], None]
+"""Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
 SUPERVISOR_S = 1.0
 RATE_CUTOFF_HZ = 120.0
@@ -121,7 +121,7 @@ def capture_cut(
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
-                motion, recipe, recorder, loader, lambda done, what: tell(done, what, coverage)
+                motion, recipe, recorder, loader, lambda done, what: tell(done, what, recorder)
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
@@ -214,7 +214,7 @@ class _Drive:
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
-        self._tell(self._done / self._total, sentence, self._recorder.coverage)
+        self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
         labels = samples["stroke"]
@@ -239,5 +239,5 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
 
 
-def _silent(done: float, sentence: str, coverage: CoverageGrid) -> None:
+def _silent(done: float, sentence: str, recorder: Recorder) -> None:
     pass

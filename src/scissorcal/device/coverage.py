@@ -127,7 +127,8 @@ class CoverageGrid:
         """Return the grid as a small table for rich: a row per speed, a column per angle."""
         from rich.table import Table
 
-        table = Table(title=f"coverage {100 * self.share:.0f} %", title_justify="left")
+        title = f"coverage {100 * self.share:.0f} %: speed (rad/s) over opening (deg)"
+        table = Table(title=title, title_justify="left")
         table.add_column("rad/s", justify="right")
         for low, high in self.cells:
             table.add_column(f"{np.degrees(low):.0f}-{np.degrees(high):.0f}", justify="center")

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, file_error
 from scissorcal.recording import layout
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
@@ -42,10 +42,7 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
         draft.replace(path)
     except OSError as error:
         draft.unlink(missing_ok=True)
-        raise ScissorcalError(
-            f"{path} could not be written: {error.strerror or error}. The recording itself is "
-            "untouched; free some space or choose another folder."
-        ) from error
+        raise file_error(error, path, "The recording is unchanged.") or error from None
     return path
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, file_error
 
 
 def create_locked(path: Path, part: Path) -> IO[bytes]:
@@ -79,7 +79,5 @@ def explained(part: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ScissorcalError(
-            f"{part} could not be written: {error.strerror or error}. What was recorded until "
-            "then is kept in it; free some space, and the next command recovers it."
-        ) from error
+        kept = f"Samples until then are kept in {part}; the next command recovers them."
+        raise file_error(error, part, kept) or error from None

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, file_error
 from scissorcal.vision.geometry.camera import Camera
 
 Style = Literal["opencv", "ros"]
@@ -48,7 +48,7 @@ def read_camera_file(path: Path) -> CameraFile:
     try:
         text = path.read_text("utf-8", errors="replace")
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+        raise file_error(error, path) or error from None
     start = text.lstrip("\ufeff \t\r\n")
     if start.startswith(("%YAML", "<?xml", "<opencv_storage", "{")) or "!!opencv-matrix" in text:
         return _opencv(path)
@@ -70,7 +70,7 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
         part.write_text(text, "utf-8")
         part.replace(path)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}.") from None
+        raise file_error(error, path) or error from None
     return path
 
 

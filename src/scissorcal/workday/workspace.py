@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, file_error
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -128,9 +128,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
         workspace.root.mkdir(parents=True, exist_ok=True)
         workspace.recipe_path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(
-            f"{workspace.root} cannot be made into a workspace: {error.strerror}."
-        ) from None
+        raise file_error(error, workspace.root) or error from None
     return workspace
 
 
@@ -151,5 +149,5 @@ def demo_folder(folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         marker.write_text("A demo made this folder; the next one replaces it.\n", encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{folder} cannot be used for a demo: {error.strerror}.") from None
+        raise file_error(error, folder) or error from None
     return folder
