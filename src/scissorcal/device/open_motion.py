@@ -22,6 +22,7 @@ def open_motion(
     ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It begins idle, and
     knows where the rig stands. A fault that the device has latched is cleared.
 
+    >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
     >>> link = LockstepLink("office-paper", np.random.default_rng(1))
     >>> limits = ServoConfig(torque_limit=1, torque_slew=200, force_limit=0, force_slew=0)
