@@ -14,7 +14,7 @@ PYTEST_ARGS ?=
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check c-tests kernel setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests kernel setup clean
 
 demo: $(STAMP)
 	$(RUN)/scissorcal demo
@@ -43,6 +43,13 @@ schemas: $(STAMP)
 
 schemas-check: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --check
+
+# docs/api and the table of docs/verdicts.md, from the docstrings.
+api: $(STAMP)
+	$(RUN)/python docs/make_api.py --write
+
+api-check: $(STAMP)
+	$(RUN)/python docs/make_api.py --check
 
 # Strict, and again under the address and undefined-behaviour sanitizers.
 c-tests:

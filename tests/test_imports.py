@@ -31,7 +31,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "report": {"model", "vision", "calibration", "package", "recipe", "recording"},
     "workday": LOWEST | MIDDLE,
     "cli": LOWEST | MIDDLE | {"workday"},
-    "<root>": {"package"},
+    "library": {"calibration", "package", "recipe", "recording", "workday"},
+    "<root>": {"library", "package"},
 }
 ROOMS = set(MAY_IMPORT) - {"<root>"}
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -100,6 +100,7 @@ def test_the_loop_renders_the_step_of_the_package(
     assert result.largest_torque_Nm == pytest.approx(np.max(samples["torque_command"]))
 
 
+@pytest.mark.filterwarnings("ignore::scissorcal.package.OutsideCoverageWarning")
 def test_what_is_felt_averages_to_what_the_package_states(
     silent_paper: ModelPackage, tmp_path: Path
 ) -> None:

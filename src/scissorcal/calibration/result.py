@@ -193,6 +193,14 @@ class FitResult:
     derived: tuple[FittedParameter, ...] = ()
     derived_draws: NDArray[np.float64] | None = None
 
+    def __repr__(self) -> str:
+        """One line: what was fitted, its law, draws and failed verdicts."""
+        return (
+            f"<{self.what} fit: {self.rung}, {len(self.parameters)} parameters, "
+            f"{len(self.draws)} draws, {self.effort}, {len(self.rejected)} of "
+            f"{len(self.verdicts)} verdicts failed>"
+        )
+
     @property
     def rejected(self) -> tuple[Verdict, ...]:
         """The verdicts that forbid to use this fit as a calibration: all that failed."""

@@ -8,7 +8,11 @@ from scissorcal.package.build import (
 )
 from scissorcal.package.check import REVIEW_CHECK, check_package
 from scissorcal.package.manifest import Manifest, manifest_schema_text
-from scissorcal.package.model_package import ModelPackage, open_package
+from scissorcal.package.model_package import (
+    ModelPackage,
+    OutsideCoverageWarning,
+    open_package,
+)
 from scissorcal.package.review import REVIEW_FORMAT, Review, stamp
 
 __all__ = [
@@ -16,6 +20,7 @@ __all__ = [
     "REVIEW_FORMAT",
     "Manifest",
     "ModelPackage",
+    "OutsideCoverageWarning",
     "PackageSummary",
     "Review",
     "build_package",

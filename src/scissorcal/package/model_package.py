@@ -1,5 +1,6 @@
 """A package in memory: torque, its band, and the step that the loop runs."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,6 +27,13 @@ from scissorcal.package.review import against
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9
+"""Share of a range's end by which a place may lie beyond it and still count as inside."""
+
+
+class OutsideCoverageWarning(UserWarning):
+    """A torque was asked for outside the ranges for which the package was built and checked."""
+
 
 @dataclass(frozen=True)
 class ModelPackage:
@@ -39,6 +47,17 @@ class ModelPackage:
     arrays: Mapping[str, NDArray[Any]]
     source: str
 
+    def __repr__(self) -> str:
+        """One line: name, what it covers, error bound and source."""
+        ranges, degrees = self.manifest.ranges, np.degrees(self.manifest.ranges.opening_rad)
+        return (
+            f"<package {self.manifest.name}: opening {degrees[0]:.3g} to {degrees[1]:.3g} deg, "
+            f"rate {ranges.opening_rate_rad_per_s[0]:.3g} to "
+            f"{ranges.opening_rate_rad_per_s[1]:.3g} rad/s, "
+            f"contact {1e3 * ranges.contact_m[0]:.3g} to {1e3 * ranges.contact_m[1]:.3g} mm, "
+            f"error bound {self.manifest.bound.stated_Nm:.2g} N m, {self.source}>"
+        )
+
     def torque(self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike) -> Array:
         """Torque in N m as felt on average, positive where it opens the blades.
 
@@ -46,11 +65,14 @@ class ModelPackage:
         what the loop renders, ripple averaged out; ``manifest.bound`` says how far it may be from
         the exact model. Arguments (rad, rad/s, m) broadcast, and so does the result's shape. The
         crack settles first: at a contact where the material would not hold, the torque is that of
-        the place where it does. See `covers` for where this is meant to be used. Raises ValueError
-        for arguments that are not finite.
+        the place where it does. Outside what the package `covers` the result has no stated error,
+        and an OutsideCoverageWarning says by how much. Raises ValueError for arguments that are
+        not finite.
         """
         opening, rate, contact = _broadcast(opening, opening_rate, contact)
-        return self._limited(self.average.torque(opening, rate, contact))
+        torque = self._limited(self.average.torque(opening, rate, contact))
+        self._warn_outside(opening, rate, contact)
+        return torque
 
     def band(
         self,
@@ -62,8 +84,8 @@ class ModelPackage:
         """Equal-tailed interval that holds the torque with ``probability``: (low, high) in N m.
 
         Each posterior draw in the package is evaluated with the exact model, without tables, and
-        held to the torque limit as in `torque`. Arguments broadcast. Raises ValueError unless
-        0 < probability < 1.
+        held to the torque limit as in `torque`. Arguments broadcast. Warns as `torque` does.
+        Raises ValueError unless 0 < probability < 1.
         """
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability must lie between 0 and 1, not {probability:g}")
@@ -71,6 +93,7 @@ class ModelPackage:
         low, high = torque_quantiles(
             self._drawn, opening, opening_rate, contact, (tail, 1.0 - tail)
         )
+        self._warn_outside(*_broadcast(opening, opening_rate, contact))
         return self._limited(low), self._limited(high)
 
     def kernel(self) -> Kernel:
@@ -81,16 +104,43 @@ class ModelPackage:
         self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike
     ) -> NDArray[np.bool_]:
         """Whether places lie within the ranges for which the package was made and checked."""
-        ranges = self.manifest.ranges
         opening, rate, contact = _broadcast(opening, opening_rate, contact)
         inside = np.ones(opening.shape, dtype=np.bool_)
-        for values, (low, high) in (
-            (opening, ranges.opening_rad),
-            (np.abs(rate), ranges.opening_rate_rad_per_s),
-            (contact, ranges.contact_m),
-        ):
-            inside &= (low <= values) & (values <= high)
+        for _, values, (low, high), _, _ in self._coordinates(opening, rate, contact):
+            inside &= (low * (1.0 - ROUNDING) <= values) & (values <= high * (1.0 + ROUNDING))
         return inside
+
+    def _coordinates(
+        self, opening: Array, rate: Array, contact: Array
+    ) -> tuple[tuple[str, Array, tuple[float, float], float, str], ...]:
+        """Name, values, range, and what turns both into the unit that people read."""
+        ranges = self.manifest.ranges
+        return (
+            ("opening", opening, ranges.opening_rad, float(np.degrees(1.0)), "deg"),
+            ("rate", np.abs(rate), ranges.opening_rate_rad_per_s, 1.0, "rad/s"),
+            ("contact", contact, ranges.contact_m, 1e3, "mm"),
+        )
+
+    def _warn_outside(self, opening: Array, rate: Array, contact: Array) -> None:
+        inside = self.covers(opening, rate, contact)
+        if inside.all():
+            return
+        parts = []
+        for name, values, (low, high), scale, unit in self._coordinates(opening, rate, contact):
+            beyond = np.maximum(low - values, values - high)
+            worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+            if beyond[worst] > ROUNDING * high:
+                parts.append(
+                    f"{name} {scale * values[worst]:.3g} {unit} is {scale * beyond[worst]:.2g} "
+                    f"{unit} outside {scale * low:.3g} to {scale * high:.3g} {unit}"
+                )
+        warnings.warn(
+            f"{int(np.sum(~inside))} of {inside.size} places lie outside what the package "
+            f"{self.manifest.name} covers ({'; '.join(parts)}). The torque there has no stated "
+            "error: widen the scene in the recipe and build the package again.",
+            OutsideCoverageWarning,
+            stacklevel=3,
+        )
 
     @cached_property
     def tables(self) -> ModelTables:

@@ -49,16 +49,9 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
 def _as_table(recording: Recording) -> "pa.Table":
     import json
 
-    import numpy as np
     import pyarrow as pa
 
-    columns = {}
-    for field in layout.fields():
-        name = layout.column_name(field, recording.joint)
-        columns[name] = np.ascontiguousarray(recording.samples[field])
-        if field == "device_time_us":
-            columns["time_s"] = recording.device_time_s
-    table = pa.table(columns)
+    table = pa.table(layout.columns(recording))
     return table.replace_schema_metadata(
         {
             layout.METADATA_NAME: _description(recording).model_dump_json(),

@@ -2,10 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.errors import MissingError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Kind = Literal["friction", "cut", "render"]
 StrokeKind = Literal["closing", "opening", "excitation", "press"]
@@ -94,6 +99,31 @@ class Recording:
     source: str = ""
     content_hash: str = ""
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: kind, length, strokes and source."""
+        return (
+            f"<{self.kind} recording: {len(self.samples)} samples, {self.duration_s:.1f} s, "
+            f"{len(self.strokes)} strokes, {self.joint.kind} joint, {self.source or 'in memory'}>"
+        )
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return the samples as a table, one row per sample, the unit in each column's name.
+
+        The columns are those of ``scissorcal export``: ``opening_rad`` (``opening_m`` for a linear
+        joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
+        Raises MissingError where pandas is not installed.
+        """
+        from scissorcal.recording.layout import columns
+
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingError(
+                "to_pandas() needs pandas, which is not installed. Run 'pip install pandas', or "
+                "use recording.samples, a NumPy array with the same fields."
+            ) from None
+        return pd.DataFrame(columns(self))
 
     @property
     def device_time_s(self) -> NDArray[np.float64]:

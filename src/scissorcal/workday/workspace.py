@@ -29,6 +29,10 @@ class Workspace:
 
     root: Path
 
+    def __repr__(self) -> str:
+        """One line: the folder."""
+        return f"<workspace {self.root}>"
+
     @property
     def recipe_path(self) -> Path:
         return self.root / RECIPE_FILE
