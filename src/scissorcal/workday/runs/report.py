@@ -82,7 +82,7 @@ def reportable_fits(workspace: Workspace, recipe: Recipe) -> "dict[FitKind, FitR
 def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitResult]") -> str:
     """Say what in the workspace is no longer as the report there shows it; empty if nothing is."""
     from scissorcal.recipe.load import parse_recipe
-    from scissorcal.report import posterior_sha256
+    from scissorcal.report import posterior_sha256, trust_check_sha256
 
     facts = _facts(workspace)
     provenance = facts.get("provenance", {}) if isinstance(facts, dict) else {}
@@ -108,13 +108,14 @@ def why_stale(workspace: Workspace, recipe: Recipe, fits: "Mapping[FitKind, FitR
         return "it shows another recipe than there is now"
     if reported != recipe:
         return "it shows another recipe than there is now"
-    checked = {section["what"]: section.get("trust_check") for section in facts.get("fits", [])}
+    checked = {row.get("fit"): row.get("sha256") for row in provenance.get("trust_checks", [])}
     try:
         checks = _trust_checks(workspace, fits)
     except InputError:
         return "a trust check beside its fits cannot be read"
     for what in fits:
-        if checked.get(what) != _as_reported(checks.get(what)):
+        check = checks.get(what)
+        if checked.get(what) != (None if check is None else trust_check_sha256(check)):
             return f"it shows another trust check of {what} than there is now"
     return ""
 
@@ -195,15 +196,6 @@ def _trust_checks(
     return {
         what: check for what, check in found.items() if check.fit_hash == fits[what].inputs_hash
     }
-
-
-def _as_reported(check: "VerifyResult | None") -> Any:
-    """A trust check as the report's twin holds it."""
-    from pydantic import TypeAdapter
-
-    from scissorcal.calibration.verify.result import VerifyResult
-
-    return None if check is None else TypeAdapter(VerifyResult).dump_python(check, mode="json")
 
 
 def _facts(workspace: Workspace) -> Any:

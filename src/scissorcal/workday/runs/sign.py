@@ -53,6 +53,7 @@ def sign_report(
     from pydantic import ValidationError
 
     from scissorcal.package import REVIEW_FORMAT, Review, stamp
+    from scissorcal.report import sign_page
 
     recipe = workspace.recipe()
     fits = reportable_fits(workspace, recipe)
@@ -86,6 +87,7 @@ def sign_report(
         raise InputError(
             f"{workspace.signature_path} cannot be written: {error.strerror or error}."
         ) from error
+    sign_page(workspace.report_html, review)
     return review
 
 
