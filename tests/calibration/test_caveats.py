@@ -8,7 +8,7 @@ import pytest
 from scissorcal.calibration import FittedParameter
 from scissorcal.calibration.caveats import FEW_COUNTS, caveats_by_parameter, caveats_of
 from scissorcal.cli.fit import _parameter_facts, _text
-from scissorcal.report.sections.parameters import tabulate_parameters
+from scissorcal.report.subjects.posterior import parameters_panel
 from scissorcal.workday.runs.fit import FitOutcome
 from tests.package.fits import cut_fit, friction_fit, recipe
 
@@ -71,8 +71,8 @@ def test_terminal_json_and_report_carry_it_beside_the_interval():
     assert "kappa *" in said
     assert f"* fracture_energy, kappa: {sentence}" in said
     facts = {row["name"]: row["caveats"] for row in _parameter_facts(outcome)}
-    rows = {row.name: list(row.caveats) for row in tabulate_parameters(fit)}
-    assert facts == rows
+    for row in parameters_panel(fit, "cut").rows:
+        assert row.note == " ".join(f"Known to be poor: {said}" for said in facts[row.name])
     assert facts["kappa"] == [sentence]
     assert facts["response_force"] == []
 

@@ -13,7 +13,7 @@ from scissorcal.recipe.library import schemas_dir
 from scissorcal.recording import write_recording
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording
-from tests.report.pages import read_page
+from tests.report.pages import panel_of, read_page, values_of
 from tests.workday.made import quick_workspace, record_cut, record_friction
 
 from .conftest import Cli
@@ -143,11 +143,15 @@ def test_two_runs_stand_side_by_side_or_are_refused_for_what_differs(
     monkeypatch.chdir(tmp_path)
     said = cli("report", "compare", recorded.root, recorded.report_json, "--json")
     assert said.code == 0
-    assert [row["in_sd"] for fit in said.envelope["result"]["fits"] for row in fit["parameters"]]
+    panels = {panel["id"]: panel for panel in said.envelope["result"]["panels"]}
+    assert panels["cut-parameters"]["sentence"] == "No parameter has changed."
+    for row in panels["cut-parameters"]["rows"]:
+        assert [value["number"] for value in row["values"] if value["name"] == "in sd"] == [0.0]
     twin = json.loads((tmp_path / "comparison" / "comparison.json").read_text(encoding="utf-8"))
     schema = json.loads((schemas_dir() / "comparison.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(schema).validate(twin)
-    assert twin["torque"]["largest_difference"] == 0
+    torque = values_of(panel_of(twin, "torque"))
+    assert torque["largest difference"]["B − A"]["number"] == pytest.approx(0, abs=1e-9)
     assert read_page(tmp_path / "comparison" / "comparison.html").unbalanced == []
 
     facts = json.loads(recorded.report_json.read_text(encoding="utf-8"))

@@ -78,7 +78,7 @@ def compare(
         typer.Option(file_okay=False, help="Folder for comparison.html and comparison.json."),
     ] = Path("comparison"),
 ) -> Answer:
-    """Put two runs side by side: parameters, verdicts, held-out errors, rendered torque.
+    """Put two runs side by side: parameters, verdicts, hold-out errors, rendered torque.
 
     Each is a workspace, a report.json or a fit (.nc). Runs of another joint, material, scene or
     law are refused.
@@ -87,28 +87,24 @@ def compare(
     Example:
       $ scissorcal report compare monday friday
       No parameter differs by more than 3 standard deviations. Rendered torque differs by at ...
+      ...
       comparison/comparison.html and comparison/comparison.json show it
     """
+    from scissorcal.report import panels_text
     from scissorcal.workday.runs.compare import compare_runs
 
     done = compare_runs(first, second, output)
     found = done.comparison
-    text = f"{found.sentence}\n{done.html} and {done.json} show it"
+    shown = [panel for panel in found.panels if panel.id.endswith("-parameters")]
+    text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{done.html} and {done.json} show it"
     result = {
         "first": found.first,
         "second": found.second,
         "sentence": found.sentence,
-        "fits": found.fits,
-        "verdicts": [row for row in found.verdicts if row.changed],
-        "torque": {
-            "missing": found.torque.missing,
-            "rms_Nm": found.torque.rms,
-            "largest_difference_Nm": found.torque.largest_difference,
-            "apart": found.torque.apart,
-            "felt": found.torque.felt,
-        },
-        "only_first": found.only_first,
-        "only_second": found.only_second,
+        "panels": [
+            {"id": panel.id, "title": panel.title, "sentence": panel.sentence, "rows": panel.rows}
+            for panel in found.panels
+        ],
         "html": done.html,
         "json": done.json,
     }

@@ -30,6 +30,7 @@ def sign_report(
     from pydantic import ValidationError
 
     from scissorcal.package import REVIEW_FORMAT, Review, stamp
+    from scissorcal.report import sign_page
 
     state = engine.state("report")
     if state.state == "missing":
@@ -54,6 +55,7 @@ def sign_report(
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"The {place} cannot be signed with: {first['msg']}.") from None
     _write(engine.file("report sign"), review.model_dump_json(indent=2) + "\n")
+    sign_page(engine.workspace.report_html, review)
     engine.refresh()
     return review
 
