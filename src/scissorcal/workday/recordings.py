@@ -95,11 +95,11 @@ def refuse_mixed_joints(rows: tuple[RecordingRow, ...]) -> None:
 def completeness_counts(
     row: RecordingRow, recipe: Recipe, kind: CaptureKind, index: FileIndex
 ) -> Mapping[str, Any]:
-    """Count what one recording holds of the recipe's plan; see `device.completeness`."""
+    """Count what one recording holds of the recipe's plan; see `device.counting`."""
     settings = digest(recipe.model_dump(include={"capture", "scene", "rig", "material", "fit"}))
 
     def count(path: Path) -> dict[str, Any]:
-        from scissorcal.device.completeness import count_recorded
+        from scissorcal.device.counting import count_recorded
         from scissorcal.recording import read_recording
 
         try:
