@@ -233,7 +233,8 @@ def scene_facts(recipe: Recipe) -> SceneFacts:
 
 
 def _is_of(evidence: Evidence, fit: FitResult) -> bool:
-    return fit.what in evidence.checks
+    check = evidence.checks.get(fit.what)
+    return check is not None and check.fit_hash == fit.inputs_hash
 
 
 def _anchors(fits: Sequence[FitResult]) -> list[str]:

@@ -71,7 +71,7 @@ def trust_check(path: Path) -> Facts:
     check = load_verify(path)
     done = {"ranks": check.calibration, "halves": check.halves, "prior": check.sensitivity}
     label = ", ".join(name for name, part in done.items() if part is not None)
-    return _facts(check.fit_hash, label or "nothing checked", check.verdicts)
+    return _facts(check.fit_content, label or "nothing checked", check.verdicts)
 
 
 def report(path: Path) -> Facts:

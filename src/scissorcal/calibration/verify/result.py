@@ -154,7 +154,7 @@ class Sensitivity:
 class VerifyResult:
     """The trust check of one fit, as stored in fits/<what>.verify.json.
 
-    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not asked for are None;
+    ``fit_hash`` is the inputs hash of the fit it is about, ``fit_content`` the SHA-256 of its file. Checks that were not asked for are None;
     ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
     probability that any statistical verdict fails although the fit is right.
     """
@@ -171,3 +171,4 @@ class VerifyResult:
     not_done: tuple[str, ...]
     false_alarm: float
     verdicts: tuple[Verdict, ...]
+    fit_content: str = ""

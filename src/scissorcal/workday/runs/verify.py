@@ -108,7 +108,7 @@ def verify_workspace(
                 wanted_tasks = {(task.kind, task.index) for task in tasks}
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
                 result = assess(study, fit, chosen.checks, records)
-                result = replace(result, fit_hash=engine.identity(f"verify {kind}"))
+                result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
                 save_verify(result, path)
                 engine.refresh()
