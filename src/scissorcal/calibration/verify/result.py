@@ -154,7 +154,8 @@ class Sensitivity:
 class VerifyResult:
     """The trust check of one fit, as stored in fits/<what>.verify.json.
 
-    ``fit_hash`` is the inputs hash of the fit it is about, ``fit_content`` the SHA-256 of its file. Checks that were not asked for are None;
+    ``fit_hash`` is the inputs hash of the fit it is about, ``fit_content`` the SHA-256 of its
+    file. Checks that were not asked for are None;
     ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
     probability that any statistical verdict fails although the fit is right.
     """
