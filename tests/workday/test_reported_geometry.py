@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.calibration.camera.store import save_camera
-from scissorcal.calibration.edge.store import save_blade
-from scissorcal.calibration.plate.store import save_plate
+from scissorcal.calibration import save
 from scissorcal.errors import MissingError
 from scissorcal.workday.geometry import fit_state
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
@@ -33,10 +31,10 @@ def workspace(tmp_path: Path) -> Workspace:
     made = quick_workspace(tmp_path / "work")
     made.recipe_path.write_text(PHOTOGRAPHED, encoding="utf-8")
     recipe = made.recipe()
-    save_camera(imported_camera(), camera_path(made))
+    save(imported_camera(), camera_path(made))
     blade = replace(blade_result(), inputs_hash=blade_inputs_hash(made, recipe, (), "draft"))
-    save_blade(blade, blade_path(made))
-    save_plate(replace(plate_fit(), inputs_hash=plate_inputs_hash(made, recipe)), plate_path(made))
+    save(blade, blade_path(made))
+    save(replace(plate_fit(), inputs_hash=plate_inputs_hash(made, recipe)), plate_path(made))
     return made
 
 
@@ -61,7 +59,7 @@ def test_another_outcome_makes_report_and_signature_stale(workspace: Workspace) 
     sign_report(workspace, "A. Lovelace", "accept")
     stored = report_geometry(workspace, workspace.recipe()).plate
     assert stored is not None
-    save_plate(replace(stored, rms_px=0.4), plate_path(workspace))
+    save(replace(stored, rms_px=0.4), plate_path(workspace))
     stale = "it shows other fits of photographs than there are now"
     assert why_stale(workspace, workspace.recipe(), {}) == stale
     assert stale in review_state(workspace, workspace.recipe(), {}).why

@@ -1,15 +1,71 @@
-"""What a fit ends in: posterior draws, parameters as people read them, diagnostics, verdicts."""
+"""What a fit results in: posterior draws, parameters, diagnostics, verdicts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.verdicts import Verdict, failed
 
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Effort = Literal["draft", "standard", "thorough"]
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Where :mod:`scissorcal.calibration.store` writes an array: the annotation of a field.
+
+    ``dims`` names the dimensions; a leading "chain" of length one is added to the array. ``group``
+    is the netCDF group, below the object's own unless it begins with "/"; ``name`` is the
+    variable's, by default the field's. ``columns`` is an attribute of the same object that names
+    the columns of the array's last axis: each column becomes a variable over ``dims``.
+    """
+
+    dims: tuple[str, ...]
+    group: str = ""
+    name: str = ""
+    columns: str = ""
+
+
+def by_name(group: str, columns: str) -> Stored:
+    """Draws (n, k) as ArviZ reads them: a variable (chain, draw) for each named column."""
+    return Stored(("chain", "draw"), group, columns=columns)
+
+
+class Result:
+    """What every stored result has, and a short ``repr``.
+
+    ``title`` names the kind of result in messages, ``command`` computes it again. ``what`` names
+    the quantity, ``inputs_hash`` identifies all that the result depends on. Where a result has
+    them, ``effort``, ``rung`` (the chosen candidate model), ``rungs``, ``verdicts``, ``sources``
+    and ``notes`` are fields. Subclasses are frozen dataclasses with ``repr=False``; the store
+    writes their fields as they are annotated.
+    """
+
+    title: ClassVar[str] = "fit"
+    command: ClassVar[str] = "scissorcal fit"
+    what: str
+    inputs_hash: str
+
+    @property
+    def model(self) -> str:
+        """The chosen candidate model in words; empty where there is only one model."""
+        return str(getattr(self, "rung", ""))
+
+    @property
+    def rejected(self) -> tuple[Verdict, ...]:
+        """The verdicts that forbid to use this result: all that failed."""
+        verdicts: tuple[Verdict, ...] = getattr(self, "verdicts", ())
+        return failed(verdicts)
+
+    def __repr__(self) -> str:
+        words = [self.what, self.model, str(getattr(self, "effort", ""))]
+        bad = ", ".join(verdict.check for verdict in self.rejected)
+        words.append(f"failed: {bad}" if bad else "no check failed")
+        return f"<{type(self).__name__} {'; '.join(word for word in words if word)}>"
 
 
 @dataclass(frozen=True)
@@ -62,6 +118,10 @@ class StrokeError:
     relative_rms: float
 
 
+_CONSTANT = Stored(("point",), "/constant_data")
+_PREDICTED = Stored(("point",), "/posterior_predictive")
+
+
 @dataclass(frozen=True)
 class FitSeries:
     """Band-limited data against the fitted model, for plots: all arrays have shape (n,).
@@ -72,16 +132,16 @@ class FitSeries:
     quantity that was fitted.
     """
 
-    time_s: NDArray[np.float64]
-    recording: NDArray[np.int64]
-    stroke: NDArray[np.int64]
-    opening: NDArray[np.float64]
-    opening_rate: NDArray[np.float64]
-    contact: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    band_low: NDArray[np.float64]
-    band_high: NDArray[np.float64]
+    time_s: Annotated[Array, _CONSTANT]
+    recording: Annotated[Integers, _CONSTANT]
+    stroke: Annotated[Integers, _CONSTANT]
+    opening: Annotated[Array, _CONSTANT]
+    opening_rate: Annotated[Array, _CONSTANT]
+    contact: Annotated[Array, _CONSTANT]
+    measured: Annotated[Array, Stored(("point",), "/observed_data", "torque")]
+    predicted: Annotated[Array, _PREDICTED]
+    band_low: Annotated[Array, _PREDICTED]
+    band_high: Annotated[Array, _PREDICTED]
 
 
 @dataclass(frozen=True)
@@ -141,30 +201,61 @@ class ReplayComparison:
     recording: str
     kind: str
     speed: float
-    opening: NDArray[np.float64]
-    torque: NDArray[np.float64]
+    opening: Annotated[Array, Stored(("opening",))]
+    torque: Annotated[Array, Stored(("opening",))]
     rows: tuple[ReplayRow, ...]
     sentence: str
 
 
 @dataclass(frozen=True)
-class FitResult:
+class Predictive:
+    """Replicated data and log-likelihoods, which ``arviz.plot_ppc`` and ``arviz.loo`` read.
+
+    ``torque`` (replicates, n) is what the model would measure at the points of
+    :class:`FitSeries`: the mean by a draw of the posterior, and a draw of the noise. ``stroke``
+    (strokes,) labels the log-likelihoods: whole strokes are the independent units.
+    ``log_likelihood`` (draws, strokes) is the chosen candidate's, ``candidate_log_likelihoods``
+    (draws, strokes, candidates) those of all that were compared; None at draft effort. They are
+    multiplied by ``independent_share``, the share of points that are independent, the same for all
+    candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
+    largest value, since their level depends on the unit of torque. Their draws are those of a
+    posterior whose likelihood is taken to such a power
+    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`), not the rows of ``posterior``.
+    """
+
+    torque: Annotated[
+        NDArray[np.float32], Stored(("chain", "draw", "point"), "/posterior_predictive")
+    ]
+    stroke: Annotated[Integers, Stored(("stroke",), "/log_likelihood")]
+    log_likelihood: Annotated[
+        Array | None, Stored(("chain", "draw", "stroke"), "/log_likelihood", "torque")
+    ]
+    log_likelihood_reference: Annotated[Array, Stored(("stroke",), "/reference", "log_likelihood")]
+    independent_share: float
+    candidates: tuple[str, ...] = ()
+    candidate_log_likelihoods: Annotated[
+        Array | None, Stored(("chain", "draw", "stroke"), "/candidates", columns="candidates")
+    ] = None
+
+
+@dataclass(frozen=True, repr=False)
+class FitResult(Result):
     """The result of one fit: the same type for friction and for a cut.
 
-    ``what`` is "friction" or "cut". ``rung`` names the chosen law in words ("coulomb + viscous,
-    asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the law (read
-    back by the package compiler). ``draws`` has shape (draws, parameters) in SI, columns in the
-    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the rungs that
-    were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
+    ``what`` is "friction" or "cut". ``rung`` names the chosen candidate model in words ("coulomb +
+    viscous, asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the
+    model (the package compiler reads them). ``draws`` (draws, parameters) are in SI, columns in the
+    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the candidates
+    that were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
     ``held_out_score``, ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and
-    ``equivalent`` (it cannot be told from the best); ``selection`` says so in words.
-    ``critic`` holds what the critic proposes, ``replay`` the comparison with record-and-replay.
-    ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and ``nuisance_draws``
-    (draws, nuisance) are the parameters that nobody asked for, row by row with ``draws``.
-    ``derived`` follow from parameters and what the recipe states, with ``derived_draws`` (draws,
-    derived) row by row; no law needs them.
-    ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
-    ``inputs_hash`` identifies recordings, recipe and settings: equal hashes need no second fit.
+    ``equivalent`` (not distinguishable from the best); ``selection`` says so in words.
+    ``critic`` holds the terms that the critic proposes, ``replay`` the comparison with
+    record-and-replay. ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and
+    ``nuisance_draws`` (draws, nuisance) are parameters that are inferred and not reported, row by
+    row with ``draws``. ``derived`` follow from parameters and the recipe, with ``derived_draws``
+    (draws, derived) row by row; no model needs them. ``diagnostics`` are plain numbers and strings
+    (k_hat, ess, evaluations, whiteness_p, ...). ``inputs_hash`` identifies recordings, recipe and
+    settings: equal hashes need no second fit.
     """
 
     what: Literal["friction", "cut"]
@@ -172,8 +263,8 @@ class FitResult:
     rung: str
     structure: Mapping[str, Any]
     parameters: tuple[FittedParameter, ...]
-    draws: NDArray[np.float64]
-    map_point: NDArray[np.float64]
+    draws: Annotated[Array, by_name("/posterior", "parameters")]
+    map_point: Annotated[Array, Stored((), "/optimum", columns="parameters")]
     series: FitSeries
     held_out: tuple[StrokeError, ...]
     rungs: tuple[Mapping[str, Any], ...]
@@ -187,16 +278,12 @@ class FitResult:
     selection: str = ""
     critic: tuple[Proposal, ...] = ()
     replay: ReplayComparison | None = None
-    prior_draws: NDArray[np.float64] | None = None
+    prior_draws: Annotated[Array | None, by_name("/prior", "parameters")] = None
     nuisance: tuple[FittedParameter, ...] = ()
-    nuisance_draws: NDArray[np.float64] | None = None
+    nuisance_draws: Annotated[Array | None, by_name("/nuisance_posterior", "nuisance")] = None
     derived: tuple[FittedParameter, ...] = ()
-    derived_draws: NDArray[np.float64] | None = None
-
-    @property
-    def rejected(self) -> tuple[Verdict, ...]:
-        """The verdicts that forbid to use this fit as a calibration: all that failed."""
-        return failed(self.verdicts)
+    derived_draws: Annotated[Array | None, by_name("/derived_posterior", "derived")] = None
+    predictive: Predictive | None = None
 
     def parameter(self, name: str) -> FittedParameter:
         """Return the parameter called ``name``; KeyError if this fit has none."""

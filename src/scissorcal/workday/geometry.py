@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.requirements import GeometryKind, requirements
-from scissorcal.verdicts import Verdict, failed
+from scissorcal.verdicts import Verdict
 from scissorcal.workday.photographs import photo_captures
 from scissorcal.workday.runs.blade import blade_inputs_hash, blade_path, fit_workspace_blade
 from scissorcal.workday.runs.camera import camera_inputs_hash, camera_path, fit_workspace_camera
@@ -76,7 +76,8 @@ def edge_belief(workspace: Workspace, recipe: "Recipe") -> "EdgeBelief | None":
     Raises MissingError where the recipe asks for photographs and they are not fitted, or have
     changed since, InputError where their shape has no scale.
     """
-    from scissorcal.calibration.edge.store import load_blade
+    from scissorcal.calibration import load
+    from scissorcal.calibration.edge.result import BladeResult
 
     if not requirements(recipe).needs_geometry("blade"):
         return None
@@ -86,16 +87,17 @@ def edge_belief(workspace: Workspace, recipe: "Recipe") -> "EdgeBelief | None":
             f"The recipe takes the edge from photographs, and the blade's fit is {state.state}: "
             "run 'scissorcal fit blade' first."
         )
-    return load_blade(blade_path(workspace)).belief
+    return load(blade_path(workspace), BladeResult).belief
 
 
 def edge_verdicts(workspace: Workspace, recipe: "Recipe") -> tuple[Verdict, ...]:
     """Verdicts on the fit that the edge is taken from; none where it is the recipe's own."""
-    from scissorcal.calibration.edge.store import load_blade
+    from scissorcal.calibration import load
+    from scissorcal.calibration.edge.result import BladeResult
 
     if not requirements(recipe).needs_geometry("blade"):
         return ()
-    return load_blade(blade_path(workspace)).verdicts
+    return load(blade_path(workspace), BladeResult).verdicts
 
 
 def scene_plate(workspace: Workspace, recipe: "Recipe") -> "PlateFit | None":
@@ -103,7 +105,8 @@ def scene_plate(workspace: Workspace, recipe: "Recipe") -> "PlateFit | None":
 
     Raises MissingError where it does, and the fit is missing or has fallen behind.
     """
-    from scissorcal.calibration.plate.store import load_plate
+    from scissorcal.calibration import load
+    from scissorcal.calibration.plate.result import PlateFit
 
     if not requirements(recipe).needs_geometry("plate"):
         return None
@@ -113,7 +116,7 @@ def scene_plate(workspace: Workspace, recipe: "Recipe") -> "PlateFit | None":
             f"The scene asks where the plate stands, and its fit is {state.state}: run 'scissorcal "
             "fit plate' first."
         )
-    return load_plate(plate_path(workspace))
+    return load(plate_path(workspace), PlateFit)
 
 
 def expected_package_hash(
@@ -146,22 +149,23 @@ def photograph_state(workspace: Workspace, what: GeometryKind) -> GeometryState:
 
 def fit_state(workspace: Workspace, recipe: "Recipe", what: GeometryKind) -> GeometryState:
     """Whether the fit of photographs is there, readable and of what is there now."""
+    from scissorcal.calibration import read_header
+
     path = _PATHS[what](workspace)
     if not path.is_file():
         return GeometryState("missing", "not fitted yet")
     try:
-        stored, verdicts, imported = _stored(what, path)
+        stored = read_header(path)
     except InputError:
         return GeometryState("stale", f"{workspace.relative(path)} is damaged", damaged=True)
     try:
-        current = stored in _expected(workspace, recipe, what)
-        current |= imported and not photo_captures(workspace, what)
+        current = stored.inputs_hash in _expected(workspace, recipe, what)
+        current |= stored.origin == "imported" and not photo_captures(workspace, what)
     except InputError as error:
         return GeometryState("stale", str(error))
     if not current:
         return GeometryState("stale", "its inputs changed since")
-    wrong = [verdict.check for verdict in failed(verdicts)]
-    words = f"failed: {', '.join(wrong)}" if wrong else "fitted"
+    words = f"failed: {', '.join(stored.failed)}" if stored.failed else "fitted"
     return GeometryState("done", words, (path,))
 
 
@@ -171,22 +175,6 @@ _PATHS: dict[GeometryKind, Callable[[Workspace], Path]] = {
     "blade": blade_path,
     "plate": plate_path,
 }
-
-
-def _stored(what: GeometryKind, path: Path) -> tuple[str, tuple[Verdict, ...], bool]:
-    """Inputs hash and verdicts of a stored fit, and whether it was brought in from a file."""
-    from scissorcal.calibration.camera.store import load_camera
-    from scissorcal.calibration.edge.store import load_blade
-    from scissorcal.calibration.plate.store import load_plate
-
-    if what == "camera":
-        camera = load_camera(path)
-        return camera.inputs_hash, camera.verdicts, camera.origin == "imported"
-    if what == "blade":
-        blade = load_blade(path)
-        return blade.inputs_hash, blade.verdicts, False
-    plate = load_plate(path)
-    return plate.inputs_hash, plate.verdicts, False
 
 
 def _expected(workspace: Workspace, recipe: "Recipe", what: GeometryKind) -> set[str]:

@@ -26,9 +26,10 @@ def report_geometry(workspace: Workspace, recipe: "Recipe") -> "Geometry":
 
     One that is missing, damaged or has fallen behind is named with the command that makes it.
     """
-    from scissorcal.calibration.camera.store import load_camera
-    from scissorcal.calibration.edge.store import load_blade
-    from scissorcal.calibration.plate.store import load_plate
+    from scissorcal.calibration import load
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.edge.result import BladeResult
+    from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.report import Geometry
 
     files: dict[GeometryKind, Path] = {}
@@ -42,9 +43,9 @@ def report_geometry(workspace: Workspace, recipe: "Recipe") -> "Geometry":
         else:
             missing[kind] = f"The scene requires it: {state.state}. {_how(workspace, kind, state)}"
     return Geometry(
-        camera=load_camera(files["camera"]) if "camera" in files else None,
-        blade=load_blade(files["blade"]) if "blade" in files else None,
-        plate=load_plate(files["plate"]) if "plate" in files else None,
+        camera=load(files["camera"], CameraFit) if "camera" in files else None,
+        blade=load(files["blade"], BladeResult) if "blade" in files else None,
+        plate=load(files["plate"], PlateFit) if "plate" in files else None,
         pictures={
             kind: tuple(sorted(path.with_suffix("").glob("*.png"))) for kind, path in files.items()
         },

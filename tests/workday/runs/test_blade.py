@@ -2,7 +2,8 @@
 
 import pytest
 
-from scissorcal.calibration.edge.store import load_blade
+from scissorcal.calibration import load
+from scissorcal.calibration.edge.result import BladeResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.demo.sim_photographs import render_blade_photographs
 from scissorcal.workday.photographs import BladeSetup, photo_captures
@@ -46,7 +47,7 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert not outcome.cached
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in outcome.pictures)
     assert len(outcome.pictures) == 2
-    belief = load_blade(blade_path(workspace)).belief
+    belief = load(blade_path(workspace), BladeResult).belief
     edge = workspace.recipe().rig.edge
     middle = 0.5e-3 * edge.length_mm
     found = float(belief.edge.offset_at(middle))

@@ -1,12 +1,12 @@
-"""What the trust check ends in: calibration, halves, prior sensitivity, verdicts."""
+"""What the trust check results in: calibration, halves, prior sensitivity, verdicts."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from scissorcal.calibration.result import Effort
+from scissorcal.calibration.result import Effort, Result
 from scissorcal.verdicts import Verdict
 
-FORMAT = "scissorcal-verify/1"
+FORMAT: Literal["scissorcal-verify/1"] = "scissorcal-verify/1"
 
 Check = Literal["sbc", "halves", "prior"]
 Diagnosis = Literal["fine", "prior-data conflict", "weak likelihood"]
@@ -150,16 +150,19 @@ class Sensitivity:
     rows: tuple[SensitivityRow, ...]
 
 
-@dataclass(frozen=True)
-class VerifyResult:
+@dataclass(frozen=True, repr=False)
+class VerifyResult(Result):
     """The trust check of one fit, as stored in fits/<what>.verify.json.
 
-    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not asked for are None;
-    ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
-    probability that any statistical verdict fails although the fit is right.
+    ``fit_hash`` is the inputs hash of the fit that was checked. Checks that were not requested are
+    None; ``not_done`` gives the reason for each requested check that could not be made.
+    ``false_alarm`` is the probability that any statistical verdict fails although the fit is right.
     """
 
-    format: str
+    title = "trust check"
+    command = "scissorcal verify"
+
+    format: Literal["scissorcal-verify/1"]
     what: Literal["friction", "cut"]
     fit_hash: str
     rung: str

@@ -107,9 +107,10 @@ def judge_photographs(
 def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeometry]:
     import numpy as np
 
-    from scissorcal.calibration.edge.store import load_blade
+    from scissorcal.calibration import load
+    from scissorcal.calibration.edge.result import BladeResult
 
-    fit = load_blade(blade_path(workspace)).blades[0]
+    fit = load(blade_path(workspace), BladeResult).blades[0]
     edges = fit.belief.with_values(fit.draws)
     blade, length = specimen.blade, fit.belief.edge.length_m
     rows = []

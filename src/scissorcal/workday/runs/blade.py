@@ -98,11 +98,11 @@ def fit_workspace_blade(
 ) -> BladeOutcome:
     """Fit the blade's edge to all its photographs, where they or the camera changed.
 
-    Uses the workspace's camera where there is one. Writes fits/blade.json and an overlay of each
+    Uses the workspace's camera where there is one. Writes fits/blade.nc and an overlay of each
     photograph below fits/blade/. Raises MissingError where there is no photograph yet.
     """
+    from scissorcal.calibration import load, save
     from scissorcal.calibration.edge.result import BladeResult
-    from scissorcal.calibration.edge.store import load_blade, save_blade
 
     recipe = workspace.recipe()
     captures = photo_captures(workspace, "blade")
@@ -115,7 +115,7 @@ def fit_workspace_blade(
     expected = blade_inputs_hash(workspace, recipe, captures, chosen)
     path = blade_path(workspace)
     if path.is_file() and not force:
-        stored = load_blade(path)
+        stored = load(path, BladeResult)
         if stored.inputs_hash == expected:
             return BladeOutcome(stored, path, _pictures_of(workspace, stored), cached=True)
     tell = progress or (lambda done, sentence: None)
@@ -127,13 +127,13 @@ def fit_workspace_blade(
     )
     pictures = _draw(workspace, seen, fits)
     names = tuple(workspace.relative(picture) for picture in pictures)
-    save_blade(replace(result, pictures=names), path)
+    save(replace(result, pictures=names), path)
     return BladeOutcome(result, path, pictures, cached=False)
 
 
 def blade_path(workspace: Workspace) -> Path:
     """The file of a workspace's blade."""
-    return workspace.root / "fits" / "blade.json"
+    return workspace.root / "fits" / "blade.nc"
 
 
 def blade_inputs_hash(

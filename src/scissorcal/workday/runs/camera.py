@@ -117,18 +117,19 @@ def fit_workspace_camera(
 ) -> CameraOutcome:
     """Fit the camera to all photographs of boards in a workspace, where they changed.
 
-    Writes fits/camera.json and pictures below fits/camera/: residuals over the picture, what is
+    Writes fits/camera.nc and pictures below fits/camera/: residuals over the picture, what is
     uncertain, and the three worst photographs with their residuals. Raises MissingError where
     there are too few photographs, and what the fit itself raises; nothing is written then.
     """
+    from scissorcal.calibration import load, save
     from scissorcal.calibration.camera.fit import fit_camera
-    from scissorcal.calibration.camera.store import load_camera, save_camera
+    from scissorcal.calibration.camera.result import CameraFit
 
     captures = photo_captures(workspace, "camera")
     expected = camera_inputs_hash(captures)
     path = camera_path(workspace)
     if path.is_file() and not force:
-        stored = load_camera(path)
+        stored = load(path, CameraFit)
         if stored.inputs_hash == expected:
             return CameraOutcome(stored, path, pictures_beside(path), cached=True)
         if stored.origin == "imported" and not captures:
@@ -136,18 +137,18 @@ def fit_workspace_camera(
     photos = _photos(captures)
     rng = np.random.default_rng([seed, 2])
     fit = fit_camera(photos, rng=rng, inputs_hash=expected, progress=progress)
-    save_camera(fit, path)
+    save(fit, path)
     return CameraOutcome(fit, path, _draw(fit, photos, captures, path), cached=False)
 
 
 def import_camera(workspace: Workspace, file: Path) -> tuple["CameraFit", "CameraFile", Path]:
-    """Bring a camera file of OpenCV, ROS or Kalibr in as fits/camera.json.
+    """Bring a camera file of OpenCV, ROS or Kalibr in as fits/camera.nc.
 
     Raises InputError where the file is none, or the workspace has photographs of a board: what is
     fitted from them says how sure it is, and a file does not.
     """
+    from scissorcal.calibration import save
     from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.calibration.camera.store import save_camera
     from scissorcal.vision.camera_files import read_camera_file
 
     if photo_captures(workspace, "camera"):
@@ -177,25 +178,26 @@ def import_camera(workspace: Workspace, file: Path) -> tuple["CameraFit", "Camer
         sources=(file.name,),
         notes=(f"Brought in from {file.name} ({read.style}).",),
     )
-    save_camera(fit, camera_path(workspace))
+    save(fit, camera_path(workspace))
     return fit, read, camera_path(workspace)
 
 
 def camera_path(workspace: Workspace) -> Path:
     """The file of a workspace's camera."""
-    return workspace.root / "fits" / "camera.json"
+    return workspace.root / "fits" / "camera.nc"
 
 
 def require_camera(workspace: Workspace) -> "CameraFit":
     """Load a workspace's camera. Raises MissingError where there is none yet."""
-    from scissorcal.calibration.camera.store import load_camera
+    from scissorcal.calibration import load
+    from scissorcal.calibration.camera.result import CameraFit
 
     if not camera_path(workspace).is_file():
         raise MissingError(
             "There is no camera yet: run 'scissorcal capture camera --image board-*.jpg' and "
             "'scissorcal fit camera', or bring one in with 'scissorcal import camera.yaml'."
         )
-    return load_camera(camera_path(workspace))
+    return load(camera_path(workspace), CameraFit)
 
 
 def camera_inputs_hash(captures: Sequence[PhotoCapture]) -> str:

@@ -157,9 +157,8 @@ def _fit(
 ) -> FitOutcome:
     import numpy as np
 
-    from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
+    from scissorcal.calibration import fit_cut, fit_friction, load_fit, read_header, save
     from scissorcal.calibration.hashing import cut_upstream
-    from scissorcal.calibration.store import load_header
     from scissorcal.workday.geometry import edge_belief, edge_verdicts
 
     chosen: Effort = effort or recipe.fit.effort
@@ -177,7 +176,7 @@ def _fit(
     edge = edge_belief(workspace, recipe) if friction else None
     upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
     expected = expected_hash(workspace, recipe, what, chosen, upstream)
-    if path.is_file() and not force and load_header(path).inputs_hash == expected:
+    if path.is_file() and not force and read_header(path).inputs_hash == expected:
         stored = load_fit(path)
         return FitOutcome(what, stored, path, cached=True, verified=is_verified(workspace, stored))
     rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
@@ -210,7 +209,7 @@ def _fit(
         )
     if result.rejected and stop is not None and stop():
         result = _unfinished(result)
-    save_fit(result, path)
+    save(result, path)
     if not result.rejected:
         checkpoint.unlink(missing_ok=True)
     return FitOutcome(what, result, path, cached=False, verified=is_verified(workspace, result))
@@ -218,11 +217,11 @@ def _fit(
 
 def last_chosen(workspace: Workspace, what: FitKind) -> str | None:
     """Name of the law that the stored fit chose, whatever its inputs; None where there is none."""
-    from scissorcal.calibration.store import load_header
+    from scissorcal.calibration import read_header
 
     path = workspace.fit_path(what)
     try:
-        return load_header(path).rung if path.is_file() else None
+        return read_header(path).model if path.is_file() else None
     except InputError:
         return None
 
@@ -276,10 +275,11 @@ def progress_share(progress: Progress | None, index: int, count: int) -> Progres
 
 def is_verified(workspace: Workspace, fit: "FitResult") -> bool:
     """Whether there is a trust check of this very fit."""
-    from scissorcal.calibration.verify import load_verify
+    from scissorcal.calibration import load
+    from scissorcal.calibration.verify import VerifyResult
 
     path = workspace.verify_path(fit.what)
     try:
-        return path.is_file() and load_verify(path).fit_hash == fit.inputs_hash
+        return path.is_file() and load(path, VerifyResult).fit_hash == fit.inputs_hash
     except InputError:
         return False

@@ -143,17 +143,18 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
     """Fit the plate's pose to the newest photographs of it, where anything changed.
 
     The plate may have been moved between captures, so that only the newest counts. With photographs
-    of the rig's card the pose is in the rig's frame too. Writes fits/plate.json and an overlay of
+    of the rig's card the pose is in the rig's frame too. Writes fits/plate.nc and an overlay of
     each photograph. Raises MissingError where there is no camera or no photograph yet.
     """
+    from scissorcal.calibration import load, save
     from scissorcal.calibration.plate.fit import fit_plate
-    from scissorcal.calibration.plate.store import load_plate, save_plate
+    from scissorcal.calibration.plate.result import PlateFit
 
     recipe = workspace.recipe()
     expected = plate_inputs_hash(workspace, recipe)
     path = plate_path(workspace)
     if path.is_file() and not force:
-        stored = load_plate(path)
+        stored = load(path, PlateFit)
         if stored.inputs_hash == expected:
             return PlateOutcome(stored, path, pictures_beside(path), cached=True)
     camera = require_camera(workspace).camera
@@ -165,25 +166,26 @@ def fit_workspace_plate(workspace: Workspace, *, force: bool = False) -> PlateOu
     fit = fit_plate(
         photos, camera, plate_target=plate_target(recipe), rig=rig, inputs_hash=expected
     )
-    save_plate(fit, path)
+    save(fit, path)
     return PlateOutcome(fit, path, _draw(newest, fit, camera, recipe, path), cached=False)
 
 
 def plate_path(workspace: Workspace) -> Path:
     """The file of a workspace's plate."""
-    return workspace.root / "fits" / "plate.json"
+    return workspace.root / "fits" / "plate.nc"
 
 
 def require_plate(workspace: Workspace) -> "PlateFit":
     """Load a workspace's plate. Raises MissingError where there is none yet."""
-    from scissorcal.calibration.plate.store import load_plate
+    from scissorcal.calibration import load
+    from scissorcal.calibration.plate.result import PlateFit
 
     if not plate_path(workspace).is_file():
         raise MissingError(
             "There is no pose of the plate yet: run 'scissorcal capture plate --image plate-*.jpg' "
             "and 'scissorcal fit plate'."
         )
-    return load_plate(plate_path(workspace))
+    return load(plate_path(workspace), PlateFit)
 
 
 def plate_inputs_hash(workspace: Workspace, recipe: "Recipe") -> str:

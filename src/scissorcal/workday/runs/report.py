@@ -185,10 +185,11 @@ def _trust_checks(
     workspace: Workspace, fits: "Mapping[FitKind, FitResult]"
 ) -> "dict[str, VerifyResult]":
     """The trust checks there that are of these very fits."""
-    from scissorcal.calibration.verify.store import load_verify
+    from scissorcal.calibration import load
+    from scissorcal.calibration.verify import VerifyResult
 
     found = {
-        what: load_verify(workspace.verify_path(what))
+        what: load(workspace.verify_path(what), VerifyResult)
         for what in fits
         if workspace.verify_path(what).is_file()
     }

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from scissorcal.calibration.plate.store import PoseRecord, pose_record
 from scissorcal.errors import InputError
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.track import STATES, State, Tracked, track
@@ -25,6 +24,16 @@ if TYPE_CHECKING:
     from scissorcal.vision.live import Frame
 
 Progress = Callable[[float, str], None]
+
+
+class PoseRecord(BaseModel):
+    """A pose T_a_b; ``covariance`` over a rotation vector in a's axes (rad), then metres."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    quaternion: tuple[float, float, float, float] = Field(description="w, x, y, z; w >= 0")
+    translation_m: tuple[float, float, float]
+    covariance: tuple[tuple[float, ...], ...] | None = None
 
 
 class TrackHead(BaseModel):
@@ -205,9 +214,14 @@ def _row(seen: Tracked, camera: "Camera", back: "Pose", rig: "RigPose | None") -
         corners=seen.corners,
         rms_px=found.rms_px,
         odds=min(found.odds, 1e12) if found.other else None,
-        pose=pose_record(pose),
-        other=pose_record(other) if other else None,
+        pose=_record(pose),
+        other=_record(other) if other else None,
     )
+
+
+def _record(pose: "Pose") -> PoseRecord:
+    rows = None if pose.covariance is None else tuple(map(tuple, pose.covariance.tolist()))
+    return PoseRecord(quaternion=pose.quaternion, translation_m=pose.translation_m, covariance=rows)
 
 
 def _append(file: TextIO, line: BaseModel) -> None:

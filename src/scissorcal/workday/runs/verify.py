@@ -80,7 +80,8 @@ def verify_workspace(
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    from scissorcal.calibration.verify import assess, make_study, save_verify, tasks_of
+    from scissorcal.calibration import save
+    from scissorcal.calibration.verify import assess, make_study, tasks_of
 
     chosen = settings or VerifySettings()
     recipe = workspace.recipe()
@@ -109,7 +110,7 @@ def verify_workspace(
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
                 result = assess(study, fits[kind], chosen.checks, records)
                 path = workspace.verify_path(kind)
-                save_verify(result, path)
+                save(result, path)
             notes = (file.note,) if file.note else ()
             outcomes.append(VerifyOutcome(kind, result, path, fitted, notes))
     return tuple(outcomes)
