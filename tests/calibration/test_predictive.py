@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, fit_friction, load_fit, save
+from scissorcal.calibration.predictive import REPLICATES
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from tests.calibration.truth import RATE_HZ, Truth, friction_recording, make_recording, sweep
@@ -84,7 +85,7 @@ def test_replicates_have_the_spread_and_autocorrelation_of_the_residuals(
     assert fitted.predictive is not None
     observed = fitted.series.measured - fitted.series.predicted
     noise = fitted.predictive.torque - fitted.series.predicted
-    assert noise.shape[0] == 100
+    assert noise.shape[0] == REPLICATES
     assert noise.std(axis=1).mean() == pytest.approx(observed.std(), rel=0.1)
     neighbours = [float(np.corrcoef(e[1:], e[:-1])[0, 1]) for e in (observed, *noise)]
     assert np.mean(neighbours[1:]) == pytest.approx(neighbours[0], abs=0.1)
@@ -122,5 +123,5 @@ def test_draft_effort_has_replicates_and_no_log_likelihood(tmp_path: Path) -> No
     save(fit_friction((recording,), wanted, effort="draft", rng=rng), tmp_path / "friction.nc")
     found = load_fit(tmp_path / "friction.nc").predictive
     assert found is not None
-    assert found.torque.shape[0] == 100
+    assert found.torque.shape[0] == REPLICATES
     assert found.log_likelihood is None

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 RESAMPLED = 3 * DRAWS // 4
 """Equally weighted draws, few enough that hardly one is repeated: repeated ones raise k-hats."""
 
+REPLICATES = 50
 MANTISSA_BITS = 10
 """Bits of a replicated value's mantissa, which compresses it to a third: within 0.05 %."""
 
@@ -30,8 +31,8 @@ def predictive_of(
     """Replicate the data of a fit, and collect log-likelihoods by stroke of its candidates.
 
     ``climbed`` are the candidates that were compared, ``chosen`` is among them. ``predictions``
-    (draws, k) are means by draws of the posterior at the points that ``thin`` selects; to each a
-    draw of the noise is added. Draft effort has no log-likelihoods.
+    (draws, k) are means by draws of the posterior at the points that ``thin`` selects; to some of
+    them a draw of the noise is added. Draft effort has no log-likelihoods.
     """
     own = next(candidate for candidate in climbed if candidate.rung is chosen.rung)
     share = best_of(list(climbed)).share
@@ -41,8 +42,9 @@ def predictive_of(
         densities[:, :, index] = share * _resampled(one.left_out)
     reference = densities.max(axis=(0, 2)) if sampled else np.zeros(densities.shape[1])
     densities -= reference[:, None]
+    means = predictions[:: max(1, len(predictions) // REPLICATES)]
     return Predictive(
-        torque=_rounded(predictions + _noise(own, len(predictions), rng)[:, thin]),
+        torque=_rounded(means + _noise(own, len(means), rng)[:, thin]),
         stroke=np.unique(own.strokes),
         log_likelihood=densities[:, :, sampled.index(own)] if own in sampled else None,
         log_likelihood_reference=reference,

@@ -10,8 +10,9 @@ bytes. A result without arrays may be kept as plain JSON, in a file that ends in
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
 from io import BytesIO
 from operator import attrgetter
@@ -69,7 +70,14 @@ class Header:
 
 def save(result: Result, path: Path) -> None:
     """Write a result to ``path``, complete or not at all."""
-    content = _text(result) if path.suffix == ".json" else _netcdf(result)
+    writer = _Writer()
+    tree = writer.tree(result, "", None)
+    if path.suffix == ".json":
+        text = json.dumps(tree, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+        content = text.encode() + b"\n"
+    else:
+        data = _netcdf(result, tree, writer.variables)
+        content = data + _seal(data)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     with part.open("wb") as file:
@@ -84,10 +92,13 @@ def load(path: Path, kind: type[R]) -> R:
 
     Raises InputError where the file is missing, damaged, of another kind or another version.
     """
-    if path.suffix == ".json":
-        return _checked(path, kind, lambda: _of_text(path.read_bytes(), kind))
-    content = _checked(path, kind, lambda: _unsealed(path, kind))
-    return _checked(path, kind, lambda: _of_netcdf(content, kind))
+    with _reported(path, kind):
+        if path.suffix == ".json":
+            return cast(R, _built(kind, json.loads(path.read_bytes()), None))
+        with _opened(path, kind) as file:
+            if file.attrs["kind"] != kind.__name__:
+                raise ValueError(f"it holds a {file.attrs['kind']}")
+            return cast(R, _built(kind, json.loads(file.attrs["scissorcal"]), file))
 
 
 def load_fit(path: Path) -> FitResult:
@@ -97,24 +108,15 @@ def load_fit(path: Path) -> FitResult:
 
 def read_header(path: Path) -> Header:
     """Read what a stored result is of; raises InputError as :func:`load` does."""
-
-    def read() -> Header:
-        import h5py
-
-        with h5py.File(BytesIO(_unsealed(path, Result)), "r") as file:
-            found: Header = _built(Header, json.loads(file.attrs["header"]), None)
-            return found
-
-    return _checked(path, Result, read)
+    with _reported(path, Result), _opened(path, Result) as file:
+        return cast(Header, _built(Header, json.loads(file.attrs["header"]), None))
 
 
-T = TypeVar("T")
-
-
-def _checked(path: Path, kind: type[Result], read: Callable[[], T]) -> T:
-    """What ``read`` gives; what goes wrong in it is an InputError with the remedy."""
+@contextmanager
+def _reported(path: Path, kind: type[Result]) -> Iterator[None]:
+    """Turn what goes wrong within into an InputError that names the file and the remedy."""
     try:
-        return read()
+        yield
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
@@ -123,55 +125,45 @@ def _checked(path: Path, kind: type[Result], read: Callable[[], T]) -> T:
         ) from error
 
 
-def _unsealed(path: Path, kind: type[Result]) -> bytes:
-    """The netCDF data of a file, whose hash is checked."""
+@contextmanager
+def _opened(path: Path, kind: type[Result]) -> "Iterator[h5py.File]":
+    """The netCDF data of a file whose hash and version are right."""
+    import h5py
+
     content = path.read_bytes()
     data, seal = content[:-_SEAL_SIZE], content[-_SEAL_SIZE:]
-    if seal == _seal(data):
-        return data
-    for version in EARLIER:
-        if version.encode() in content:
-            raise InputError(
-                f"{path} was written by an earlier version of scissorcal ({version}), which this "
-                f"version does not read: remove it and run '{kind.command}' again."
-            )
-    raise ValueError("its SHA-256 does not match its content")
+    if seal != _seal(data):
+        for version in EARLIER:
+            if version.encode() in content:
+                raise InputError(
+                    f"{path} was written by an earlier version of scissorcal ({version}), which "
+                    f"this version does not read: remove it and run '{kind.command}' again."
+                )
+        raise ValueError("its SHA-256 does not match its content")
+    with h5py.File(BytesIO(data), "r") as file:
+        if file.attrs["format"] != FORMAT:
+            raise ValueError(f"its format is {file.attrs['format']}, and this reads {FORMAT}")
+        yield file
 
 
 def _seal(data: bytes) -> bytes:
     return _SEAL + hashlib.sha256(data).hexdigest().encode() + b"\n"
 
 
-def _text(result: Result) -> bytes:
-    """A result without arrays as JSON."""
-    tree = _Writer().tree(result, "", None)
-    text = json.dumps(tree, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    return text.encode() + b"\n"
-
-
-def _of_text(content: bytes, kind: type[R]) -> R:
-    found: R = _built(kind, json.loads(content), None)
-    return found
-
-
-def _netcdf(result: Result) -> bytes:
+def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> bytes:
     import h5netcdf
 
-    writer = _Writer()
-    tree = writer.tree(result, "", None)
-    effort = str(getattr(result, "effort", ""))
-    failed = tuple(verdict.check for verdict in result.rejected)
     header = Header(
-        result.what,
-        effort,
-        result.model,
-        result.inputs_hash,
-        failed,
-        str(getattr(result, "origin", "fitted")),
+        what=result.what,
+        effort=str(getattr(result, "effort", "")),
+        model=result.model,
+        inputs_hash=result.inputs_hash,
+        failed=tuple(verdict.check for verdict in result.rejected),
+        origin=str(getattr(result, "origin", "fitted")),
     )
     stream = BytesIO()
     with h5netcdf.File(stream, "w") as file:
-        for at, variable in writer.variables.items():
+        for at, variable in variables.items():
             _write(file, at, variable)
         file.attrs.update(
             format=FORMAT,
@@ -180,20 +172,7 @@ def _netcdf(result: Result) -> bytes:
             scissorcal=json.dumps(tree),
             inference_library="scissorcal",
         )
-    data = stream.getvalue()
-    return data + _seal(data)
-
-
-def _of_netcdf(content: bytes, kind: type[R]) -> R:
-    import h5py
-
-    with h5py.File(BytesIO(content), "r") as file:
-        if file.attrs["format"] != FORMAT:
-            raise ValueError(f"its format is {file.attrs['format']}, and this reads {FORMAT}")
-        if file.attrs["kind"] != kind.__name__:
-            raise ValueError(f"it holds a {file.attrs['kind']}")
-        found: R = _built(kind, json.loads(file.attrs["scissorcal"]), file)
-        return found
+    return stream.getvalue()
 
 
 @dataclass(frozen=True)
@@ -334,10 +313,11 @@ def _one_of(
     if value is None and NoneType in kinds:
         return None
     for kind in kinds:
-        try:
-            return _built(kind, value, file, stored)
-        except (ValueError, TypeError, KeyError) as error:
-            reason = error
+        if kind is not NoneType:
+            try:
+                return _built(kind, value, file, stored)
+            except (ValueError, TypeError, KeyError) as error:
+                reason = error
     raise reason
 
 
@@ -345,14 +325,8 @@ def _object_of(
     kind: Any, value: dict[str, Any], file: "h5py.File | None", stored: Stored | None
 ) -> Any:
     known = _fields(kind)
-    missing = {
-        one.name
-        for one in fields(kind)
-        if one.init and one.default is MISSING and one.default_factory is MISSING
-    } - value.keys()
-    if missing:
-        raise ValueError(f"{kind.__name__} lacks {', '.join(sorted(missing))}")
-    if unknown := value.keys() - known.keys() - {one.name for one in fields(kind)}:
+    every = {one.name for one in fields(kind)}
+    if unknown := value.keys() - every:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")
     given = {
         name: _built(hint, value[name], file, own or stored)
