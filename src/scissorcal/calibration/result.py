@@ -70,11 +70,11 @@ class Result:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """One parameter with its marginal posterior, in the unit that stands beside it.
+    """One parameter with its marginal posterior, in ``unit``.
 
-    ``believed`` marks what another measurement told before, as photographs tell the edge.
+    ``believed`` marks a prior from another measurement, such as photographs of the edge.
     ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
-    speak, near 1 the prior does.
+    determine the parameter, near 1 the prior does.
     """
 
     name: str
@@ -104,9 +104,9 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class StrokeError:
-    """Error on one stroke by a fit that had not seen it.
+    """Hold-out error: one stroke as predicted by a fit without it.
 
-    ``rms`` and ``relative_rms`` (``rms`` over the rms of what all strokes measured) are taken on
+    ``rms`` and ``relative_rms`` (``rms`` over that of the measured effort of all strokes) are of
     the band-limited samples that the likelihood uses.
     """
 
@@ -124,12 +124,12 @@ _PREDICTED = Stored(("point",), "/posterior_predictive")
 
 @dataclass(frozen=True)
 class FitSeries:
-    """Band-limited data against the fitted model, for plots: all arrays have shape (n,).
+    """Band-limited data and the fitted model, for plots: all arrays have shape (n,).
 
-    ``time_s`` restarts at every recording; ``recording`` and ``stroke`` index what a point came
-    from. ``measured``, ``predicted``, ``band_low`` and ``band_high`` (5 % and 95 % of the
-    posterior of the mean) are torque in N m (force in N for a linear joint), signed as the
-    quantity that was fitted.
+    ``time_s`` restarts at every recording; ``recording`` and ``stroke`` are the indices of a
+    point's recording and stroke. ``measured``, ``predicted``, ``band_low`` and ``band_high`` (5 %
+    and 95 % of the posterior of the mean) are torque in N m (force in N for a linear joint), with
+    the sign of the quantity that was fitted.
     """
 
     time_s: Annotated[Array, _CONSTANT]
@@ -146,13 +146,13 @@ class FitSeries:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A term that the critic found in what a law leaves unexplained. It proposes; people decide.
+    """A term that the critic found in the residuals, as a proposal for the model.
 
-    The law would gain ``coefficient`` (``unit``, standard deviation ``coefficient_sd``) times the
-    term ``name``, whose ``formula`` is in words. ``inclusion`` is the share of resamples of whole
-    strokes in which the search found it; ``held_out_gain`` the share by which it lowers the rms
-    error on unseen strokes, ``held_out_nats`` what that is in log density, independent bins only.
-    ``adopted_by`` is the recipe's line that takes it into the law; empty where there is none.
+    The term ``name`` (``formula`` in words) has a ``coefficient`` in ``unit`` with the standard
+    deviation ``coefficient_sd``. ``inclusion`` is the share of resamples of whole strokes in which
+    the search found it, ``held_out_gain`` the share by which it lowers the rms hold-out error,
+    ``held_out_nats`` its gain in log density, independent points only. ``adopted_by`` is the line
+    of the recipe that adds it to the model; empty where there is none.
     """
 
     name: str
@@ -169,14 +169,14 @@ class Proposal:
 
 @dataclass(frozen=True)
 class ReplayRow:
-    """One stroke that neither side had seen: what a replay and what the model make of it.
+    """One stroke that neither the replay nor the fit has used, as predicted by both.
 
-    ``novelty`` says in what the stroke differs from the replayed one: "speed", "contact" (where
-    along the blades the material is met), "place" (where in the material), joined by " + ", or
-    "none". Errors are rms in the unit of the measured effort, over the share ``covered`` of the
-    stroke that lies within the replay's range of opening. ``model_rms`` is of a fit that had not
-    seen the stroke; ``one_stroke_rms`` of the same law fitted to the replayed stroke alone, NaN
-    where that was not done.
+    ``novelty`` names the differences from the replayed stroke: "speed", "contact" (position of the
+    material along the blades), "place" (position in the material), joined by " + ", or "none".
+    Errors are rms in the unit of the measured effort, over the share ``covered`` of the stroke
+    within the replay's range of opening. ``model_rms`` is of a fit without the stroke,
+    ``one_stroke_rms`` of the same model fitted to the replayed stroke alone, NaN where that was
+    not done.
     """
 
     stroke: int
@@ -192,9 +192,9 @@ class ReplayRow:
 
 @dataclass(frozen=True)
 class ReplayComparison:
-    """The model against record-and-replay of the stroke ``stroke`` of ``recording``.
+    """The model compared with record-and-replay of the stroke ``stroke`` of ``recording``.
 
-    ``opening`` and ``torque`` (k,) are the replay's table; ``sentence`` sums it up.
+    ``opening`` and ``torque`` (k,) are the replay's table; ``sentence`` is the summary.
     """
 
     stroke: int
