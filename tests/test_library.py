@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scissorcal
-from scissorcal.calibration.store import save_fit
+from scissorcal.calibration.store import save
 from scissorcal.errors import InputError, MissingError
 from scissorcal.package import build_package
 from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke, write_recording
@@ -94,7 +94,7 @@ def test_without_pandas_a_sentence_says_what_to_do(monkeypatch: pytest.MonkeyPat
 
 def test_a_fit_is_described_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "cut.nc"
-    save_fit(cut_fit(recipe()), path)
+    save(cut_fit(recipe()), path)
     fit = scissorcal.open_fit(path)
     text = repr(fit)
     assert text.startswith("<cut fit: ")

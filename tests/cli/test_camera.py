@@ -86,7 +86,7 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     sd = np.sqrt(camera["covariance"][0][0])
     assert abs(camera["fx"] - 620.0) < 4.0 * sd < 20.0
     assert said.code == (3 if any(v["status"] == "fail" for v in said.envelope["verdicts"]) else 0)
-    assert [Path(file).suffix for file in said.envelope["files"]] == [".json"] + [".png"] * 5
+    assert [Path(file).suffix for file in said.envelope["files"]] == [".nc"] + [".png"] * 5
     assert all(Path(file).is_file() for file in said.envelope["files"])
 
     again = cli("fit", "camera")
@@ -94,11 +94,11 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     assert again.code == said.code
 
     for name, style in (("a.yml", "opencv"), ("a.yaml", "ros")):
-        assert cli("export", "fits/camera.json", name, "--style", style).code == 0
-        assert cli("export", "fits/camera.json", name, "--style", style).code == 2
-    before = (workspace / "fits" / "camera.json").read_bytes()
+        assert cli("export", "fits/camera.nc", name, "--style", style).code == 0
+        assert cli("export", "fits/camera.nc", name, "--style", style).code == 2
+    before = (workspace / "fits" / "camera.nc").read_bytes()
     assert cli("import", "a.yaml").code == 2
-    assert (workspace / "fits" / "camera.json").read_bytes() == before
+    assert (workspace / "fits" / "camera.nc").read_bytes() == before
 
     # A photograph more, and the fit is done anew; the same one again is left out.
     assert cli("capture", "camera", "-i", album / "flat-0.jpg").code == 0

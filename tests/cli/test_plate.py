@@ -166,7 +166,7 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
     said = cli("fit", "plate", "--json")
     assert said.code == 3
     assert "the rig stood in one place" in said.envelope["result"]["error"]
-    assert not (workspace / "fits" / "plate.json").exists()
+    assert not (workspace / "fits" / "plate.nc").exists()
 
 
 def test_what_must_come_first_is_said(cli: Cli, workspace: Path, album: Path) -> None:

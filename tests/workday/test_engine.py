@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal.calibration import store
+from scissorcal.calibration.store import load_fit, save
 from scissorcal.device.capture import capture_friction, open_writer
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.errors import InputError, MissingError, VerdictError
@@ -19,7 +21,6 @@ from scissorcal.workday.history import restore, versions
 from scissorcal.workday.index import FileIndex
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording, include_recording, used_recordings
-from scissorcal.workday.runs import friction as friction_run
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.steps import BY_NAME, STEPS
@@ -50,9 +51,9 @@ def state(workspace: Workspace, name: str) -> str:
 def fail(workspace: Workspace, check: str) -> None:
     """Give the friction fit a failed check, keeping the identity of its inputs."""
     path = workspace.fit_path("friction")
-    fit = friction_run.load(path)
+    fit = load_fit(path)
     wrong = Verdict("fit.friction", check, "fail", 1.0, 0.5, "Made to fail.")
-    friction_run.save(replace(fit, verdicts=(wrong,)), path)
+    save(replace(fit, verdicts=(wrong,)), path)
 
 
 def test_inputs_are_rows_above_and_no_step_builds_on_itself() -> None:
@@ -107,7 +108,7 @@ def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(
         path.write_bytes(b"half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(friction_run, "save", full)
+    monkeypatch.setattr(store, "save", full)
     with pytest.raises(OSError, match="No space"):
         fit_workspace(copied, ("friction",), seed=7, force=True)
     assert copied.fit_path("friction").read_bytes() == before
@@ -165,8 +166,8 @@ def test_a_package_of_a_failed_fit_is_refused_unless_allowed(copied: Workspace) 
 
 def test_a_fit_that_ran_out_of_time_is_incomplete(copied: Workspace) -> None:
     path = copied.fit_path("friction")
-    fit = friction_run.load(path)
-    friction_run.save(replace(fit, inputs_hash=f"unfinished:{fit.inputs_hash}"), path)
+    fit = load_fit(path)
+    save(replace(fit, inputs_hash=f"unfinished:{fit.inputs_hash}"), path)
     found = Engine.of(copied).state("fit friction")
     assert found.state == "incomplete"
     assert found.command == "scissorcal fit friction --max-minutes 60"

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from scissorcal.calibration.plate.result import PlateFit
+from scissorcal.calibration.store import load, save
 from scissorcal.errors import MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
 from scissorcal.workday.plan import make_plan
-from scissorcal.workday.runs import blade, camera, plate
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.sign import sign_report, standing_review
 from scissorcal.workday.workspace import Workspace
@@ -37,12 +38,9 @@ def workspace(tmp_path: Path) -> Workspace:
     photographs(made, "blade")
     photographs(made, "plate")
     (made.root / "fits").mkdir()
-    camera.save(imported_camera(), Engine.of(made).file("fit camera"))
+    save(imported_camera(), Engine.of(made).file("fit camera"))
     engine = Engine.of(made)
-    for name, save, result in (
-        ("fit blade", blade.save, blade_result()),
-        ("fit plate", plate.save, plate_fit()),
-    ):
+    for name, result in (("fit blade", blade_result()), ("fit plate", plate_fit())):
         current = replace(result, inputs_hash=engine.identity(name, "draft"))  # type: ignore[type-var]
         save(current, engine.file(name))  # type: ignore[arg-type]
     return made
@@ -69,7 +67,7 @@ def test_another_result_makes_report_and_signature_stale(workspace: Workspace) -
     write_workspace_report(engine)
     sign_report(engine, "A. Lovelace", "accept")
     path = engine.file("fit plate")
-    plate.save(replace(plate.load(path), rms_px=0.4), path)
+    save(replace(load(path, PlateFit), rms_px=0.4), path)
     engine = Engine.of(workspace)
     assert engine.state("report").state == "stale"
     assert "other fits" in engine.state("report").found

@@ -6,7 +6,7 @@ from scissorcal.calibration.friction.fit import fit_friction, friction_experimen
 from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.calibration.store import load_fit, save_fit
+from scissorcal.calibration.store import load, load_fit, read_header, save
 
 __all__ = [
     "CutExperiment",
@@ -23,6 +23,8 @@ __all__ = [
     "fit_inputs_hash",
     "friction_experiment",
     "friction_law",
+    "load",
     "load_fit",
-    "save_fit",
+    "read_header",
+    "save",
 ]

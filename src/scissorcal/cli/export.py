@@ -23,7 +23,7 @@ def export(
 ) -> Answer:
     """Write RECORDING as TABLE: Parquet or CSV, by its suffix. Units stand in the headings.
 
-    Where RECORDING is the camera of a workspace (fits/camera.json), write it as a camera file for
+    Where RECORDING is the camera of a workspace (fits/camera.nc), write it as a camera file for
     OpenCV (.yml, .xml) or ROS (.yaml).
 
     \b
@@ -31,10 +31,10 @@ def export(
       $ scissorcal export captures/friction-20261121T131415Z.mcap friction.parquet
       friction.parquet: 24841 rows
       ...
-      $ scissorcal export fits/camera.json camera.yaml --style ros
+      $ scissorcal export fits/camera.nc camera.yaml --style ros
       camera.yaml: camera of 640 x 480 for ROS
     """
-    if recording.suffix == ".json":
+    if recording.suffix == ".nc":
         return _export_camera(recording, table, style, overwrite)
     from scissorcal.recording import export_table, read_recording
 
@@ -50,11 +50,12 @@ def export(
 def _export_camera(
     fit: Path, file: Path, style: Literal["opencv", "ros"], overwrite: bool
 ) -> Answer:
-    from scissorcal.calibration.camera.store import load_camera
+    from scissorcal.calibration import load
+    from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.errors import InputError
     from scissorcal.vision.camera_files import write_camera_file
 
-    camera = load_camera(fit).camera
+    camera = load(fit, CameraFit).camera
     if file.exists() and not overwrite:
         raise InputError(f"{file} already exists: name another file, or give --overwrite.")
     write_camera_file(camera, file, style)

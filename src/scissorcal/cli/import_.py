@@ -72,7 +72,7 @@ def import_(
       captures/friction-20261121T131415Z.mcap: 24841 samples, 24.8 s, 8 strokes, linear joint
       ...
       $ scissorcal import left_intrinsics.yml
-      fits/camera.json: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
+      fits/camera.nc: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
       ...
     """
     import math

@@ -6,13 +6,11 @@ One function a kind of file; each gives plain values, which the index keeps. Eve
 """
 
 import json
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from scissorcal.errors import InputError
 from scissorcal.identity import file_digest
-from scissorcal.verdicts import Verdict
 
 Facts = dict[str, Any]
 
@@ -20,58 +18,40 @@ UNFINISHED = "unfinished:"
 """Prefix of the inputs of a fit that ran out of time."""
 
 
-def rig_fit(path: Path) -> Facts:
-    """Facts of a fit of friction or of a cut."""
-    from scissorcal.calibration.store import load_fit
+def fit(path: Path) -> Facts:
+    """Facts of a fit; ``imported`` where a file gave it."""
+    from scissorcal.calibration.store import read_header
 
-    fit = load_fit(path)
-    label = f"{fit.rung} ({fit.effort})"
-    facts = _facts(fit.inputs_hash, label, fit.verdicts)
+    header = read_header(path)
     return {
-        **facts,
-        "what": fit.what,
-        "model": fit.rung,
-        "effort": fit.effort,
-        "little_used": list(fit.diagnostics.get("little_used", ())),
+        "inputs": header.inputs_hash,
+        "label": f"{header.model} ({header.effort})" if header.effort else header.model,
+        "failed": list(header.failed),
+        "what": header.what,
+        "model": header.model,
+        "effort": header.effort,
+        "imported": header.origin == "imported",
     }
 
 
-def camera_fit(path: Path) -> Facts:
-    """Facts of a camera; ``imported`` where a file gave it."""
-    from scissorcal.calibration.camera.store import load_camera
+def law_fit(path: Path) -> Facts:
+    """Facts of a fit of friction or of a cut, with the speeds of which little data were used."""
+    from scissorcal.calibration.store import load_fit
 
-    fit = load_camera(path)
-    facts = _facts(fit.inputs_hash, fit.rung, fit.verdicts)
-    return {**facts, "imported": fit.origin == "imported"}
-
-
-def blade_fit(path: Path) -> Facts:
-    """Facts of a blade's edge."""
-    from scissorcal.calibration.edge.store import load_blade
-
-    fit = load_blade(path)
-    families = ", ".join(sorted({blade.family for blade in fit.blades}))
-    return _facts(fit.inputs_hash, families, fit.verdicts)
-
-
-def plate_fit(path: Path) -> Facts:
-    """Facts of a plate's pose."""
-    from scissorcal.calibration.plate.store import load_plate
-
-    fit = load_plate(path)
-    return _facts(
-        fit.inputs_hash, f"{len(fit.views)} photographs of the {fit.target}", fit.verdicts
-    )
+    little = load_fit(path).diagnostics.get("little_used", ())
+    return {**fit(path), "little_used": list(little)}
 
 
 def trust_check(path: Path) -> Facts:
     """Facts of a trust check; its inputs are the fit that it checked."""
-    from scissorcal.calibration.verify.store import load_verify
+    from scissorcal.calibration.store import load
+    from scissorcal.calibration.verify.result import VerifyResult
 
-    check = load_verify(path)
+    check = load(path, VerifyResult)
     done = {"ranks": check.calibration, "halves": check.halves, "prior": check.sensitivity}
     label = ", ".join(name for name, part in done.items() if part is not None)
-    return _facts(check.fit_content, label or "nothing checked", check.verdicts)
+    failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
+    return {"inputs": check.fit_content, "label": label or "nothing checked", "failed": failed}
 
 
 def report(path: Path) -> Facts:
@@ -141,8 +121,3 @@ def photographs(path: Path) -> Facts:
             "photographs again."
         ) from None
     return {"content": file_digest(path), "photographs": count}
-
-
-def _facts(inputs: str, label: str, verdicts: Iterable[Verdict]) -> Facts:
-    failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
-    return {"inputs": inputs, "label": label, "failed": failed}

@@ -2,16 +2,18 @@
 
 import re
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.steps import BY_NAME, steps_of
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.result import Result
 
 HASH = 8
 """Digits of the content's digest in a version's name."""
@@ -96,16 +98,17 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     return version, before
 
 
-def save_version(engine: Engine, name: str, save: Callable[[Path], object]) -> Path:
-    """Keep the result that is there, then write the new one by ``save``. Gives its path.
+def save_version(engine: Engine, name: str, result: "Result") -> Path:
+    """Keep the result that is there, then write the new one. Gives its path.
 
     Where writing fails the earlier result is put back.
     """
+    from scissorcal.calibration.store import save
+
     path = engine.file(name)
     kept = keep(engine, name)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save(path)
+        save(result, path)
     except BaseException:
         if kept is not None:
             for part in kept.iterdir():

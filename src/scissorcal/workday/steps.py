@@ -34,7 +34,8 @@ class Step:
     it has a result and is not waited for. ``settings`` are the parts of the recipe that the result
     depends on; ``version`` is raised whenever the same inputs would give another result.
     ``by_effort`` says that the result depends on the effort. ``file`` is where the result lies,
-    ``read`` gives its facts, ``run`` names the module of a fit (`workday.runs.fit.FitModule`).
+    ``read`` gives its facts, ``holds`` names the type in it ("module:type"), ``run`` the module of
+    a fit (`workday.runs.fit.FitModule`).
     ``verified_by`` names the step that checks it. ``optional`` steps are never what comes next.
     ``photographs`` are the folders that a capture of photographs fills, the first one required;
     with ``newest_only`` earlier folders do not count.
@@ -50,6 +51,7 @@ class Step:
     by_effort: bool = False
     file: Callable[[Workspace, Recipe], Path] | None = None
     read: Read | None = None
+    holds: str = ""
     run: str = ""
     verified_by: str = ""
     optional: bool = False
@@ -162,8 +164,9 @@ STEPS: tuple[Step, ...] = (
         _geometry("camera"),
         inputs=("capture camera",),
         version=2,
-        file=_in_fits("camera.json"),
-        read=facts.camera_fit,
+        file=_in_fits("camera.nc"),
+        read=facts.fit,
+        holds="scissorcal.calibration.camera.result:CameraFit",
         run="scissorcal.workday.runs.camera",
     ),
     Step(
@@ -175,8 +178,9 @@ STEPS: tuple[Step, ...] = (
         settings=_blade_settings,
         version=2,
         by_effort=True,
-        file=_in_fits("blade.json"),
-        read=facts.blade_fit,
+        file=_in_fits("blade.nc"),
+        read=facts.fit,
+        holds="scissorcal.calibration.edge.result:BladeResult",
         run="scissorcal.workday.runs.blade",
     ),
     Step(
@@ -187,8 +191,9 @@ STEPS: tuple[Step, ...] = (
         inputs=("capture plate", "fit camera"),
         settings=_plate_settings,
         version=2,
-        file=_in_fits("plate.json"),
-        read=facts.plate_fit,
+        file=_in_fits("plate.nc"),
+        read=facts.fit,
+        holds="scissorcal.calibration.plate.result:PlateFit",
         run="scissorcal.workday.runs.plate",
     ),
     Step(
@@ -201,7 +206,8 @@ STEPS: tuple[Step, ...] = (
         version=8,
         by_effort=True,
         file=_in_fits("friction.nc"),
-        read=facts.rig_fit,
+        read=facts.law_fit,
+        holds="scissorcal.calibration.result:FitResult",
         run="scissorcal.workday.runs.friction",
         verified_by="verify friction",
     ),
@@ -215,7 +221,8 @@ STEPS: tuple[Step, ...] = (
         version=8,
         by_effort=True,
         file=_in_fits("cut.nc"),
-        read=facts.rig_fit,
+        read=facts.law_fit,
+        holds="scissorcal.calibration.result:FitResult",
         run="scissorcal.workday.runs.cut",
         verified_by="verify cut",
     ),
@@ -227,6 +234,7 @@ STEPS: tuple[Step, ...] = (
         inputs=("fit friction",),
         file=_in_fits("friction.verify.json"),
         read=facts.trust_check,
+        holds="scissorcal.calibration.verify.result:VerifyResult",
         optional=True,
     ),
     Step(
@@ -237,6 +245,7 @@ STEPS: tuple[Step, ...] = (
         inputs=("fit cut",),
         file=_in_fits("cut.verify.json"),
         read=facts.trust_check,
+        holds="scissorcal.calibration.verify.result:VerifyResult",
         optional=True,
     ),
     Step(

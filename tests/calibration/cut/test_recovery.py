@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, cut_experiment, cutting_from, fit_cut
-from scissorcal.calibration.store import load_fit, save_fit
+from scissorcal.calibration.store import load_fit, save
 from scissorcal.model import Edge, EdgeBelief
 from tests.calibration.cut.recipes import friction_of, paper, pressing
 from tests.calibration.truth import (
@@ -124,7 +124,7 @@ def test_two_slopes_are_told_from_a_power_law_and_an_exponential(pressed_frictio
     knots = fit.structure["response_knots_m"]
     assert knots[-1] == pytest.approx(1.2e-3, rel=0.1)
     assert knots[0] == pytest.approx(knots[-1] / 8.0, rel=1e-3)
-    save_fit(fit, tmp_path / "cut.nc")
+    save(fit, tmp_path / "cut.nc")
     design = cut_experiment((pressed,), wanted, pressed_friction, load_fit(tmp_path / "cut.nc"))
     assert tuple(design.key["response_knots_m"]) == tuple(knots)
     values = {p.name: fit.draws[:, [i]] for i, p in enumerate(fit.parameters)}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.store import load_fit, save_fit
+from scissorcal.calibration.store import load_fit, save
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, recipe
 
@@ -45,7 +45,7 @@ def test_it_stands_beside_the_law_and_not_in_it(tmp_path):
     assert found.draws is fit.draws
     again = with_toughness(fit, thick(0.005), np.random.default_rng(7))
     assert again.derived == found.derived
-    save_fit(found, tmp_path / "cut.nc")
+    save(found, tmp_path / "cut.nc")
     read = load_fit(tmp_path / "cut.nc")
     assert read.derived == found.derived
     assert np.array_equal(read.derived_draws, found.derived_draws)

@@ -8,7 +8,6 @@ import pytest
 
 from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
 from scissorcal.calibration.plate.result import PlateFit
-from scissorcal.calibration.plate.store import load_plate, save_plate
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.geometry.camera import Camera
@@ -166,26 +165,6 @@ def test_another_target_is_named() -> None:
     )
     with pytest.raises(InputError, match="shows the blade mat, not the plate board"):
         find_board(photo_of(picture), PLATE_BOARD)
-
-
-def test_what_is_stored_comes_back(still: tuple[Pose, list[PlatePhoto]], tmp_path: Path) -> None:
-    fit = fit_plate(still[1], SURE, inputs_hash="abc")
-    path = tmp_path / "fits" / "plate.json"
-    save_plate(fit, path)
-    again = load_plate(path)
-    for pose, stored in ((fit.camera_plate, again.camera_plate), (fit.other, again.other)):
-        assert (pose is None) == (stored is None)
-        if pose and stored:
-            assert pose.quaternion == stored.quaternion
-            assert pose.translation_m == stored.translation_m
-    assert np.array_equal(fit.camera_plate.covariance, again.camera_plate.covariance)  # type: ignore[arg-type]
-    assert again.verdicts == fit.verdicts
-    assert again.halves == fit.halves
-    assert [view.name for view in again.views] == [photo.name for photo in still[1]]
-    assert [file.name for file in path.parent.iterdir()] == ["plate.json"]
-    path.write_text(path.read_text()[:400])
-    with pytest.raises(InputError, match=r"plate\.json is not a plate's pose .* or it is damaged"):
-        load_plate(path)
 
 
 def test_a_slanted_marker_is_measured_within_its_own_border() -> None:

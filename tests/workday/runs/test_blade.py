@@ -2,12 +2,14 @@
 
 import pytest
 
+from scissorcal.calibration.edge.result import BladeResult
+from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.vision.sim.sim_camera import render_blade_photographs
 from scissorcal.workday.demo.sim_photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import BladeSetup, photo_captures
-from scissorcal.workday.runs.blade import capture_blade, load
+from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import create_workspace
 
@@ -48,7 +50,7 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert not outcome.cached
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in outcome.pictures)
     assert len(outcome.pictures) == 2
-    belief = load(Engine.of(workspace).file("fit blade")).belief
+    belief = load(Engine.of(workspace).file("fit blade"), BladeResult).belief
     edge = workspace.recipe().rig.edge
     middle = 0.5e-3 * edge.length_mm
     found = float(belief.edge.offset_at(middle))

@@ -15,7 +15,8 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.verify import VerifyResult, load_verify, save_verify
+from scissorcal.calibration.store import load, save
+from scissorcal.calibration.verify import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.engine import Engine
@@ -80,8 +81,8 @@ def test_a_check_holds_all_three_parts_and_keeps_its_schema(
     }, [verdict.why for verdict in whole.verdicts]
     assert {row.diagnosis for row in whole.sensitivity.rows} == {"fine"}
     path = Engine.of(cleared).file("verify friction")
-    save_verify(whole, path)
-    assert load_verify(path) == whole
+    save(whole, path)
+    assert load(path, VerifyResult) == whole
     schema = json.loads((schemas_dir() / "verify.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), schema)
 
@@ -91,13 +92,13 @@ def test_a_report_is_stale_once_its_check_is_another_or_gone(
 ) -> None:
     """A check of more fits, of the same seed, is another one."""
     path = Engine.of(cleared).file("verify friction")
-    save_verify(whole, path)
+    save(whole, path)
     write_workspace_report(Engine.of(cleared))
     assert Engine.of(cleared).state("report").state == "done"
     assert Engine.of(cleared).state("fit friction").state == "done"
     assert whole.calibration is not None
     longer = replace(whole, calibration=replace(whole.calibration, fits=400))
-    save_verify(longer, path)
+    save(longer, path)
     assert Engine.of(cleared).state("report").state == "stale"
     path.unlink()
     assert Engine.of(cleared).state("report").state == "stale"
@@ -194,7 +195,7 @@ def test_a_damaged_result_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "friction.verify.json"
     path.write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match=r"friction\.verify\.json is not a trust check"):
-        load_verify(path)
+        load(path, VerifyResult)
 
 
 def test_an_unreachable_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,12 +9,21 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from scissorcal.calibration.plate.store import PoseRecord, pose_record
 from scissorcal.errors import InputError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.track import STATES, State, Tracked
+
+
+class PoseRecord(BaseModel):
+    """A pose T_a_b; ``covariance`` over a rotation vector in a's axes (rad), then metres."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    quaternion: tuple[float, float, float, float] = Field(description="w, x, y, z; w >= 0")
+    translation_m: tuple[float, float, float]
+    covariance: tuple[tuple[float, ...], ...] | None = None
 
 
 class TrackHead(BaseModel):
@@ -88,8 +97,8 @@ def track_row(seen: Tracked, camera: Camera, back: Pose, rig: RigPose | None) ->
         corners=seen.corners,
         rms_px=found.rms_px,
         odds=min(found.odds, 1e12) if found.other else None,
-        pose=pose_record(pose),
-        other=pose_record(other) if other else None,
+        pose=_pose_record(pose),
+        other=_pose_record(other) if other else None,
     )
 
 
@@ -145,3 +154,13 @@ def why_no_pose(rows: Sequence[TrackRow]) -> str:
 def _worst(pose: PoseRecord) -> tuple[float, float]:
     sd = np.sqrt(np.diag(np.array(pose.covariance)))
     return float(1e3 * sd[3:].max()), float(np.degrees(sd[:3].max()))
+
+
+def _pose_record(pose: Pose) -> PoseRecord:
+    """A pose as files hold it."""
+    rows = pose.covariance
+    return PoseRecord(
+        quaternion=pose.quaternion,
+        translation_m=pose.translation_m,
+        covariance=None if rows is None else tuple(tuple(row) for row in rows.tolist()),
+    )

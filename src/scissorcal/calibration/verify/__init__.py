@@ -19,7 +19,6 @@ from scissorcal.calibration.verify.simulator import (
     cut_simulator,
     friction_simulator,
 )
-from scissorcal.calibration.verify.store import load_verify, save_verify
 from scissorcal.calibration.verify.study import Study, Task, run
 
 __all__ = [
@@ -40,9 +39,7 @@ __all__ = [
     "assess",
     "cut_simulator",
     "friction_simulator",
-    "load_verify",
     "make_study",
     "run",
-    "save_verify",
     "tasks_of",
 ]

@@ -18,7 +18,7 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.edge.result import BladeFit, BladeResult
+    from scissorcal.calibration.edge.result import BladeFit
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.photo import Photo
@@ -70,20 +70,6 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     sources = tuple(one.photo.source for one in seen)
     result = BladeResult(fits, openings, request.inputs_hash, sources)
     return Made(result, lambda folder: _draw(seen, fits, folder))
-
-
-def load(path: Path) -> "BladeResult":
-    """Read the blade's edge. Raises InputError where it cannot be read."""
-    from scissorcal.calibration.edge.store import load_blade
-
-    return load_blade(path)
-
-
-def save(result: "BladeResult", path: Path) -> None:
-    """Write the blade's edge, complete or not at all."""
-    from scissorcal.calibration.edge.store import save_blade
-
-    save_blade(result, path)
 
 
 def _measured(photo: "Photo", camera: "Camera | None", setup: BladeSetup) -> "BladePhoto":

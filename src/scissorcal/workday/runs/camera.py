@@ -81,20 +81,6 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     return Made(result, lambda folder: _draw(result, photos, captures, folder))
 
 
-def load(path: Path) -> "CameraFit":
-    """Read the camera. Raises InputError where it cannot be read."""
-    from scissorcal.calibration.camera.store import load_camera
-
-    return load_camera(path)
-
-
-def save(result: "CameraFit", path: Path) -> None:
-    """Write the camera, complete or not at all."""
-    from scissorcal.calibration.camera.store import save_camera
-
-    save_camera(result, path)
-
-
 def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFile", Path]:
     """Import a camera file of OpenCV, ROS or Kalibr as the workspace's camera.
 
@@ -111,7 +97,7 @@ def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFil
         )
     read = read_camera_file(file)
     found = imported_camera(read, file)
-    path = save_version(engine, "fit camera", lambda part: save(found, part))
+    path = save_version(engine, "fit camera", found)
     return found, read, path
 
 

@@ -5,15 +5,13 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.recordings import used_recordings
-from scissorcal.workday.runs.friction import finished, load, save
+from scissorcal.workday.runs.friction import finished
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.model import EdgeBelief
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.fit import Made, Request
-
-__all__ = ["edge_of_photographs", "fit", "load", "save"]
 
 STREAM = 1
 

@@ -47,11 +47,9 @@ class Made:
 
 
 class FitModule(Protocol):
-    """What a module of runs/ gives for its fit: the computation, and its file."""
+    """What a module of runs/ gives for its fit: the computation."""
 
     def fit(self, engine: Engine, request: Request) -> Made: ...
-    def load(self, path: Path) -> Any: ...
-    def save(self, result: Any, path: Path) -> object: ...
 
 
 @dataclass(frozen=True)
@@ -140,12 +138,12 @@ def fit_step(
     """Run one fit, or read it back where its identity is the stored one's, unless ``force``."""
     chosen: Effort = effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
-    module, path = _module(step), engine.file(step.name)
+    path = engine.file(step.name)
     stored = _stored(engine, step, force)
     current = stored.get("inputs") == identity or stored.get("imported")
     if stored and current and not force and engine.state(step.name).state != "stale":
         state = engine.state(step.name)
-        return FitOutcome(step.what, module.load(path), path, pictures_beside(path), True, state)
+        return FitOutcome(step.what, _load(step, path), path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
     request = Request(
         effort=chosen,
@@ -156,8 +154,8 @@ def fit_step(
         progress=progress or (lambda done, sentence: None),
         stop=stop or (lambda: False),
     )
-    made = module.fit(engine, request)
-    save_version(engine, step.name, lambda file: module.save(made.result, file))
+    made = cast(FitModule, import_module(step.run)).fit(engine, request)
+    save_version(engine, step.name, made.result)
     if made.draw:
         made.draw(path.with_suffix(""))
     state = engine.state(step.name)
@@ -180,7 +178,7 @@ def load_result(engine: Engine, what: str) -> Any:
             f"{engine.workspace.relative(engine.file(step.name))} is stale ({state.found}): run "
             f"'{step.command}' first."
         )
-    return _module(step).load(engine.file(step.name))
+    return _load(step, engine.file(step.name))
 
 
 def available(engine: Engine, names: Sequence[str] = ()) -> tuple[str, ...]:
@@ -246,5 +244,8 @@ def _refuse_without_data(engine: Engine, capture: Step) -> None:
     )
 
 
-def _module(step: Step) -> FitModule:
-    return cast(FitModule, import_module(step.run))
+def _load(step: Step, path: Path) -> Any:
+    from scissorcal.calibration.store import load
+
+    module, _, name = step.holds.partition(":")
+    return load(path, getattr(import_module(module), name))

@@ -1,7 +1,6 @@
 """The fit of friction: its run in a workspace."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.workday.facts import UNFINISHED
@@ -47,17 +46,3 @@ def finished(result: "FitResult", request: "Request") -> "FitResult":
     )
     marked = f"{UNFINISHED}{request.inputs_hash}"
     return replace(result, inputs_hash=marked, notes=(*result.notes, note))
-
-
-def load(path: Path) -> "FitResult":
-    """Read the fit. Raises InputError where it cannot be read."""
-    from scissorcal.calibration.store import load_fit
-
-    return load_fit(path)
-
-
-def save(result: "FitResult", path: Path) -> None:
-    """Write the fit, complete or not at all."""
-    from scissorcal.calibration.store import save_fit
-
-    save_fit(result, path)

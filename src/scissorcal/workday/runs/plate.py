@@ -91,20 +91,6 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     return Made(result, lambda folder: _draw(newest, result, camera, engine, folder))
 
 
-def load(path: Path) -> "PlateFit":
-    """Read the plate's pose. Raises InputError where it cannot be read."""
-    from scissorcal.calibration.plate.store import load_plate
-
-    return load_plate(path)
-
-
-def save(result: "PlateFit", path: Path) -> None:
-    """Write the plate's pose, complete or not at all."""
-    from scissorcal.calibration.plate.store import save_plate
-
-    save_plate(result, path)
-
-
 def locate_workspace_rig(engine: "Engine", camera: "Camera") -> "RigPose | None":
     """Locate the rig from the newest photographs of its card, None where there are none.
 

@@ -96,10 +96,11 @@ def _recordings(engine: Engine, what: "CaptureKind") -> tuple[Any, ...]:
 
 def _trust_checks(engine: Engine, fits: "dict[str, FitResult]") -> "dict[str, VerifyResult]":
     """The trust checks of these very fits."""
-    from scissorcal.calibration.verify.store import load_verify
+    from scissorcal.calibration.store import load
+    from scissorcal.calibration.verify.result import VerifyResult
 
     current = [w for w in fits if engine.state(f"verify {w}").state in ("done", "failed")]
-    return {what: load_verify(engine.file(f"verify {what}")) for what in current}
+    return {what: load(engine.file(f"verify {what}"), VerifyResult) for what in current}
 
 
 def _geometry(engine: Engine) -> "Geometry":

@@ -80,7 +80,8 @@ def verify_workspace(
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    from scissorcal.calibration.verify import assess, make_study, save_verify, tasks_of
+    from scissorcal.calibration.store import save
+    from scissorcal.calibration.verify import assess, make_study, tasks_of
 
     chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
@@ -110,7 +111,7 @@ def verify_workspace(
                 result = assess(study, fit, chosen.checks, records)
                 result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
-                save_verify(result, path)
+                save(result, path)
                 engine.refresh()
             notes = (file.note,) if file.note else ()
             outcomes.append(VerifyOutcome(kind, result, path, fitted, notes))
