@@ -120,7 +120,7 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     assert said.code == 0
     assert said.envelope["result"]["style"] == "Kalibr"
     assert said.envelope["verdicts"][0]["status"] == "not_evaluated"
-    assert "Brought in from kalibr.yaml" in cli("fit", "camera").out
+    assert "Imported from kalibr.yaml" in cli("fit", "camera").out
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_photographs_of_other_sizes_turns_and_boards_are_left_out(
     said = cli("capture", "camera", "-i", first, small, turned, copy)
     assert said.code == 0
     assert "480 x 360" in said.err
-    assert "turned by its EXIF data" in said.err
+    assert "has the EXIF orientation 3" in said.err
     assert "given twice" in said.err
     said = cli("capture", "camera", "--board", "chessboard:9x6:25", "-i", boards(album)[2])
     assert said.code == 2

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
-from scissorcal.vision.targets.detect import Detection
+from scissorcal.vision.targets.detect import SMALL_PX, Detection
 
 Array = NDArray[np.float64]
 
@@ -83,9 +84,17 @@ def slant_of(detection: Detection, width: int, height: int) -> tuple[float, floa
     return float(np.arctan2(facing[0], -facing[2])), float(np.arctan2(-facing[1], -facing[2]))
 
 
-def view_words(detection: Detection, width: int, height: int) -> str:
-    """Say where and how a board stands in one photograph."""
-    return f"{_size(detection, width, height)}, {_slant(detection, width, height)}"
+def detection_words(photo: Photo, detection: Detection) -> str:
+    """Say what was found in a photograph: corners, size of a square, where and how the board is."""
+    size = _size(detection, photo.width, photo.height)
+    slant = _slant(detection, photo.width, photo.height)
+    words = (
+        f"{photo.source}: {len(detection.ids)} of {len(detection.board.points)} corners, "
+        f"{detection.square_px:.0f} px a square, {size}, {slant}"
+    )
+    if detection.square_px < SMALL_PX:
+        words += f" (small: {SMALL_PX:.0f} px a square and more are safe; move closer)"
+    return words
 
 
 def _places(pixels: Array, width: int, height: int) -> frozenset[str]:

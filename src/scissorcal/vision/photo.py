@@ -128,6 +128,29 @@ def _photo(path: Path, opened: "Image.Image", digest: str, max_pixels: int, colo
     return Photo(image, width, height, reduction, origin, orientation, digest, path.name)
 
 
+PictureShape = tuple[int, int, int]
+"""Width and height in pixels, and the EXIF orientation that was applied."""
+
+
+def same_shape(photo: Photo, shape: PictureShape | None) -> PictureShape:
+    """The shape of a photograph. Raises InputError where it is not ``shape``.
+
+    A photograph of another size or orientation would be one of another camera to the fit.
+    """
+    own = (photo.width, photo.height, photo.orientation)
+    if shape is None or own == shape:
+        return own
+    if own[:2] != shape[:2]:
+        raise InputError(
+            f"{photo.source} has {own[0]} x {own[1]} pixels, the photographs before it "
+            f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom."
+        )
+    raise InputError(
+        f"{photo.source} has the EXIF orientation {own[2]}, the photographs before it "
+        f"{shape[2]}: hold the camera the same way for all."
+    )
+
+
 def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
     """Decode to grey or blue-green-red, averaging blocks of ``reduction`` by as many pixels."""
     from PIL import Image

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.vision.coverage import PLACES, SIZES, SLANTS, ViewCoverage, view_words
+from scissorcal.vision.coverage import PLACES, SIZES, SLANTS, ViewCoverage, detection_words
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.sim import Lens, Pose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
-from tests.vision.scenes import lens, pose_before
+from tests.vision.scenes import lens, photo_of, pose_before
 
 BEND = (-0.25, 0.07, 0.001, -0.0006, 0.02)
 CAMERA = Camera(900.0, 900.0, 646.0, 351.0, BEND, 1280, 720)
@@ -71,7 +71,8 @@ def test_slants_are_named_by_where_the_board_faces(azimuth: float, slant: str) -
     face = -pose.rotation[:, 2]
     facing = {"facing left": face[0] < 0, "facing right": face[0] > 0, "facing up": face[1] < 0,
               "facing down": face[1] > 0}  # fmt: skip
-    named = view_words(seen(pose), 1280, 720).split(", ")[1]
+    photo = photo_of(np.zeros((720, 1280), dtype=np.uint8))
+    named = detection_words(photo, seen(pose)).split(", ")[3].split(" (")[0]
     assert facing[named]
     assert abs(face[0 if "t" in named.split()[1] else 1]) > 0.4
 

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scissorcal.errors import InputError, MissingError
-from scissorcal.verdicts import Verdict
-from scissorcal.vision.coverage import ViewCoverage, view_words
+from scissorcal.vision.coverage import ViewCoverage, detection_words
 from scissorcal.vision.overlay import detection_overlay, write_picture
-from scissorcal.vision.photo import Photo, read_photo
+from scissorcal.vision.photo import PictureShape, read_photo, same_shape
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
-from scissorcal.vision.targets.detect import SMALL_PX, Detection, find_board
+from scissorcal.vision.targets.detect import find_board
 from scissorcal.workday.photographs import (
     PhotoCapture,
     PhotoWriter,
@@ -87,7 +86,7 @@ def capture_camera(
                 photo = read_photo(path, colour=False)
                 refuse_known(photo, before, writer)
                 detection = find_board(photo, board)
-                shape = _same_shape(photo, shape)
+                shape = same_shape(photo, shape)
             except InputError as error:
                 refused.append(str(error))
                 tell(f"left out: {error}")
@@ -96,7 +95,8 @@ def capture_camera(
             drawn = f"{Path(stored.file).stem}-detected.png"
             write_picture(detection_overlay(photo, detection), writer.part / drawn)
             coverage = coverage.with_view(detection, photo.width, photo.height)
-            taken.append(_taken(photo, detection))
+            corners, words = len(detection.ids), detection_words(photo, detection)
+            taken.append(TakenPhoto(photo.source, corners, detection.square_px, words))
             tell(f"{taken[-1].words}\n  {coverage.sentence()}")
         if not taken:
             raise InputError(
@@ -146,7 +146,7 @@ def import_camera(workspace: Workspace, file: Path) -> tuple["CameraFit", "Camer
     Raises InputError where the file is none, or the workspace has photographs of a board: what is
     fitted from them says how sure it is, and a file does not.
     """
-    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.camera.imported import imported_camera
     from scissorcal.calibration.camera.store import save_camera
     from scissorcal.vision.camera_files import read_camera_file
 
@@ -156,27 +156,7 @@ def import_camera(workspace: Workspace, file: Path) -> tuple["CameraFit", "Camer
             "run 'scissorcal fit camera', or remove them first."
         )
     read = read_camera_file(file)
-    why = f"{file.name} ({read.style}) says nothing of how well its camera is known."
-    fit = CameraFit(
-        camera=read.camera,
-        origin="imported",
-        board="",
-        rung=f"as in {file.name}",
-        rungs=(),
-        draws=np.empty((0, 9)),
-        views=(),
-        bulge_mm=(0.0, 0.0),
-        noise_px=read.rms_px if read.rms_px is not None else float("nan"),
-        stretch=float("nan"),
-        region=np.empty((0, 2)),
-        region_share=0.0,
-        pixel_map=None,
-        cross=None,
-        verdicts=(Verdict("fit.camera", "uncertainty", "not_evaluated", None, None, why),),
-        inputs_hash=hashlib.sha256(file.read_bytes()).hexdigest(),
-        sources=(file.name,),
-        notes=(f"Brought in from {file.name} ({read.style}).",),
-    )
+    fit = imported_camera(read, file)
     save_camera(fit, camera_path(workspace))
     return fit, read, camera_path(workspace)
 
@@ -215,17 +195,6 @@ def camera_inputs_hash(captures: Sequence[PhotoCapture]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _taken(photo: Photo, detection: Detection) -> TakenPhoto:
-    words = (
-        f"{photo.source}: {len(detection.ids)} of {len(detection.board.points)} corners, "
-        f"{detection.square_px:.0f} px a square, "
-        f"{view_words(detection, photo.width, photo.height)}"
-    )
-    if detection.square_px < SMALL_PX:
-        words += f" (small: {SMALL_PX:.0f} px a square and more are safe; go nearer)"
-    return TakenPhoto(photo.source, len(detection.ids), detection.square_px, words)
-
-
 def _refuse_other_board(before: Sequence[PhotoCapture], board: CameraBoard) -> None:
     for capture in before:
         if capture.index.board != board:
@@ -236,26 +205,7 @@ def _refuse_other_board(before: Sequence[PhotoCapture], board: CameraBoard) -> N
             )
 
 
-Shape = tuple[int, int, int]
-
-
-def _same_shape(photo: Photo, shape: Shape | None) -> Shape:
-    """Refuse photographs of another size or turn: they are of another camera to the fit."""
-    own = (photo.width, photo.height, photo.orientation)
-    if shape is None or own == shape:
-        return own
-    if own[:2] != shape[:2]:
-        raise InputError(
-            f"{photo.source} has {own[0]} x {own[1]} pixels, the photographs before it "
-            f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom and held one way."
-        )
-    raise InputError(
-        f"{photo.source} was turned by its EXIF data (orientation {own[2]}), and not as the "
-        f"photographs before it ({shape[2]}): hold the camera one way for all."
-    )
-
-
-def _shape_of(captures: Sequence[PhotoCapture]) -> Shape | None:
+def _shape_of(captures: Sequence[PhotoCapture]) -> PictureShape | None:
     for capture in captures:
         for photo in capture.index.photographs:
             return photo.width, photo.height, photo.orientation
