@@ -10,7 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.vision.blade.measure import measure_blade
 from scissorcal.vision.blade.parts import lone_blade
 from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
-from scissorcal.vision.blade.picture import NickMark, as_png, blade_picture
+from scissorcal.vision.blade.picture import NickMark, blade_picture
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
@@ -162,7 +162,6 @@ def test_a_picture_shows_what_was_found(measured):
     assert max(drawn.shape[:2]) <= 1600
     green = (drawn[..., 1].astype(int) - drawn[..., 0] > 60) & (drawn[..., 1] > 150)
     assert green.sum() > 100
-    assert as_png(drawn)[:4] == b"\x89PNG"
 
 
 def two_blades():

@@ -72,13 +72,6 @@ def blade_picture(
     return canvas.picture
 
 
-def as_png(picture: Picture) -> bytes:
-    """Encode a picture as PNG."""
-    import cv2
-
-    return bytes(cv2.imencode(".png", picture)[1].tobytes())
-
-
 def _blade(
     canvas: "_Canvas",
     view: View,

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from scissorcal.calibration.edge.result import BladeFit, BladeResult, SeenOpening
     from scissorcal.inference import Effort
     from scissorcal.recipe.schema import Recipe
-    from scissorcal.vision.blade.measure import BladeMeasurement
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.photo import Photo
@@ -80,7 +79,7 @@ def capture_blade(
                 tell(f"left out: {error}")
                 continue
             writer.add(path, photo)
-            taken.append(_words(seen))
+            taken.append(seen.sentence())
             tell(taken[-1])
         if not taken:
             raise InputError(" ".join(refused[:3]) + " Nothing was kept.")
@@ -208,29 +207,6 @@ def _openings(seen: Sequence["BladePhoto"]) -> tuple["SeenOpening", ...]:
     )
 
 
-def _names(one: "BladePhoto") -> tuple[str, ...]:
-    """What the blades of a photograph are called: "blade" alone, else "left" and "right".
-
-    Left and right are as seen from the handles, so that they stay the same from photograph to
-    photograph as long as the scissors are not turned over.
-    """
-    if len(one.measured) != 2:
-        return ("blade",) * len(one.measured)
-    first, second = (measured.parts.axis for measured in one.measured)
-    # y runs down on the sheet, so that a positive turn is clockwise: to the right
-    turn = float(first[0] * second[1] - first[1] * second[0])
-    return ("left", "right") if turn > 0 else ("right", "left")
-
-
-def _sides(seen: Sequence["BladePhoto"]) -> dict[str, list["BladeMeasurement"]]:
-    """Measurements by blade."""
-    found: dict[str, list[BladeMeasurement]] = {}
-    for one in seen:
-        for name, measured in zip(_names(one), one.measured, strict=True):
-            found.setdefault(name, []).append(measured)
-    return dict(sorted(found.items()))
-
-
 def _fits(
     seen: Sequence["BladePhoto"],
     captures: Sequence[PhotoCapture],
@@ -240,10 +216,11 @@ def _fits(
     tell: Progress,
 ) -> tuple["BladeFit", ...]:
     from scissorcal.calibration.edge.fit import fit_blade
+    from scissorcal.vision.blade.photo import by_blade
 
     lengths = [c.index.blade.length_mm for c in captures if c.index.blade]
     known = next((1e-3 * length for length in lengths if length), None)
-    sides = _sides(seen)
+    sides = by_blade(seen)
     if not sides:
         raise InputError(
             "The scissors are closed in every photograph, and each blade hides the other's edge: "
@@ -264,63 +241,21 @@ def _fits(
     return tuple(fits)
 
 
-def _words(seen: "BladePhoto") -> str:
-    name = seen.photo.source
-    if seen.scissors is not None and not seen.measured:
-        return f"{name}: closed scissors; their edges hide each other"
-    parts = []
-    for one in seen.measured:
-        length = f"{1e3 * one.length:.2f} mm" if one.metric else f"{one.length:.0f} px"
-        parts.append(
-            f"{length} long, {len(one.station)} points, borders {one.edge.blur_px:.1f} px soft"
-        )
-    text = f"{name}: " + "; ".join(parts)
-    if seen.scissors is not None:
-        text += f"; open by {np.degrees(seen.scissors.opening):.1f} deg"
-    return text
-
-
 def _draw(
     workspace: Workspace, seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"]
 ) -> tuple[Path, ...]:
-    from scissorcal.vision.blade.picture import NickMark, as_png, blade_picture
+    from scissorcal.calibration.edge.pictures import edge_picture
+    from scissorcal.vision.overlay import write_picture
 
     folder = blade_path(workspace).with_suffix("")
-    folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.png"):
         old.unlink()
     by_name = {fit.name: fit for fit in fits}
     paths = []
     for number, one in enumerate(seen, start=1):
-        edges, marks = [], []
-        for name, measured in zip(_names(one), one.measured, strict=True):
-            fit = by_name[name]
-            unit = measured.length / fit.belief.edge.length_m if not measured.metric else 1.0
-            edges.append(_scaled_edge(fit, unit))
-            marks.append(
-                [
-                    NickMark(nick.station_m * unit, _nick_words(nick.depth_m, fit.metric))
-                    for nick in fit.nicks
-                ]
-            )
-        picture = blade_picture(
-            one.photo, one.view, one.outline, one.measured, edges, marks, one.photo.source
-        )
         path = folder / f"{number:03d}-{Path(one.photo.source).stem}.png"
-        part = path.with_name(path.name + ".part")
-        part.write_bytes(as_png(picture))
-        part.replace(path)
-        paths.append(path)
+        paths.append(write_picture(edge_picture(one, by_name), path))
     return tuple(paths)
-
-
-def _scaled_edge(fit: "BladeFit", unit: float) -> Callable[["np.ndarray"], "np.ndarray"]:
-    edge = fit.belief.edge
-    return lambda station: edge.offset_at(station / unit) * unit
-
-
-def _nick_words(depth: float, metric: bool) -> str:
-    return f"nick {1e3 * depth:.2f} mm" if metric else f"nick {100 * depth:.1f} %"
 
 
 def _pictures_of(workspace: Workspace, result: "BladeResult") -> tuple[Path, ...]:
