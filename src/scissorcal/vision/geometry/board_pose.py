@@ -174,30 +174,21 @@ def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
 
 
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
-    """Levenberg-Marquardt on the reprojection error of the corners used."""
-    both = np.repeat(used, 2)
-    pose, damping = start.copy(), 1e-3
+    """Minimise the reprojection error of the corners used (Levenberg-Marquardt)."""
+    import cv2
+
+    turn, shift = cv2.solvePnPRefineLM(
+        corners.points[used],
+        corners.pixels[used],
+        camera.matrix,
+        camera.coefficients,
+        start[:3, None].copy(),
+        start[3:, None].copy(),
+        (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, ROUNDS, 1e-12),
+    )
+    pose = np.concatenate([turn.ravel(), shift.ravel()])
     residuals, slope = project_pose(pose, corners, camera)
-    square = float(np.sum(residuals[used] ** 2))
-    for _ in range(ROUNDS):
-        by_pose = slope[both, :6]
-        normal = by_pose.T @ by_pose
-        pull = by_pose.T @ residuals.ravel()[both]
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
-        tried = pose + step
-        away, leaning = project_pose(tried, corners, camera)
-        reached = float(np.sum(away[used] ** 2))
-        if reached <= square:
-            settled = square - reached <= 1e-12 * square
-            pose, residuals, slope, square = tried, away, leaning, reached
-            damping = max(0.1 * damping, 1e-12)
-            if settled:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e8:
-                break
-    return _Refined(pose, residuals, slope, square)
+    return _Refined(pose, residuals, slope, float(np.sum(residuals[used] ** 2)))
 
 
 def _square(found: _Refined) -> float:
