@@ -29,7 +29,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class RankedQuantity:
-    """One parameter, or the effort that all of them predict, over all simulated fits.
+    """One parameter, or the predicted effort, over all simulated fits.
 
     ``ranks`` and ``truths`` (fits,) are the truth's rank among the posterior's draws and its value
     in ``unit``. ``ecdf_p`` and ``chi_square_p`` test the ranks' uniformity, by their empirical
@@ -64,7 +64,7 @@ class RankBand:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Simulation-based calibration of a whole fit over its own motion, with its own noise.
+    """Simulation-based calibration of a whole fit, with its motion and its noise.
 
     Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` name the distributions of
     truths and data; ``spread`` is the factor by which the local prior is wider than the posterior.

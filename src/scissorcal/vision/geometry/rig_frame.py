@@ -1,4 +1,4 @@
-"""Where the camera stands in the rig's frame: from a card of markers that rides on the rig."""
+"""The camera's pose in the rig's frame, from a card of markers on the moving rig."""
 
 from dataclasses import dataclass
 
@@ -21,20 +21,19 @@ from scissorcal.vision.targets.detect import Detection
 Array = NDArray[np.float64]
 
 OPEN = 3.0
-"""Prior standard deviation, rad and m, of what nobody said about how the card is fixed."""
+"""Prior standard deviation (rad and m) of both poses."""
 
 UNTOLD = 0.1
-"""A direction of the camera's pose whose standard deviation exceeds this (rad or m) was not told
-by the motion."""
+"""A direction of the camera's pose with a larger standard deviation (rad or m) is undetermined by
+the motion."""
 
 STEP = 1e-6
-ROUNDS = 60
 
 
 @dataclass(frozen=True)
 class CardView:
-    """The card in one picture, with where the rig stood: ``advance_m`` and, for a card on a moving
-    blade, ``blade_angle_rad`` by which that blade had turned (zero for a card on the carriage)."""
+    """The card in one picture, and the rig's stance: ``advance_m`` and, for a card on a moving
+    blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
     corners: Corners
     advance_m: float
@@ -54,7 +53,7 @@ class RigPose:
 
     The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
     card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
-    +z. ``untold`` names what the motion left open, empty where all is known. ``by_camera`` (6, 9)
+    +z. ``untold`` names the directions that the motion does not determine. ``by_camera`` (6, 9)
     says how ``camera_rig`` moves with the camera's parameters.
     """
 
@@ -65,7 +64,7 @@ class RigPose:
     by_camera: Array
 
     def holds(self, board: BoardPose, camera: Camera) -> Pose:
-        """T_rig_target of a target that the same camera sees, whose errors are in both poses."""
+        """T_rig_target of a target seen by the same camera, with the common camera errors."""
         known = camera.covariance
         shared = np.zeros((6, 6))
         if known is not None:
@@ -77,33 +76,37 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
-    squares on all corners, both poses unknown at once. Advances tell the x axis, turns tell the
-    pivot's axis and place; with one of them only, part of the frame stays open and is named.
-    The covariance holds what is unknown of the camera and of the card's print.
+    squares on all corners, both poses unknown at once. Advances determine the x axis, turns the
+    pivot's axis and place; with one of them only, ``untold`` names the undetermined directions. The
+    covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
+    from scipy.optimize import least_squares
+
     stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(stances) < 2:
         raise ValueError(
-            "the rig stood in one place in all pictures; move it between pictures: several "
-            "advances, and several openings"
+            "the rig has the same stance in all pictures: take pictures at several advances and "
+            "several openings"
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
-    used = tuple(found.used for found in located)
-    point, square, normal, slopes = _search(views, camera, middle_m, used, start)
-    count = 2 * sum(int(np.sum(mask)) for mask in used)
-    noise = max(square / max(count - len(point), 1), LEAST_SD_PX**2)
+    rows = _Rows(views, camera, middle_m, tuple(found.used for found in located))
+    point = least_squares(
+        rows.residuals, start, jac=rows.by_point, method="lm", x_scale="jac", xtol=1e-14, ftol=1e-12
+    ).x
+    residual, slope, shared = rows.residuals(point), rows.by_point(point), rows.by_shared(point)
+    square, normal, slopes = float(residual @ residual), slope.T @ slope, slope.T @ shared
+    noise = max(square / max(len(residual) - len(point), 1), LEAST_SD_PX**2)
     prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
     inverse = np.linalg.inv(normal / noise + prior)
-    spread = normal / noise
-    alike = np.zeros((11, 11))
-    alike[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
+    known = np.zeros((11, 11))
+    known[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
     if camera.covariance is not None:
-        alike[:9, :9] = camera.covariance
+        known[:9, :9] = camera.covariance
     drawn = slopes / noise
-    spread = spread + drawn @ alike @ drawn.T
+    spread = normal / noise + drawn @ known @ drawn.T
     turn = np.eye(len(point))
     turn[:3, :3] = left_jacobian(point[:3])
     covariance = turn @ inverse @ (spread + prior) @ inverse @ turn.T
@@ -113,7 +116,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     return RigPose(
         Pose(rig.quaternion, rig.translation_m, covariance[:6, :6]),
         card,
-        float(np.sqrt(2.0 * square / count)),
+        float(np.sqrt(2.0 * square / len(residual))),
         untold,
         -(turn @ inverse @ drawn)[:6, :9],
     )
@@ -175,67 +178,54 @@ def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array)
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise ValueError("the card did not move although the rig did; is it fixed to it?")
+        raise ValueError("the card did not move with the rig: fix it to the moving part")
     return np.asarray(vector / length)
 
 
-def _search(
-    views: tuple[CardView, ...],
-    camera: Camera,
-    middle_m: Array,
-    used: tuple[NDArray[np.bool_], ...],
-    start: Array,
-) -> tuple[Array, float, Array, Array]:
-    """Levenberg-Marquardt: point, sum of squares, normal matrix (11, 11), slopes (11, 11) by
-    what all pictures share: the camera's parameters and the print's scales."""
-    point, damping = start, 1e-3
-    square, pull, normal, slopes = _sums(point, views, camera, middle_m, used)
-    for _ in range(ROUNDS):
-        damped = normal + damping * np.diag(np.diag(normal)) + 1e-9 * np.eye(len(point))
-        tried = point + np.linalg.solve(damped, pull)
-        reached = _sums(tried, views, camera, middle_m, used)
-        if reached[0] <= square:
-            settled = square - reached[0] <= 1e-12 * square
-            point, (square, pull, normal, slopes) = tried, reached
-            damping = max(0.1 * damping, 1e-12)
-            if settled:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e8:
-                break
-    return point, square, normal, slopes
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of the least squares over the corners of all pictures that ``used`` selects."""
+
+    views: tuple[CardView, ...]
+    camera: Camera
+    middle_m: Array
+    used: tuple[NDArray[np.bool_], ...]
+
+    def residuals(self, point: Array) -> Array:
+        """Predicted minus measured pixels (n,) at parameters (11,)."""
+        poses = _poses(point, self.middle_m)
+        away = [
+            project_pose(_card(poses, view), view.corners, self.camera)[0][mask]
+            for view, mask in zip(self.views, self.used, strict=True)
+        ]
+        return -np.concatenate(away).ravel()
+
+    def by_point(self, point: Array) -> Array:
+        """Slopes (n, 11) of predicted pixels by the parameters."""
+        here = _poses(point, self.middle_m)
+        steps = STEP * np.eye(len(point))
+        beside = [[_poses(point + s * e, self.middle_m) for s in (1, -1)] for e in steps]
+        rows = []
+        for view, mask in zip(self.views, self.used, strict=True):
+            _, slope = project_pose(_card(here, view), view.corners, self.camera)
+            chain = [(_card(a, view) - _card(b, view)) / (2 * STEP) for a, b in beside]
+            rows.append(slope[np.repeat(mask, 2), :6] @ np.stack(chain, axis=1))
+        return np.concatenate(rows)
+
+    def by_shared(self, point: Array) -> Array:
+        """Slopes (n, 11) by what all pictures share: the camera and the print's scales."""
+        here = _poses(point, self.middle_m)
+        rows = []
+        for view, mask in zip(self.views, self.used, strict=True):
+            card = _card(here, view)
+            _, slope = project_pose(card, view.corners, self.camera)
+            shared = np.hstack([slope[:, 6:15], print_slopes(card, slope, view.corners)])
+            rows.append(shared[np.repeat(mask, 2)])
+        return np.concatenate(rows)
 
 
-def _sums(
-    point: Array,
-    views: tuple[CardView, ...],
-    camera: Camera,
-    middle_m: Array,
-    used: tuple[NDArray[np.bool_], ...],
-) -> tuple[float, Array, Array, Array]:
-    square, size = 0.0, len(point)
-    pull, normal, slopes = np.zeros(size), np.zeros((size, size)), np.zeros((size, 11))
-    for view, mask in zip(views, used, strict=True):
-
-        def seen(p: Array, view: CardView = view) -> Array:
-            rig, card = _poses(p, middle_m)
-            return _vector(rig.after(_motion(view)).after(card))
-
-        stand = seen(point)
-        away, slope = project_pose(stand, view.corners, camera)
-        alike = np.hstack([slope[:, 6:15], print_slopes(stand, slope, view.corners)])
-        both = np.repeat(mask, 2)
-        chain = np.stack(
-            [(seen(point + e) - seen(point - e)) / (2 * STEP) for e in STEP * np.eye(size)], axis=1
-        )
-        by_point, left = slope[both, :6] @ chain, away.ravel()[both]
-        square += float(left @ left)
-        pull += by_point.T @ left
-        normal += by_point.T @ by_point
-        slopes += by_point.T @ alike[both]
-    return square, pull, normal, slopes
-
-
-def _vector(pose: Pose) -> Array:
-    return np.concatenate([pose.rotation_vector, pose.translation_m])
+def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
+    """The card's pose before the camera (6,): rotation vector and translation."""
+    rig, card = poses
+    seen = rig.after(_motion(view)).after(card)
+    return np.concatenate([seen.rotation_vector, seen.translation_m])
