@@ -27,7 +27,9 @@ class Built:
     cached: bool
 
 
-def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool = False) -> Built:
+def build_workspace_package(
+    workspace: Workspace, *, seed: int = 0, force: bool = False, allow_failed: bool = False
+) -> Built:
     """Compile the fits of a workspace into package/<recipe>.zip.
 
     The package carries the signature under the report, where there is one that stands. Nothing is
@@ -57,7 +59,7 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
     state = review_state(workspace, recipe, fits)
     if path.is_file() and not force:
         try:
-            package = open_package(path)
+            package = open_package(path, warn=False)
         except InputError:
             package = None
         expected = expected_package_hash(workspace, recipe, fits)
@@ -75,6 +77,7 @@ def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool 
         np.random.default_rng(seed),
         review=state.valid,
         plate=plate,
+        allow_failed=allow_failed,
     )
     warnings = _void(state) + summary.warnings
     return Built(path, summary.manifest, summary.verdicts, warnings, cached=False)
