@@ -40,9 +40,11 @@ types: $(STAMP)
 
 schemas: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --write
+	$(RUN)/python src/scissorcal/kernel/write_wire.py
 
 schemas-check: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --check
+	$(RUN)/python src/scissorcal/kernel/write_wire.py --check
 
 # docs/api and the table of docs/verdicts.md, from the docstrings.
 api: $(STAMP)

@@ -91,7 +91,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "package bound share": ("at most", TORQUE + "error of the tables, share of the largest torque"),
     "package extremes": ("at most", "the motors: steps that gave no number"),
     "package centre": ("at least", TORQUE + "share of the scene that lies in the posterior's band"),
-    "package fits": ("at most", "what the package is made from: failed verdicts there"),
+    "package failed fits": (
+        "at most",
+        "what the package is made from: checks that its fits failed",
+    ),
     "package review": ("at least", "who answers for the package: 1 for an accepted report"),
     "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
     "render misses": ("at most", f"{_LOOP}: share of frames that never came"),

@@ -84,7 +84,7 @@ def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
     assert f"up to {lost:.2g} N m" in told
     assert told in summary.warnings
     assert told in package.warnings
-    assert not [v for v in summary.verdicts if v.check == "fits" and v.status == "fail"]
+    assert not [v for v in summary.verdicts if v.check == "failed fits" and v.status == "fail"]
     _, plain = built(tmp_path, friction_fit())
     assert plain.manifest.provenance.cut.left_out == ()
 

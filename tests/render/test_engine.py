@@ -64,7 +64,9 @@ def test_strokes_are_rendered_recorded_and_judged(paper: ModelPackage, tmp_path:
         "supervision": "pass",
         "passivity": "pass",
     }
-    assert any("not signed" in sentence for sentence in result.warnings)
+    (unsigned,) = result.warnings
+    assert "not signed" in unsigned
+    assert recording.notes[0] == unsigned
     assert result.package_hash == paper.manifest.content_hash
     assert result.ledger.fracture_J > 0.005
     assert recording.kind == "render"

@@ -1,12 +1,16 @@
-"""One file per thing that is fitted: recording + model + inference -> result."""
+"""From recordings and photographs to fits: recording + model + inference -> result."""
 
-from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
-from scissorcal.calibration.fit_model import Experiment
-from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
-from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
-from scissorcal.calibration.hashing import fit_inputs_hash
-from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.calibration.store import load, load_fit, read_header, save
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
+    from scissorcal.calibration.fit_model import Experiment
+    from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
+    from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
+    from scissorcal.calibration.hashing import fit_inputs_hash
+    from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
+    from scissorcal.calibration.store import load, load_fit, read_header, save
 
 __all__ = [
     "CutExperiment",
@@ -28,3 +32,22 @@ __all__ = [
     "read_header",
     "save",
 ]
+
+_HOMES = {
+    "cut.fit": ("cut_experiment", "fit_cut"),
+    "cut.model": ("CutExperiment",),
+    "cut.structure": ("cutting_from",),
+    "fit_model": ("Experiment",),
+    "friction.fit": ("fit_friction", "friction_experiment"),
+    "friction.model": ("FrictionExperiment", "friction_law"),
+    "hashing": ("fit_inputs_hash",),
+    "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
+    "store": ("load", "load_fit", "read_header", "save"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,7 +7,9 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihood,
     cut_log_likelihoods,
 )
-from scissorcal.kernel.frames import (
+from scissorcal.kernel.frames import decode, encode
+from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
     Capability,
@@ -22,10 +24,7 @@ from scissorcal.kernel.frames import (
     Message,
     State,
     StateFlag,
-    decode,
-    encode,
 )
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.frames import ConfigEcho
+from scissorcal.kernel.messages import ConfigEcho
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
     EnergyLedger,

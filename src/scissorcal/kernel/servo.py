@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.frames import Command, State
 from scissorcal.kernel.layout import dtype_of
+from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.wire import encode_frame
 

@@ -111,6 +111,7 @@ def _away(
         strongest = STRONGEST_N * model.cutting.moving_blades
         parallel = np.maximum(PARALLEL, 2.0 * model.cutting.fracture_energy / strongest)
         clear &= (view.slope > parallel) | (view.slope < -PARALLEL)
-    exact = np.where(clear, np.clip(model.torque(*where), -limit, limit), 0.0)
+    torque = model.torque_settled(points.opening, points.opening_rate, place)
+    exact = np.where(clear, np.clip(torque, -limit, limit), 0.0)
     table = np.where(clear, np.clip(average.torque(*where), -limit, limit), 0.0)
     return np.abs(table - exact), exact

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import scissorcal
-from scissorcal.calibration import FitResult
 from scissorcal.calibration.plate.result import PlateFit
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package.archive import archive_bytes, member_of, write_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
-from scissorcal.package.check import package_verdicts
+from scissorcal.package.check import FITS_CHECK, package_verdicts
 from scissorcal.package.compile import (
     TOLERANCE,
     Compiled,
@@ -85,16 +85,20 @@ def build_package(
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
     The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
-    ``rng`` picks which posterior draws travel along for the band, at most 200; the same fits,
-    recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its value.
-    ``review`` is the signature under the fits' report; it changes nothing else in the package.
-    ``plate`` is where the plate stands, which travels along as a pose with its covariance.
+    ``rng`` picks the posterior draws that the package keeps for the band, at most 200; the same
+    fits, recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its
+    value. ``review`` is the signature under the fits' report; it changes nothing else in the
+    package. ``plate`` is where the plate stands, stored as a pose with its covariance.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
-    belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the
-    tables are further from the model than the scene bears.
+    belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
+    failed a check or the tables are further from the model than the scene allows. With
+    ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
+    the package says so (docs/decisions/109-packages-from-failed-fits.md).
     """
     cut, friction = _wanted(recipe, friction, cut)
+    if not allow_failed:
+        _refuse_failed_fits(path, cut, friction, plate)
     record = _provenance(recipe, cut, friction, plate)
     if inputs_hash:
         record = record.model_copy(update={"inputs_hash": inputs_hash})
@@ -274,8 +278,8 @@ def _with_left_out(
     said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
     update: dict[str, Any] = {"cut": record.cut.model_copy(update={"left_out": said})}
     if record.friction and model.friction:
-        said = (*record.friction.warnings, *left_out(model.friction, bound.scene_torque_Nm))
-        update["friction"] = record.friction.model_copy(update={"warnings": said})
+        said = left_out(model.friction, bound.scene_torque_Nm)
+        update["friction"] = record.friction.model_copy(update={"left_out": said})
     return record.model_copy(update=update)
 
 
@@ -376,8 +380,25 @@ def _hashed(manifest: Manifest) -> Manifest:
     return manifest.model_copy(update={"content_hash": content_hash(facts)})
 
 
+def _refuse_failed_fits(
+    path: Path, cut: FitResult, friction: FitResult | None, plate: PlateFit | None
+) -> None:
+    fits = (("friction", friction), ("cut", cut), ("plate", plate))
+    wrong = {what: reasons for what, fit in fits if fit and (reasons := _warnings(fit.verdicts))}
+    if not wrong:
+        return
+    sentences = " ".join(reason for reasons in wrong.values() for reason in reasons)
+    again = " and ".join(f"'scissorcal fit {what}'" for what in wrong)
+    count = sum(map(len, wrong.values()))
+    raise VerdictError(
+        f"{path} was not written: its fits failed {count} check{'s' if count > 1 else ''}. "
+        f"{sentences} Correct that and run {again} again, or build it all the same with "
+        "'scissorcal package build --allow-failed': the package then says so on every use."
+    )
+
+
 def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
-    own = [verdict for verdict in failed(verdicts) if verdict.check not in ("fits", "review")]
+    own = [verdict for verdict in failed(verdicts) if verdict.check not in (FITS_CHECK, "review")]
     if own:
         reasons = " ".join(verdict.why for verdict in own)
         raise VerdictError(f"{path} was not written: {reasons}")

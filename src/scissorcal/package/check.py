@@ -11,6 +11,7 @@ from scissorcal.verdicts import Status, Verdict
 
 SCOPE = "package"
 REVIEW_CHECK = "review"
+FITS_CHECK = "failed fits"
 GRID_POINTS = 13_337
 """Another count, so other points than those that the bound was measured on."""
 
@@ -24,7 +25,7 @@ def check_package(path: Path | str) -> tuple[Verdict, ...]:
 
     Raises MissingError or InputError where the file cannot even be opened as a package.
     """
-    return package_verdicts(open_package(path))
+    return package_verdicts(open_package(path, warn=False))
 
 
 def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
@@ -111,11 +112,11 @@ def _centre(package: ModelPackage) -> Verdict:
 
 
 def _fits(package: ModelPackage) -> Verdict:
-    reasons = package.fit_warnings
-    if not reasons:
-        return Verdict(SCOPE, "fits", "pass", 0.0, 0.0, "No fit in it failed a verdict.")
-    why = f"{len(reasons)} verdicts on its fits failed: " + " ".join(reasons)
-    return Verdict(SCOPE, "fits", "fail", float(len(reasons)), 0.0, why)
+    count = len(package.manifest.failed_checks)
+    if not count:
+        why = "Every fit in the package passed its checks."
+        return Verdict(SCOPE, FITS_CHECK, "pass", 0.0, 0.0, why)
+    return Verdict(SCOPE, FITS_CHECK, "fail", float(count), 0.0, " ".join(package.fit_warnings))
 
 
 def _review(package: ModelPackage) -> Verdict:

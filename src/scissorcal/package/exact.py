@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.calibration import cutting_from, friction_law
+from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.friction.model import friction_law
 from scissorcal.model import (
     Cutting,
     FrictionLaw,
@@ -39,7 +40,10 @@ class ExactModel:
         Arguments (rad, rad/s, m) broadcast; shape (draws, points) with draws and flat arguments.
         Material beyond the blade's tip is out of reach and gives no torque.
         """
-        place = self.settled(opening, contact)
+        return self.torque_settled(opening, opening_rate, self.settled(opening, contact))
+
+    def torque_settled(self, opening: ArrayLike, opening_rate: ArrayLike, place: Array) -> Array:
+        """The torque of `torque` where the crack stands at ``place`` (m), as `settled` gives it."""
         view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
         reached = view.station < self.cutting.edge.length_m
         felt = np.where(reached, torque_at(self.cutting, opening, place, opening_rate), 0.0)

@@ -28,7 +28,9 @@ Range = tuple[Finite, Finite]
 class Section(BaseModel):
     """Base of every object in the manifest: frozen, no unknown keys, no conversions, no NaN."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 class Member(Section):
@@ -299,6 +301,13 @@ class Manifest(Section):
         if (self.provenance.friction is None) != (self.mechanics.friction is None):
             raise ValueError("mechanics.friction and provenance.friction contradict each other")
         return self
+
+    @property
+    def failed_checks(self) -> tuple[str, ...]:
+        """The checks that the fits in the package failed, each as "scope, check: reason"."""
+        record = self.provenance
+        parts = (record.cut, record.friction, self.plate)
+        return tuple(reason for part in parts if part for reason in part.warnings)
 
     @property
     def fit_hashes(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, ModelTables
-from scissorcal.package.archive import MEND, read_archive
+from scissorcal.package.archive import REMEDY, read_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import kernel_tables
 from scissorcal.package.exact import (
@@ -33,6 +33,10 @@ ROUNDING = 1e-9
 
 class OutsideCoverageWarning(UserWarning):
     """A torque was asked for outside the ranges for which the package was built and checked."""
+
+
+class FailedFitsWarning(UserWarning):
+    """A package that was built from fits that failed checks is in use."""
 
 
 @dataclass(frozen=True)
@@ -157,15 +161,22 @@ class ModelPackage:
 
     @property
     def fit_warnings(self) -> tuple[str, ...]:
-        """What the fits' own verdicts hold against them, as sentences."""
-        record, plate = self.manifest.provenance, self.manifest.plate
-        rig = record.cut.warnings + (record.friction.warnings if record.friction else ())
-        return rig + (plate.warnings if plate else ())
+        """One sentence where the package was built from fits that failed checks, else none."""
+        reasons = self.manifest.failed_checks
+        if not reasons:
+            return ()
+        checks = "1 check" if len(reasons) == 1 else f"{len(reasons)} checks"
+        return (
+            f"The package {self.manifest.name} was built from fits that failed {checks}, so its "
+            f"torque and its band may be wrong. {' '.join(reasons)}",
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever renders this package should know beforehand, as sentences."""
-        return self.review_warnings + self.fit_warnings + self.manifest.provenance.cut.left_out
+        record = self.manifest.provenance
+        left_out = record.cut.left_out + (record.friction.left_out if record.friction else ())
+        return self.review_warnings + self.fit_warnings + left_out
 
     @property
     def review_warnings(self) -> tuple[str, ...]:
@@ -198,11 +209,13 @@ class ModelPackage:
         )
 
 
-def open_package(path: Path | str) -> ModelPackage:
+def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
     """Open a package file, checking everything in it before anything is used.
 
-    Raises MissingError where there is no file, InputError where it is no package, was changed, or
-    states what cannot be. Nothing in a package is executed or unpacked to disk.
+    A package that was built from fits that failed checks gives a FailedFitsWarning with the
+    checks' names; ``warn=False`` is for callers who show ``warnings`` themselves. Raises
+    MissingError where there is no file, InputError where it is no package, was changed, or states
+    what cannot be. Nothing in a package is executed or unpacked to disk.
 
     >>> package = open_package("package/paper-80gsm.zip")  # doctest: +SKIP
     >>> package.torque(opening=0.5, opening_rate=-0.2, contact=0.03)  # doctest: +SKIP
@@ -216,12 +229,14 @@ def open_package(path: Path | str) -> ModelPackage:
         if record and arrays[f"draws/{what}.npy"].shape[1] != len(record.parameters):
             raise InputError(
                 f"{path}, member 'draws/{what}.npy' has another number of columns than the {what} "
-                f"fit has parameters. {MEND}"
+                f"fit has parameters. {REMEDY}"
             )
     try:
         _ = package.tables, package.exact, package.average
     except (ValueError, KeyError) as error:
-        raise InputError(f"{path}: its parts make no model ({error}). {MEND}") from error
+        raise InputError(f"{path}: its parts make no model ({error}). {REMEDY}") from error
+    for sentence in package.fit_warnings if warn else ():
+        warnings.warn(sentence, FailedFitsWarning, stacklevel=2)
     return package
 
 

@@ -20,7 +20,7 @@ class Review(BaseModel):
     fit that it shows. It says what was reviewed, not who is who: nothing here is encrypted.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     format: ReviewFormat
     name: Annotated[str, Field(min_length=1, max_length=200)]

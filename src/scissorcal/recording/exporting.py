@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError, file_error
 from scissorcal.recording import layout
+from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
 
@@ -54,7 +55,7 @@ def _as_table(recording: Recording) -> "pa.Table":
     table = pa.table(layout.columns(recording))
     return table.replace_schema_metadata(
         {
-            layout.METADATA_NAME: _description(recording).model_dump_json(),
+            METADATA_NAME: _description(recording).model_dump_json(),
             "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
         }
     )

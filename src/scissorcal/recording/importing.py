@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import CHANNELS, gap_note
+from scissorcal.recording.summarising import gap_note
 from scissorcal.recording.table import Table
 from scissorcal.recording.tables import read_table
 
@@ -109,7 +109,7 @@ def _check_request(
     wanted: tuple[str, ...],
 ) -> None:
     """Refuse what cannot be read; of the channels ``wanted`` one must be named, if any."""
-    known = ("time", *CHANNELS)
+    known = ("time", *MEASURED)
     for name in (*columns, *units, *scale):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
@@ -205,7 +205,7 @@ def _notes(
     quantities: Mapping[str, Quantity],
     samples: NDArray[np.void],
 ) -> tuple[str, ...]:
-    missing = [channel for channel in CHANNELS if channel not in columns]
+    missing = [channel for channel in MEASURED if channel not in columns]
     notes = [f"Imported from {source}: {describe(quantities)}."]
     notes += [f"Not in that file, and 0 throughout: {', '.join(missing)}."] if missing else []
     notes += [entry.note for entry in quantities.values() if entry.note]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recording import layout
-from scissorcal.recording.recording import SAMPLE_DTYPE
+from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, to_entries
 
 FLUSH_SPAN_NS = 125_000_000
@@ -45,7 +45,7 @@ class SampleFile:
 
     def append(self, samples: NDArray[np.void]) -> None:
         """Add samples, shape (n,) with SAMPLE_DTYPE; close the chunk once it is 0.125 s old."""
-        if samples.dtype != SAMPLE_DTYPE or samples.ndim != 1:
+        if samples.dtype != layout.SAMPLE_DTYPE or samples.ndim != 1:
             raise ValueError(
                 f"samples must have SAMPLE_DTYPE and one dimension, not {samples.dtype} "
                 f"with shape {samples.shape}"
@@ -53,7 +53,7 @@ class SampleFile:
         if not len(samples):
             return
         data = samples.tobytes()
-        size = SAMPLE_DTYPE.itemsize
+        size = layout.SAMPLE_DTYPE.itemsize
         times = np.maximum(samples["host_time_ns"], 0).tolist()
         for index, (time, number) in enumerate(
             zip(times, samples["sequence"].tolist(), strict=True)
@@ -89,7 +89,7 @@ class SampleFile:
 
     def note(self, sentence: str) -> None:
         """Add a sentence for the report, in its place among the samples."""
-        self._mark(layout.NOTE_NAME, {"note": sentence})
+        self._mark(NOTE_NAME, {"note": sentence})
 
     def mark_sheet(self, sheet: int) -> None:
         """Say that from the next sample on this sheet of material is loaded (-1: none)."""
@@ -98,7 +98,7 @@ class SampleFile:
     def finish(self) -> None:
         """Write what is left, the metadata again, the index and the footer; leave the file open."""
         self._flush(self._newest_host_time)
-        self._mcap.add_metadata(layout.METADATA_NAME, self._entries)
+        self._mcap.add_metadata(METADATA_NAME, self._entries)
         self._mcap.finish()
 
     def _mark(self, name: str, entries: dict[str, str]) -> None:
@@ -119,5 +119,5 @@ def _start(stream: IO[bytes], entries: dict[str, str]) -> Any:
 
     writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(profile=layout.PROFILE, library=f"scissorcal {__version__}")
-    writer.add_metadata(layout.METADATA_NAME, entries)
+    writer.add_metadata(METADATA_NAME, entries)
     return writer

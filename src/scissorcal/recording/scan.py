@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording import layout
+from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
 
-MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK = 64 * 1024 * 1024
-HEAD = struct.Struct("<BQ")
 _ZSTD_FIELD = b"\x04\x00\x00\x00zstd"
 _ZSTD_FIELD_AT = HEAD.size + 28
 _MESSAGE_BODY = layout.MESSAGE_DTYPE.itemsize - HEAD.size
@@ -149,14 +148,14 @@ class _Walk:
         from mcap.records import Metadata
 
         record = _parse(Metadata, body)
-        if record.name == layout.NOTE_NAME:
+        if record.name == NOTE_NAME:
             self.events.append(Note(record.metadata.get("note", "")))
         elif record.name == layout.SHEET_NAME:
             try:
                 self.events.append(Sheet(int(record.metadata["sheet"])))
             except (KeyError, ValueError):
                 raise _DamageError("a sheet mark without a number") from None
-        elif record.name == layout.METADATA_NAME:
+        elif record.name == METADATA_NAME:
             try:
                 metadata = from_entries(record.metadata)
             except ValueError as error:

@@ -3,13 +3,12 @@
 import json
 import math
 import platform
-import zlib
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from scissorcal.recording.recording import Joint, Kind, Stroke, StrokeKind
+from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind, checksum
 
 
 class StrokeRecord(BaseModel):
@@ -140,9 +139,3 @@ def _is_text(annotation: Any) -> bool:
         return True
     arguments = getattr(annotation, "__args__", ())
     return bool(arguments) and all(isinstance(argument, str) for argument in arguments)
-
-
-def checksum(entries: Mapping[str, str]) -> str:
-    """Return the CRC-32, in hexadecimal, of all entries but the checksum itself."""
-    text = json.dumps(dict(entries), sort_keys=True, ensure_ascii=False)
-    return f"{zlib.crc32(text.encode()):08x}"

@@ -5,17 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recording.layout import unit_of
+from scissorcal.recording.layout import MEASURED, unit_of
 from scissorcal.recording.recording import Recording, Stroke
-
-CHANNELS = (
-    "opening",
-    "advance",
-    "motor_torque",
-    "handle_force",
-    "torque_command",
-    "force_command",
-)
 
 
 @dataclass(frozen=True)
@@ -83,7 +74,7 @@ def summary(recording: Recording) -> RecordingSummary:
         rate_Hz=1e6 / step_us if step_us > 0 else 0.0,
         gaps=find_gaps(samples),
         strokes=tuple(_stroke(recording, stroke) for stroke in recording.strokes),
-        ranges=tuple(_range(recording, channel) for channel in CHANNELS),
+        ranges=tuple(_range(recording, channel) for channel in MEASURED),
         notes=recording.notes,
     )
 

@@ -70,7 +70,8 @@ def render(
     recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
     On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
     with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
-    ``writer`` records every sample; see `open_writer`.
+    ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
+    match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
     Raises InputError, before anything moves, where package and device do not fit each other or
     nobody can be asked; DeviceError where the rig fails, and what was recorded stays.
@@ -80,6 +81,9 @@ def render(
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
     config = _servo_config(applied, identity, seconds)
+    if writer:
+        for sentence in warnings:
+            writer.note(sentence)
     watch = _Watch(package, writer, progress or _silent, seconds)
     with open_motion(link, config, package.tables) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
@@ -115,7 +119,8 @@ def render(
         verdicts=render_verdicts(report, latency, identity.tick_us),
         warnings=warnings + _limited_warning(limited, applied),
     )
-    _note(writer, result)
+    if writer:
+        _note(writer, result, result.warnings[len(warnings) :])
     return result
 
 
@@ -303,14 +308,13 @@ def _limited_warning(share: float, applied: AppliedLimits) -> tuple[str, ...]:
     )
 
 
-def _note(writer: RecordingWriter | None, result: RenderResult) -> None:
-    if writer is None:
-        return
+def _note(writer: RecordingWriter, result: RenderResult, late: tuple[str, ...]) -> None:
+    """Note how it went, with the warnings that were not known (and noted) at the start."""
     writer.note(f"Rendered package {result.package_hash} for {result.seconds:.1f} s.")
-    for sentence in result.warnings:
+    for sentence in late:
         writer.note(sentence)
     for count, words in (
-        (result.misses, "frames never came."),
+        (result.misses, "frames were lost."),
         (result.garbled, "frames arrived garbled."),
         (result.faults, "times the device latched a fault."),
         (result.overrun, "samples were fetched too late and lost."),

@@ -124,18 +124,18 @@ static void serve_mailbox(loop *self)
         return;
     }
     uint8_t payload[SC_SIZE_CONFIG];
-    const sc_config config = {0, (uint16_t)mailbox->key, wanted, mailbox->value};
+    const sc_config config = {(uint16_t)mailbox->key, wanted, mailbox->value};
     self->asked = wanted;
     self->asked_frames = 0;
-    (void)send_payload(self, payload, sc_pack_config(&config, SC_TYPE_CONFIG, payload));
+    (void)send_payload(self, payload, sc_pack_config(&config, payload));
 }
 
 static void take_other(loop *self, const uint8_t *payload, size_t size)
 {
     sc_mailbox *mailbox = &self->block->mailbox;
-    sc_config echo;
+    sc_config_echo echo;
     self->block->other_frames++;
-    if (sc_unpack_config(payload, size, SC_TYPE_CONFIG_ECHO, &echo) &&
+    if (sc_unpack_config_echo(payload, size, &echo) &&
         echo.nonce == __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE) &&
         echo.nonce != mailbox->answered && echo.key == mailbox->key) {
         mailbox->status = echo.status;

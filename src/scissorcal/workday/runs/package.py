@@ -51,7 +51,7 @@ def build_workspace_package(
     review, path = standing_review(engine), engine.file("package build")
     if path.is_file() and not force:
         try:
-            package = open_package(path)
+            package = open_package(path, warn=False)
         except InputError:
             package = None
         if package and package.manifest.provenance.inputs_hash == engine.identity("package build"):
