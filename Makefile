@@ -11,6 +11,8 @@ RUN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch])
 PYTEST_ARGS ?=
+# All cores; the tests of one file stay in one process, so that they share their fixtures.
+PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
@@ -20,10 +22,10 @@ demo: $(STAMP)
 	$(RUN)/scissorcal demo
 
 test: $(STAMP)
-	$(RUN)/pytest -m "not slow" $(PYTEST_ARGS)
+	$(PYTEST) -m "not slow" $(PYTEST_ARGS)
 
 test-slow: $(STAMP)
-	$(RUN)/pytest -m slow $(PYTEST_ARGS)
+	$(PYTEST) -m slow $(PYTEST_ARGS)
 
 lint: $(STAMP)
 	$(RUN)/ruff check .

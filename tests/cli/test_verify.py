@@ -25,7 +25,7 @@ def test_it_prints_tables_and_verdicts(
     fitted: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(fitted.captures_dir)
-    said = cli("verify", "friction", "--fits", "3", "--workers", "1")
+    said = cli("verify", "friction", "--fits", "3", "--workers", "1", "-v")
     assert said.code == 0, said.out
     assert "FAIL  " not in said.out
     for words in (

@@ -1,6 +1,7 @@
 """Exported tables hold the same numbers, and come back by import."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ def test_what_stands_is_kept_and_wrong_names_are_refused(tmp_path: Path) -> None
         export_table(recording, path)
     assert path.read_text() == "precious"
     export_table(recording, path, overwrite=True)
-    assert path.read_text().startswith('"sequence"')
+    assert path.read_text().startswith("sequence,")
     with pytest.raises(InputError, match=r"written as \.parquet or \.csv"):
         export_table(recording, tmp_path / "a.xlsx")
     with pytest.raises(InputError, match="is no folder"):
@@ -84,3 +85,16 @@ def test_what_stands_is_kept_and_wrong_names_are_refused(tmp_path: Path) -> None
 def test_an_empty_recording_gives_a_table_without_rows(tmp_path: Path) -> None:
     found = written_and_read(Recording("friction", made_samples(0)), tmp_path / "a.parquet")
     assert len(found["opening_rad"]) == 0
+
+
+def test_without_pyarrow_csv_works_and_parquet_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    recording = made_recording(20)
+    assert export_table(recording, tmp_path / "a.csv").is_file()
+    with pytest.raises(InputError, match=r"pip install 'scissorcal\[parquet\]', or use CSV"):
+        export_table(recording, tmp_path / "a.parquet")
+    with pytest.raises(InputError, match=r"scissorcal\[parquet\]"):
+        import_table(tmp_path / "b.parquet", columns={"time": 0, "opening": 1, "motor_torque": 2})
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

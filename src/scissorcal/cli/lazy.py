@@ -7,6 +7,8 @@ from typing import Any, ClassVar
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from scissorcal.errors import InputError
+
 Commands = Mapping[str, tuple[str, str]]
 """Name of a command -> where it stands (``module:attribute``) and one line of help."""
 
@@ -38,6 +40,15 @@ class LazyGroup(TyperGroup):
         return typer.main.get_command(app)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Load the command that ``args`` name.
+
+        Raises InputError where options of a group that is a command, too, stand in front of a
+        subcommand: they would be lost.
+        """
+        own = (option for option in self.params if option.name in ctx.params)
+        given = any(ctx.params[option.name] != option.get_default(ctx) for option in own)
+        if given and self.invoke_without_command:
+            raise InputError("Give the options after the subcommand, not in front of it.")
         name, _, rest = super().resolve_command(ctx, args)
         return name, self.load(name) if name else None, rest
 

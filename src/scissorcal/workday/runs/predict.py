@@ -146,9 +146,9 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 def _headings(path: Path) -> list[str]:
     if path.suffix.lower() == ".parquet":
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from scissorcal.recording.parquetfile import require_pyarrow
 
+        pa, pq = require_pyarrow()
         try:
             return list(pq.read_schema(path).names)
         except (OSError, pa.ArrowException) as error:
