@@ -15,6 +15,7 @@ import pytest
 
 from scissorcal.cli.root import run
 from scissorcal.device.lockstep import LockstepLink
+from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -99,6 +100,17 @@ def test_the_glossary_defines_every_promise():
     promises = text.partition("## Words that promise something")[2].partition("\n## ")[0]
     for word in ("done", "complete", "trusted", "verified", "safe", "signed", "stale"):
         assert re.search(rf"^\| \*\*[^|]*\b{word}\b", promises, re.MULTILINE), word
+
+
+def test_the_table_of_rooms_is_that_of_the_import_rules():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    stated: dict[str, set[str]] = {}
+    for rooms, may in re.findall(r"^\| (`.*?) \| [^|]* \| ([^|]*) \|$", text, re.MULTILINE):
+        above = set(stated) - LEAVES
+        words = {"all of the above": above, "-": set()}
+        allowed = words.get(may) if may in words else set(may.split(", "))
+        stated |= dict.fromkeys(re.findall(r"`(\w+)`", rooms), allowed)
+    assert stated == {room: may for room, may in MAY_IMPORT.items() if room != "<root>"}
 
 
 # --------------------------------------------------------------------------- generated pages
