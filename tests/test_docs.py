@@ -189,7 +189,8 @@ def run_block(lines: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -
         words = simulated(line)
         if words[:1] == ["cd"]:
             monkeypatch.chdir(words[1])
-        elif words[:1] == ["scissorcal"] and words[1:3] != ["device", "doctor"]:
+        else:
+            assert words[0] == "scissorcal", line
             with pytest.raises(SystemExit) as ended:
                 run(words[1:])
             assert ended.value.code == 0, line
