@@ -102,6 +102,15 @@ def test_the_glossary_defines_every_promise():
         assert re.search(rf"^\| \*\*[^|]*\b{word}\b", promises, re.MULTILINE), word
 
 
+def test_names_in_the_glossary_are_in_the_files_it_links_to():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| `(\w+)`[^|]*\|[^|]*\|[^|]*\| \[[\w.]+\]\(([^)]*)\)", text)
+    assert len(rows) > 20
+    for name, path in rows:
+        code = (ROOT / "docs" / path).read_text(encoding="utf-8")
+        assert re.search(rf"\b{name}", code), (name, path)
+
+
 def test_the_table_of_rooms_is_that_of_the_import_rules():
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     stated: dict[str, set[str]] = {}
