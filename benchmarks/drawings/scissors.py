@@ -159,7 +159,7 @@ def _handles(drawing: Drawing, place: Callable[[float, float], Point]) -> None:
 
 
 def _close_up(drawing: Drawing, contact: float, height: float, psi: float) -> None:
-    """Enlarge the contact, in a frame of its own."""
+    """Enlarge the contact, in a separate frame."""
     scale, left, top, wide, tall = 23.0, 430.0, 440.0, 646.0, 208.0
     origin = (left + 250.0, top + tall - 22.0)
 
