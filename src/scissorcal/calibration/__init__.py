@@ -3,7 +3,7 @@
 from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
-from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
+from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
 from scissorcal.calibration.store import load_fit, save_fit
@@ -22,7 +22,6 @@ __all__ = [
     "fit_friction",
     "fit_inputs_hash",
     "friction_experiment",
-    "friction_law",
     "load_fit",
     "save_fit",
 ]

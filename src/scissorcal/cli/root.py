@@ -16,6 +16,7 @@ THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 _COMMANDS = {
     "init": ("scissorcal.cli.init:init", "Start a workspace from a recipe."),
     "plan": ("scissorcal.cli.plan:plan", "What the scene needs; done, missing, stale; what next."),
+    "recipe": ("scissorcal.cli.recipe:recipe", "Settings and priors, with defaults."),
     "target": (
         "scissorcal.cli.target:target",
         "Sheets to print: camera board, blade mat, markers.",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.calibration import cutting_from, friction_law
+from scissorcal.calibration import cutting_from
 from scissorcal.model import (
     Cutting,
     FrictionLaw,
@@ -118,5 +118,5 @@ def _join(
         cutting_from(dict(cut.structure), cut_values),
         None
         if friction is None
-        else friction_law(friction_values, float(friction.structure["angle_center"])),
+        else FrictionLaw.of_fit(friction_values, float(friction.structure["angle_center"])),
     )

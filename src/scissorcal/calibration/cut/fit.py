@@ -90,7 +90,7 @@ def fit_cut(
     """
     tell = progress or (lambda done, sentence: None)
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = replace(KnownFriction.of(friction), prior=prior)
+    known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
     sensors = inspect_sensors(recordings, "fit.cut")
     motions = path_motion(recordings, known.inertia, sensors.usable)
     _refuse_no_contact(motions, known, recordings)
@@ -192,7 +192,7 @@ def cut_experiment(
     over other outcomes begins where the fit ended.
     """
     geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = KnownFriction.of(friction)
+    known = KnownFriction.of(friction, recipe.fit.cut.priors)
     motions = path_motion(recordings, known.inertia, inspect_sensors(recordings, "fit.cut").usable)
     law = CutLaw.of(fit.structure)
     scouted = _scouted(motions, known, recipe, geometry, [law], recordings)

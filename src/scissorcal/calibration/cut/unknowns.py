@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.laws import LOAD_SHARE_SD, LOADED
+from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
@@ -216,5 +216,6 @@ def _load(
         return 0.0, "the empty sweeps were loaded, and friction's fit has it.", ""
     if any(LOADED in str(row["name"]) for row in fit.rungs):
         return 0.0, "laws with and without it were compared, and the strokes show none.", ""
-    said = f"jaw tools have up to {LOAD_SHARE_SD:g} of the load as friction, and none was fitted."
-    return LOAD_SHARE_SD * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'
+    usual = recipe.fit.cut.priors.load_share.sd
+    said = f"jaw tools have up to {usual:g} of the load as friction, and none was fitted."
+    return usual * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.friction.terms import NUISANCE, LawParts
 from scissorcal.calibration.parameters import Layout
+from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
 from scissorcal.verdicts import Status, Verdict
 
 Array = NDArray[np.float64]
@@ -21,17 +21,6 @@ MOVED_LIMIT = 4.0
 UNMOVED = 1e-9
 NOTHING = 0.02
 """Share of the drive's standard deviation below which Stribeck friction counts as absent."""
-
-CURES = {
-    "inertia": "check the signs of the torque and of the opening, and record a quicker excitation",
-    "coulomb": "the torque pushes with the motion: check its sign; or an offset larger than "
-    "friction hides in an asymmetric law: set fit.friction.symmetry",
-    "viscous": 'friction falls with the speed: let the ladder have Stribeck (rung = "auto"), check '
-    "for a motor that compensates friction, and record faster sweeps",
-    "stribeck": "static friction would be below Coulomb friction: record slower sweeps, or choose "
-    "a rung without Stribeck",
-    "load_share": "friction would fall with the load: check the sign of the handle force",
-}
 
 
 def physical_verdict(experiment: FrictionExperiment, point: Array, share: float) -> Verdict:
@@ -51,7 +40,7 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
         return Verdict(SCOPE, "physical", "pass", 0.0, CERTAIN, why)
     worst = {level.name: level for level in negative}.values()
     listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
-    cures = "; ".join(dict.fromkeys(CURES[one.stem] for one in worst))
+    cures = "; ".join(dict.fromkeys(one.remedy for one in worst))
     why = f"Freed from the bounds the data want {listed}, which no joint has: {cures}."
     value = max(one.sds_below for one in worst)
     return Verdict(SCOPE, "physical", "fail", value, CERTAIN, why)
@@ -113,8 +102,10 @@ class _Level:
     sd: float
 
     @property
-    def stem(self) -> str:
-        return self.name.removesuffix("_pos").removesuffix("_neg")
+    def remedy(self) -> str:
+        """What to do where the level is negative, empty for what may be so."""
+        row = side_of(self.name, PARAMETERS)
+        return PARAMETERS[row].remedy if row is not None else ""
 
 
 def _rated(experiment: FrictionExperiment, values: dict[str, float]) -> list[dict[str, float]]:
@@ -129,8 +120,7 @@ def _rated(experiment: FrictionExperiment, values: dict[str, float]) -> list[dic
         return rows
     felt = level * float(np.sqrt(np.mean(_slope(experiment, values, "stribeck") ** 2)))
     if felt < NOTHING * float(np.std(experiment.observed)):
-        names = experiment.layout.names
-        slow = float(np.exp(experiment.layout.mean[names.index("stribeck_rate")]))
+        slow = experiment.slow_rate
         rows += [{**values, "stribeck_rate": factor * slow} for factor in (0.3, 1.0, 3.0)]
     return rows
 
@@ -139,7 +129,7 @@ def _freed(experiment: FrictionExperiment, values: dict[str, float], share: floa
     """Levels of a free least-squares fit near a point."""
     layout = experiment.layout
     offered = []
-    if LawParts.of(str(experiment.key["law"])).base == "coulomb":
+    if side_of("viscous_pos", values) is None:
         sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
         offered = [f"viscous{side}" for side in sides]
     names = [*(name for name in layout.names if name != "noise"), *offered]
@@ -156,7 +146,7 @@ def _freed(experiment: FrictionExperiment, values: dict[str, float], share: floa
         value = values.get(name, 0.0) + float(moved / unit)
         below = -value / float(sd / unit) if sd > 0 and np.isfinite(unit) else 0.0
         levels.append(_Level(below, name, value, float(sd / unit)))
-    return [level for level in levels if level.stem in CURES]
+    return [level for level in levels if level.remedy]
 
 
 def _slope(experiment: FrictionExperiment, values: Mapping[str, float], name: str) -> Array:

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.cogging import Cogging
-from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
+from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.signals.segments import stretches
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.inference import Posterior
 from scissorcal.kernel import presliding_path
-from scissorcal.model import friction_torque
+from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ def sample_noise(law: FrictionExperiment, point: Array) -> TorqueNoise | None:
     """
     windows = law.windows
     values = law.layout.natural(point)
-    friction = friction_law(values, float(law.key["angle_center"]))
+    friction = FrictionLaw.of_fit(values, float(law.key["angle_center"]))
     state = None
     if "presliding_length" in values:
         length = float(values["presliding_length"])

@@ -13,6 +13,7 @@ from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.errors import InputError
+from scissorcal.model.friction_terms import terms_of
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -146,11 +147,11 @@ def predict_effort(
     """
     windows = weigh(recordings, cutoff_Hz)
     bins = windows.bins
+    adopt = tuple(fit.structure.get("adopt", ()))
     basis = FrictionBasis(
         windows,
         float(fit.structure["angle_center"]),
-        angle=True,
-        terms=tuple(fit.structure.get("adopt", ())),
+        terms_of(str(fit.structure["law"]), adopt),
         cogging=float(fit.structure.get("cogging_periods_per_turn", 0.0)),
     )
     values = _values(fit)

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.columns import FrictionBasis
-from scissorcal.calibration.friction.terms import LawParts
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.errors import InputError
+from scissorcal.model.friction_terms import needs_load, terms_of
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ def two_ended(fit: FitResult, recordings: tuple[Recording, ...], cutoff_Hz: floa
 
     Raises InputError as :func:`predict_load` does.
     """
-    if not LawParts.of(str(fit.structure["law"])).load:
+    if not needs_load(str(fit.structure["law"])):
         raise InputError(
             f'The law "{fit.rung}" knows no load: fit one that does (fit.friction.rung with '
             '"+load") to recordings of both ends.'
@@ -104,18 +104,13 @@ class LoadSolver:
     """Solves a law for the load: linear in it on either side of zero."""
 
     def __init__(self, fit: FitResult, windows: Windows) -> None:
-        parts = LawParts.of(str(fit.structure["law"]))
+        terms = terms_of(str(fit.structure["law"]), tuple(fit.structure.get("adopt", ())))
         center = float(fit.structure["angle_center"])
         assert windows.load is not None
         self.bins = windows.bins
         self.driven = windows.bins.drive + windows.average(windows.load)
         self.bases = [
-            FrictionBasis(
-                replace(windows, load=np.full_like(windows.rate, load)),
-                center,
-                angle=parts.angle,
-                terms=tuple(fit.structure.get("adopt", ())),
-            )
+            FrictionBasis(replace(windows, load=np.full_like(windows.rate, load)), center, terms)
             for load in (-1.0, 0.0, 1.0)
         ]
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.calibration import friction_law
 from scissorcal.calibration.result import FitResult
-from scissorcal.model.friction import friction_torque
+from scissorcal.model.friction import FrictionLaw, friction_torque
 from scissorcal.report.numbers import Number, finite, finite_each, unit_text, with_unit
 from scissorcal.report.reduce import Array, thinned
 from scissorcal.report.sections.torque import effort_word, position_word
@@ -99,7 +98,7 @@ def draw_friction(
 def friction_of(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
-    return friction_torque(friction_law(named, _center(fit)), opening, rate)
+    return friction_torque(FrictionLaw.of_fit(named, _center(fit)), opening, rate)
 
 
 def _center(fit: FitResult) -> float:
