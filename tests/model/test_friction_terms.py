@@ -115,6 +115,7 @@ def test_a_law_is_the_sum_of_its_rows(name):
         steps = (friction_level(law, sign, speed[1:] + step)[0] for step in (1e-6, -1e-6))
         assert slope[1:] == pytest.approx((next(steps) - next(steps)) / 2e-6, abs=1e-8)
     place, step = np.linspace(0.0, 1.0, 5), 1e-6
+    assert angle_factor(law, place).shape == place.shape
     rise = (angle_factor(law, place + step) - angle_factor(law, place - step)) / (2 * step)
     assert angle_slope(law, place) == pytest.approx(rise, abs=1e-8)
 

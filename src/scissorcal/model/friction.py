@@ -108,7 +108,7 @@ def friction_level(law: FrictionLaw, sign: float, speed: Array) -> tuple[Array, 
 def angle_factor(law: FrictionLaw, opening: ArrayLike) -> Array:
     """The factor by which friction changes with the opening; 1 at the law's centre."""
     away = np.asarray(opening, dtype=np.float64) - law.angle_center
-    return np.asarray(1.0 + sum(c * away**power for c, power in _place(law)))
+    return np.asarray(1.0 + 0.0 * away + sum(c * away**power for c, power in _place(law)))
 
 
 def angle_slope(law: FrictionLaw, opening: ArrayLike) -> Array:

@@ -168,7 +168,7 @@ def predict_far_load(
 ) -> Prediction:
     """Predict the load at the passive end from torque and motion at the driven one.
 
-    See :func:`scissorcal.calibration.friction.transmission.predict_load` for the law.
+    See :mod:`scissorcal.calibration.friction.transmission` for the law.
     """
     windows = two_ended(fit, recordings, cutoff_Hz)
     assert windows.load is not None
