@@ -216,7 +216,7 @@ def _bandwidth(
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
-    """Fit the same law once more over shorter windows, from where the fit ended."""
+    """Fit the same law over shorter windows, starting from the optimum."""
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
         return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
@@ -244,24 +244,23 @@ def _bandwidth(
 
 
 def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
-    """What was left out near rest, and how late torque was measured."""
+    """Notes on the time that is left out, on window length and on the delay of the torque."""
     left = 1.0 - len(windows.first) / len(every.first)
     notes = [
-        f"{left:.1%} of the time the joint rests or turns, or moves by less than "
-        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
-        "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
-        "it is left out."
+        f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
+        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
+        "show the direction), or a sensor is faulty."
     ]
     if windows.lengthening > 1.0:
         notes.append(
             f"The encoder's steps are coarse: windows pass half at {windows.half_at:.3g} Hz, "
-            "below fit.friction.cutoff_Hz, so that the steps do not lower the inertia."
+            "below fit.friction.cutoff_Hz, to keep the steps from biasing the inertia."
         )
     if "delay" in posterior.names:
         delays = posterior.draws[:, posterior.names.index("delay")]
         notes.append(
             f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
-            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms), which the fit takes into account."
+            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
         )
     return tuple(notes)
 
@@ -278,12 +277,12 @@ def _refuse_poor_motion(
     if len(bins.rate) < FEWEST_BINS:
         travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
         if sensors.verdict.status == "fail":
-            raise InputError(f"{names}: hardly a sample is left to fit. {sensors.verdict.why}")
+            raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
         if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
             raise InputError(
                 f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
-                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps "
-                "leave its direction open: record faster sweeps, or lower fit.friction.cutoff_Hz."
+                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder does not "
+                "show its direction: record faster sweeps, or lower fit.friction.cutoff_Hz."
             )
         raise InputError(
             f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
@@ -295,17 +294,17 @@ def _refuse_poor_motion(
         missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
         raise InputError(
             f"{names}: the motion has one direction only; the {missing} one is missing. "
-            "Friction cannot be told from an offset: capture sweeps in both directions."
+            "Friction and an offset are not distinguishable: capture sweeps in both directions."
         )
     if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
         raise InputError(
-            f"{names}: the drive torque is constant although the joint moves; check the "
+            f"{names}: the drive torque is constant while the joint moves; check the "
             "motor_torque column or the sensor's connection."
         )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
-    """Refuse what cannot be fitted to these recordings: loads where none was measured, angles."""
+    """Refuse terms that these recordings cannot determine: of a load or angle that they lack."""
     named = "" if settings.rung == "auto" else settings.rung
     own = terms_of(named) if named else ()
     wanted = [f'fit.friction.rung = "{named}"'] if any(one.needs_load for one in own) else []
@@ -315,11 +314,11 @@ def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None
             f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
             "one that hardly varies: record sweeps in which motor and handle work against each "
             "other by various amounts (motor_torque and handle_force, with handle_radius), or "
-            "choose a rung without load."
+            "choose a law without load."
         )
     angles = [name for name in settings.adopt if TERMS[name].rotary]
     if angles and joint.kind == "linear":
-        raise InputError(f'The term "{angles[0]}" is of an angle; this joint is a linear one.')
+        raise InputError(f'The term "{angles[0]}" needs an angle, and this joint is linear.')
     known = {name for one in own or terms_of("coulomb") for name in one.covers}
     for name in settings.adopt:
         if name in known or settings.adopt.count(name) > 1:

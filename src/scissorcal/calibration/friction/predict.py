@@ -1,4 +1,4 @@
-"""What a friction fit predicts of a new stroke or recording, with a band that held-out ones set."""
+"""Predictions of a friction fit for new motion, with a band calibrated on held-out data."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -45,14 +45,14 @@ class Band:
     def sentence(self) -> str:
         """What the band promises, in one sentence."""
         ground = (
-            f"by the errors on {self.count} {self.unit}s, each predicted without itself"
+            f"its width is from the errors on {self.count} held-out {self.unit}s"
             if self.conformal
-            else f"by the errors on {self.count} {self.unit}s, each predicted without itself, and "
-            "widened by Student's t as these are few"
+            else f"its width is from the errors on {self.count} held-out {self.unit}s, widened by "
+            "Student's t because these are few"
         )
         return (
-            f"A measured sample of a new {self.unit}, made as those of the fit were, lies in the "
-            f"band with a probability of {self.level:.0%}, {ground}."
+            f"{self.level:.0%} of the samples of a new {self.unit}, recorded like those of the "
+            f"fit, lie in the band: {ground}."
         )
 
 
@@ -226,8 +226,8 @@ class _Folds:
         labels = np.unique(index)
         if len(labels) < 2:
             raise InputError(
-                "A band needs strokes that the law has not seen, and there is only one: record "
-                "several strokes, or two recordings, and fit again."
+                "A band needs held-out strokes, and there is only one stroke: record several "
+                "strokes, or two recordings, and fit again."
             )
         values = {name: float(value) for name, value in _values(fit).items()}
         return cls(normal, design.layout.unconstrained(values), unit, index, labels)
