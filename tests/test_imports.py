@@ -22,7 +22,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "kernel": set(),
     "model": set(),
     "inference": set(),
-    "recipe": set(),
+    "recipe": {"model"},
     "recording": {"recipe"},
     "device": {"kernel", "recipe", "recording"},
     "vision": {"recipe", "model"},

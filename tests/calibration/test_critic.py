@@ -10,7 +10,8 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.candidates import climb
 from scissorcal.calibration.critic import FEWEST_STROKES, RECURS, criticise
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.model.terms import TERMS, Motion
+from scissorcal.model.friction_terms import TERMS
+from scissorcal.model.terms import Motion
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps

@@ -72,7 +72,7 @@ def test_wrong_files_and_laws_are_refused_with_the_mend(
     at = ("-w", fitted.root)
     said = cli("predict", "load", fresh, *at)
     assert said.code == 2
-    assert "knows no load" in said.err
+    assert "has no load" in said.err
     said = cli("predict", "friction", tmp_path / "none.mcap", *at)
     assert said.code == 2
     assert "does not exist" in said.err

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
     from scissorcal.calibration.fit_model import Experiment
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
-    from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
+    from scissorcal.calibration.friction.model import FrictionExperiment
     from scissorcal.calibration.hashing import fit_inputs_hash
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
     from scissorcal.calibration.store import load, load_fit, read_header, save
@@ -26,7 +26,6 @@ __all__ = [
     "fit_friction",
     "fit_inputs_hash",
     "friction_experiment",
-    "friction_law",
     "load",
     "load_fit",
     "read_header",
@@ -39,7 +38,7 @@ _HOMES = {
     "cut.structure": ("cutting_from",),
     "fit_model": ("Experiment",),
     "friction.fit": ("fit_friction", "friction_experiment"),
-    "friction.model": ("FrictionExperiment", "friction_law"),
+    "friction.model": ("FrictionExperiment",),
     "hashing": ("fit_inputs_hash",),
     "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
     "store": ("load", "load_fit", "read_header", "save"),

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scissorcal.calibration.candidates import Climbed, beaten, split_strokes
 from scissorcal.calibration.result import Proposal
 from scissorcal.inference import gradient, ljung_box
-from scissorcal.model.terms import TERMS, Motion, Term, evaluate
+from scissorcal.model.friction_terms import TERMS, evaluate
+from scissorcal.model.terms import Motion, Term
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]

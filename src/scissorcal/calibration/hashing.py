@@ -6,7 +6,7 @@ import json
 from scissorcal.model import EdgeBelief
 from scissorcal.recording.recording import Recording
 
-ALGORITHM = 7
+ALGORITHM = 8
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 

@@ -16,7 +16,8 @@ THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 
 _COMMANDS = {
     "init": ("scissorcal.cli.init:init", "Start a workspace from a recipe."),
-    "plan": ("scissorcal.cli.plan:plan", "What is done, missing or stale, and the next command."),
+    "plan": ("scissorcal.cli.plan:plan", "The state of every step, and the next command."),
+    "recipe": ("scissorcal.cli.recipe:recipe", "Settings and priors, with defaults."),
     "target": ("scissorcal.cli.target:target", "Sheets to print: camera board, mat, markers."),
     "capture": ("scissorcal.cli.capture:capture", "Record friction, cuts or photographs."),
     "import": ("scissorcal.cli.import_:import_", "Import a log (CSV, Parquet, .mat) or a camera."),

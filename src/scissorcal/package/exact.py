@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.calibration.cut.structure import cutting_from
-from scissorcal.calibration.friction.model import friction_law
 from scissorcal.model import (
     Cutting,
     FrictionLaw,
@@ -122,5 +121,5 @@ def _join(
         cutting_from(dict(cut.structure), cut_values),
         None
         if friction is None
-        else friction_law(friction_values, float(friction.structure["angle_center"])),
+        else FrictionLaw.of_fit(friction_values, float(friction.structure["angle_center"])),
     )

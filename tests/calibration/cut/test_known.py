@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.model import friction_torque
+from scissorcal.recipe.priors import CutPriors
 from tests.package.fits import friction_fit
 
 RATE, LEVEL = 0.1, 0.015
@@ -58,4 +59,4 @@ def test_the_standard_deviation_is_of_the_posteriors_core():
     draws[:20, [p.name for p in fit.parameters].index("coulomb")] += 0.05
     wide, narrow = KnownFriction.of(replace(fit, draws=draws)), KnownFriction.of(fit)
     assert wide.closing_sd == pytest.approx(narrow.closing_sd, rel=0.1)
-    assert narrow.closing_sd > OFFSET_SD_FLOOR
+    assert narrow.closing_sd > CutPriors().friction_sd_floor_Nm

@@ -118,9 +118,9 @@ def standing_clock(recording: Recording) -> Recording:
     [
         (still, "hardly any motion"),
         (one_way, r"positive \(opening\) one is missing"),
-        (silent, "constant although the joint moves"),
+        (silent, "constant while the joint moves"),
         (standing_clock, "clock does not advance"),
-        (coarse, "leave its direction open"),
+        (coarse, "does not show its direction"),
     ],
 )
 def test_poor_recordings_are_refused_with_what_is_missing(recording, spoil, says):

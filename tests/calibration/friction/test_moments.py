@@ -9,6 +9,7 @@ from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.inference.curvature import gradient
+from scissorcal.recipe.priors import JointPriors
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from tests.calibration.truth import Truth, friction_recording
@@ -38,7 +39,7 @@ def windows():
 def experiment(windows, law: str, symmetric: bool = False, cogging: float = 120.0):
     joint = friction_recording(Truth(), np.random.default_rng(1)).joint
     strokes = windows.bins.stroke
-    return design(windows, strokes, law, symmetric, joint, ("rate^2",), cogging)
+    return design(windows, strokes, law, symmetric, joint, JointPriors(), ("rate^2",), cogging)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -105,7 +106,7 @@ def test_the_scan_finds_a_length_far_from_every_start(length):
     windows = every.where(every.bins.moving)
     ways = np.sign(windows.bins.rate)
     strokes = np.cumsum(np.diff(ways, prepend=ways[:1]) != 0)
-    one = design(windows, strokes, "coulomb+presliding", True, recording.joint)
+    one = design(windows, strokes, "coulomb+presliding", True, recording.joint, JointPriors())
     rung = one.rung(one.observed)
     problem = rung.problem(one.series)
     found = search(problem)

@@ -12,6 +12,7 @@ from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
+from scissorcal.model.transforms import IDENTITY, LOG
 
 Array = NDArray[np.float64]
 
@@ -26,10 +27,10 @@ def columns() -> Array:
 
 LAYOUT = Layout(
     (
-        Parameter("offset", "N m", "identity", 0.0, 3.0, ""),
-        Parameter("slope", "N m", "identity", 0.0, 3.0, ""),
-        Parameter("level", "N m", "log", 0.0, 1.0, ""),
-        Parameter("noise", "N m", "log", -1.0, 2.0, ""),
+        Parameter("offset", "N m", IDENTITY, 0.0, 3.0, ""),
+        Parameter("slope", "N m", IDENTITY, 0.0, 3.0, ""),
+        Parameter("level", "N m", LOG, 0.0, 1.0, ""),
+        Parameter("noise", "N m", LOG, -1.0, 2.0, ""),
     )
 )
 

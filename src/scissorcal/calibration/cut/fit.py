@@ -82,7 +82,7 @@ class _Data:
         prior: StatedPrior | None = None,
     ) -> "_Data":
         geometry = belief_geometry(recipe, edge or edge_of(recipe))
-        known = replace(KnownFriction.of(friction), prior=prior)
+        known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
         sensors = inspect_sensors(recordings, "fit.cut")
         motions = path_motion(recordings, known.inertia, sensors.usable)
         return cls(recordings, recipe, friction, edge, geometry, known, sensors, motions)

@@ -11,17 +11,14 @@ from scissorcal.calibration.cut.path import (
     material_of,
     torque_noise_of,
 )
-from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.recipe.priors import CutPriors
 
 Array = NDArray[np.float64]
 
-OFFSET_SD_FLOOR = 1e-4
-"""Least standard deviation (N m) of friction in one stroke: levels differ by stroke and speed by
-more than the empty sweeps' posterior says."""
 USUAL_RATE = 0.3
 RATES = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])
 """Rates (rad/s) at which two laws of friction are compared."""
@@ -52,37 +49,32 @@ class KnownFriction:
     prior: StatedPrior | None = None
 
     @classmethod
-    def of(cls, friction: FitResult) -> "KnownFriction":
-        """Take a finished fit of friction."""
+    def of(cls, friction: FitResult, priors: CutPriors | None = None) -> "KnownFriction":
+        """Take a finished fit of friction, with the recipe's priors of a cut or their defaults."""
+        floor = (priors or CutPriors()).friction_sd_floor_Nm
         centre = float(friction.structure["angle_center"])
         means = _middle(friction, centre)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
         # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
-            max(OFFSET_SD_FLOOR, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
+            max(floor, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
         )
-        stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", OFFSET_SD_FLOOR))
+        stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", floor))
         return cls(
-            law=friction_law(_of_law(means), centre),
+            law=FrictionLaw.of_fit(means, centre),
             offset=float(means.get("offset", 0.0)),
             inertia=float(means["inertia"]),
             cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
             noise=torque_noise_of(friction.diagnostics),
             closing_sd=closing,
             opening_sd=opening,
-            stroke_sd=max(OFFSET_SD_FLOOR, stroke),
+            stroke_sd=max(floor, stroke),
         )
 
     def material(self, motion: PathMotion) -> Material:
         """Work and torque of the material along a motion, friction and cogging taken off."""
         return material_of(motion, self.law, self.offset, self.cogging)
-
-
-def _of_law(values: dict[str, Array]) -> dict[str, Array]:
-    """Parameters of the friction law, without those of the drive and the noise."""
-    others = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
-    return {name: value for name, value in values.items() if name not in others}
 
 
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
@@ -109,5 +101,5 @@ def _spread(friction: FitResult, centre: float, rate: float) -> float:
 
 def _level(values: dict[str, Array], centre: float, rate: float) -> Array:
     """Friction and offset together at one rate, of one set of values or of many draws."""
-    torque = friction_torque(friction_law(_of_law(values), centre), centre, rate)
+    torque = friction_torque(FrictionLaw.of_fit(values, centre), centre, rate)
     return np.asarray(torque + values.get("offset", np.asarray(0.0)))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.laws import LOAD_SHARE_SD, LOADED
+from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
@@ -219,5 +219,6 @@ def _load(
         return 0.0, "loaded sweeps were recorded, and the friction fit includes it.", ""
     if any(LOADED in str(row["name"]) for row in fit.rungs):
         return 0.0, "candidates with and without it were compared; the strokes show none.", ""
-    said = f"jaw tools lose up to {LOAD_SHARE_SD:.0%} of the load to friction, and none was fitted."
-    return LOAD_SHARE_SD * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'
+    usual = recipe.fit.cut.priors.load_share.sd
+    said = f"jaw tools lose up to {usual:.0%} of the load to friction, and none was fitted."
+    return usual * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.result import FitResult
-from scissorcal.model.friction import friction_torque
+from scissorcal.model.friction import FrictionLaw, friction_torque
 
 Array = NDArray[np.float64]
 
@@ -101,7 +100,7 @@ def friction_map(fit: FitResult) -> FrictionMap | None:
 def friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
-    return friction_torque(friction_law(named, _center(fit)), opening, rate)
+    return friction_torque(FrictionLaw.of_fit(named, _center(fit)), opening, rate)
 
 
 def _draws(fit: FitResult, most: int) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
+    BetweenRecordings,
     compare_recordings,
     jackknife,
     widened,
@@ -29,7 +31,6 @@ from scissorcal.calibration.friction.noise import (
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.friction.terms import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
@@ -39,22 +40,13 @@ from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, Stop, infer, tails_of
-from scissorcal.model.terms import TERMS
+from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, TERMS, needs_load, terms_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict
 
 Progress = Callable[[float, str], None]
 
-LAWS = (
-    "coulomb",
-    "coulomb+viscous",
-    "stribeck",
-    "stribeck+angle",
-    "stribeck+angle+load",
-    "stribeck+angle+presliding",
-    "stribeck+angle+load+presliding",
-)
 DRAFT_LAWS = {
     "rotary": "stribeck + angle, asymmetric",
     "linear": "coulomb + viscous, symmetric",
@@ -83,14 +75,12 @@ def fit_friction(
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
-    drive = inertia * acceleration + F(opening, rate) + offset + noise, over the ladder coulomb,
-    + viscous, + Stribeck, + angle, + load (where one was measured), + presliding, each symmetric or
-    not. An asymmetric law has no offset of its
-    own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
-    alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
-    the handles, and an offset of a sensor is not. The rung that unseen strokes
-    cannot tell from the best is taken, the cheapest first, unless ``settings`` name one. Works
-    for a rotary joint and for a linear one; units follow the recordings' joint. Two or more
+    drive = inertia * acceleration + F(opening, rate) + offset + noise, with the candidate laws of
+    :mod:`scissorcal.model.friction_terms`, each symmetric or not. An asymmetric law has no offset:
+    unequal Coulomb levels contain it. Where both explain the data alike, a linear joint gets the
+    offset, and scissors the unequal levels: those are felt through the handles, and an offset of a
+    sensor is not. The cheapest law is taken whose error on held-out strokes is not distinguishable
+    from the best, unless ``settings`` name one. Units follow the recordings' joint. Two or more
     recordings are also fitted each by itself, and draws widened by what they differ in.
 
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
@@ -103,22 +93,15 @@ def fit_friction(
     sensors = inspect_sensors(recordings)
     every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
     windows = every.where(every.bins.moving)
-    bins = windows.bins
-    _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
+    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
     _refuse_terms(settings, windows, joint)
-    strokes = _strokes(bins)
-    every_law, cogging = _ladder(windows, strokes, settings, joint, prior)
-    ladder = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    climbed: list[Climbed] = []
-    for index, candidate in enumerate(ladder):
-        tell(0.6 * index / len(ladder), f"friction: trying {candidate.name}")
-        climbed.append(climb(candidate.rung(bins.drive), bins.series, strokes, stop))
-    chosen = choose(climbed, float(np.sqrt(np.mean(bins.drive**2))))
-    chosen = _with_tails(chosen, climbed, ladder, bins, strokes)
-    law = next(design for design in ladder if design.name == chosen.rung.name)
+    every_law, cogging = _laws(windows, settings, joint, prior)
+    laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
+    climbed, chosen = _compare(laws, stop, tell)
+    law = next(design for design in laws if design.name == chosen.rung.name)
     tell(0.6, f"friction: inferring {chosen.rung.name}")
     posterior = infer(
-        chosen.rung.problem(bins.series),
+        chosen.rung.problem(law.series),
         effort,
         rng,
         checkpoint=checkpoint,
@@ -127,16 +110,6 @@ def fit_friction(
         progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
     )
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
-    noise = sample_noise(law, chosen.optimum.point)
-    diagnostics = {
-        "window_lengthening": windows.lengthening,
-        "jackknife_sd": jackknife(law, chosen.optimum.point, NUISANCE),
-        **(between.diagnostics() if between else {}),
-        **noise_diagnostics(noise),
-        "stroke_offset_sd_Nm": stroke_offsets(
-            chosen.rung.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
-        ),
-    }
     usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
         what="friction",
@@ -145,10 +118,10 @@ def fit_friction(
         climbed=climbed,
         chosen=chosen,
         structure={**chosen.rung.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
-        bins=bins,
-        strokes=strokes,
-        measured=bins.drive,
-        contact=np.full(len(bins.drive), np.nan),
+        bins=law.bins,
+        strokes=law.strokes,
+        measured=law.observed,
+        contact=np.full(len(law.observed), np.nan),
         recordings=recordings,
         joint=joint,
         inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
@@ -165,12 +138,12 @@ def fit_friction(
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint),
-            *draft_note(effort, every_law, ladder),
+            *draft_note(effort, every_law, laws),
             *cogging_notes(cogging, posterior, joint),
             usage.sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
-        extra_diagnostics=diagnostics,
+        extra_diagnostics=_diagnostics(law, chosen, between),
     )
 
 
@@ -188,29 +161,50 @@ def friction_experiment(
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
-    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
+    strokes = _strokes(windows.bins)
+    found = design(windows, strokes, law, symmetric, joint, settings.priors, adopt, cogging)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
 
 
-def _with_tails(
-    chosen: Climbed,
-    climbed: list[Climbed],
-    ladder: list[FrictionExperiment],
-    bins: Bins,
-    strokes: NDArray[np.int64],
-) -> Climbed:
-    """Fit the chosen law again with a Student-t noise where its residuals have outliers.
+def _compare(
+    laws: list[FrictionExperiment], stop: Stop | None, tell: Progress
+) -> tuple[list[Climbed], Climbed]:
+    """Fit every candidate law and choose one.
 
-    The fit takes the place of the chosen one in ``climbed``.
+    The chosen law is fitted again with a Student-t noise where its residuals have outliers; that
+    fit takes the place of the first.
     """
+    climbed: list[Climbed] = []
+    for index, law in enumerate(laws):
+        tell(0.6 * index / len(laws), f"friction: trying {law.name}")
+        climbed.append(climb(law.rung(law.observed), law.series, law.strokes, stop))
+    chosen = choose(climbed, float(np.sqrt(np.mean(laws[0].observed ** 2))))
     tails = tails_of(chosen.rung.likelihood.standardised(chosen.optimum.point), chosen.share)
     if tails > OUTLIERS:
-        return chosen
+        return climbed, chosen
     place = next(i for i, candidate in enumerate(climbed) if candidate.rung is chosen.rung)
-    robust = replace(ladder[place], tails=tails).rung(bins.drive)
-    again = climb(replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes)
+    law = laws[place]
+    robust = replace(law, tails=tails).rung(law.observed)
+    starts = chosen.optimum.point[None, :]
+    again = climb(replace(robust, starts=starts), law.series, law.strokes)
     climbed[place] = replace(again, alike=chosen.alike)
-    return climbed[place]
+    return climbed, climbed[place]
+
+
+def _diagnostics(
+    law: FrictionExperiment, chosen: Climbed, between: BetweenRecordings | None
+) -> dict[str, Any]:
+    """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
+    point = chosen.optimum.point
+    noise = sample_noise(law, point)
+    residuals = chosen.rung.likelihood.residuals(point)
+    return {
+        "window_lengthening": law.windows.lengthening,
+        "jackknife_sd": jackknife(law, point, NUISANCE),
+        **(between.diagnostics() if between else {}),
+        **noise_diagnostics(noise),
+        "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),
+    }
 
 
 def _bandwidth(
@@ -222,7 +216,7 @@ def _bandwidth(
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
-    """Fit the same law once more over shorter windows, from where the fit ended."""
+    """Fit the same law over shorter windows, starting from the optimum."""
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
         return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
@@ -250,24 +244,23 @@ def _bandwidth(
 
 
 def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
-    """What was left out near rest, and how late torque was measured."""
+    """Notes on the time that is left out, on window length and on the delay of the torque."""
     left = 1.0 - len(windows.first) / len(every.first)
     notes = [
-        f"{left:.1%} of the time the joint rests or turns, or moves by less than "
-        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
-        "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
-        "it is left out."
+        f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
+        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
+        "show the direction), or a sensor is faulty."
     ]
     if windows.lengthening > 1.0:
         notes.append(
             f"The encoder's steps are coarse: windows pass half at {windows.half_at:.3g} Hz, "
-            "below fit.friction.cutoff_Hz, so that the steps do not lower the inertia."
+            "below fit.friction.cutoff_Hz, to keep the steps from biasing the inertia."
         )
     if "delay" in posterior.names:
         delays = posterior.draws[:, posterior.names.index("delay")]
         notes.append(
             f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
-            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms), which the fit takes into account."
+            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
         )
     return tuple(notes)
 
@@ -284,12 +277,12 @@ def _refuse_poor_motion(
     if len(bins.rate) < FEWEST_BINS:
         travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
         if sensors.verdict.status == "fail":
-            raise InputError(f"{names}: hardly a sample is left to fit. {sensors.verdict.why}")
+            raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
         if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
             raise InputError(
                 f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
-                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps "
-                "leave its direction open: record faster sweeps, or lower fit.friction.cutoff_Hz."
+                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder does not "
+                "show its direction: record faster sweeps, or lower fit.friction.cutoff_Hz."
             )
         raise InputError(
             f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
@@ -301,32 +294,32 @@ def _refuse_poor_motion(
         missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
         raise InputError(
             f"{names}: the motion has one direction only; the {missing} one is missing. "
-            "Friction cannot be told from an offset: capture sweeps in both directions."
+            "Friction and an offset are not distinguishable: capture sweeps in both directions."
         )
     if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
         raise InputError(
-            f"{names}: the drive torque is constant although the joint moves; check the "
+            f"{names}: the drive torque is constant while the joint moves; check the "
             "motor_torque column or the sensor's connection."
         )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
-    """Refuse what cannot be fitted to these recordings: loads where none was measured, angles."""
+    """Refuse terms that these recordings cannot determine: of a load or angle that they lack."""
     named = "" if settings.rung == "auto" else settings.rung
-    wanted = [f'fit.friction.rung = "{named}"'] if LawParts.of(named).load else []
+    own = terms_of(named) if named else ()
+    wanted = [f'fit.friction.rung = "{named}"'] if any(one.needs_load for one in own) else []
     wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
     if wanted and not windows.bears_load:
         raise InputError(
             f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
             "one that hardly varies: record sweeps in which motor and handle work against each "
             "other by various amounts (motor_torque and handle_force, with handle_radius), or "
-            "choose a rung without load."
+            "choose a law without load."
         )
     angles = [name for name in settings.adopt if TERMS[name].rotary]
     if angles and joint.kind == "linear":
-        raise InputError(f'The term "{angles[0]}" is of an angle; this joint is a linear one.')
-    known = {"sign", "1", *(("rate",) if "viscous" in named or "stribeck" in named else ())}
-    known |= {"load", "load*sign"} if LawParts.of(named).load else set()
+        raise InputError(f'The term "{angles[0]}" needs an angle, and this joint is linear.')
+    known = {name for one in own or terms_of("coulomb") for name in one.covers}
     for name in settings.adopt:
         if name in known or settings.adopt.count(name) > 1:
             raise InputError(
@@ -344,34 +337,34 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
     return np.where(bins.stroke >= 0, bins.stroke, planned + runs).astype(np.int64)
 
 
-def _ladder(
-    windows: Windows,
-    strokes: NDArray[np.int64],
-    settings: FitFriction,
-    joint: Joint,
-    prior: StatedPrior | None,
+def _laws(
+    windows: Windows, settings: FitFriction, joint: Joint, prior: StatedPrior | None
 ) -> tuple[list[FrictionExperiment], Cogging]:
-    """The laws to be compared, over columns that they share, with cogging where there is any."""
-    laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
+    """The laws to be compared, over columns that they share, with cogging where there is any.
+
+    Cheapest first; those of the load only where one was measured.
+    """
+    names = [law for law in CANDIDATES if windows.bears_load or not needs_load(law)]
+    names = names if settings.rung == "auto" else [settings.rung]
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
-    plain = design(windows, strokes, laws[0], False, joint, settings.adopt)
-    steady = windows.without_turns
-    clear = plain
-    if not np.all(steady):
-        some = windows.where(steady), strokes[steady]
-        clear = design(*some, laws[0], False, joint, settings.adopt)
-    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(clear.moments)
+    strokes = _strokes(windows.bins)
+
+    def one(law: str, symmetric: bool, periods: float = 0.0) -> FrictionExperiment:
+        priors, adopt = settings.priors, settings.adopt
+        return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior)
+
+    plain = one(names[0], False)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(_clear_of_turns(plain).moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
-    first, *others = (
-        design(windows, strokes, law, symmetric, joint, settings.adopt, periods, prior)
-        for law in laws
-        for symmetric in both[settings.symmetry]
-    )
-    first = first if periods else replace(first, shared=plain.moments)
-    return [first, *(replace(other, shared=first.moments) for other in others)], cogging
+    laws = [one(law, symmetric, periods) for law in names for symmetric in both[settings.symmetry]]
+    shared = laws[0].moments if periods else plain.moments
+    return [replace(law, shared=shared) for law in laws], cogging
 
 
-def _laws(windows: Windows) -> tuple[str, ...]:
-    """Laws to be compared, cheapest first: those of the load only where one was measured."""
-    return LAWS if windows.bears_load else tuple(law for law in LAWS if not LawParts.of(law).load)
+def _clear_of_turns(law: FrictionExperiment) -> FrictionExperiment:
+    """The same law over the windows that hold no turn."""
+    steady = law.windows.without_turns
+    if np.all(steady):
+        return law
+    return replace(law, windows=law.windows.where(steady), strokes=law.strokes[steady])

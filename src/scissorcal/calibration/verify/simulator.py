@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut import fit_cut
-from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import torque_noise_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.parameters import Layout
@@ -24,6 +24,7 @@ from scissorcal.calibration.verify.simulation import (
     simulate_friction,
 )
 from scissorcal.model import EdgeBelief
+from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording
 
@@ -103,13 +104,13 @@ class CutSimulator:
     @property
     def noise(self) -> str:
         """Description of the noise of the samples."""
-        known = KnownFriction.of(self.friction)
+        known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
         return noise_in_words(known.noise, known.stroke_sd, "N m")
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion through sheets of the truth's material."""
         tick_s = self.motions[0].pieces[0].tick_s
-        known = KnownFriction.of(self.friction)
+        known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
         values = _plain(self.layout, truth)
         return simulate_cut(self.motions, cut_truth(values, self.structure, known, tick_s), rng)
 
@@ -185,4 +186,4 @@ def _plain(layout: Layout, u: Array) -> dict[str, float]:
 
 
 def _finite(value: Any) -> float:
-    return float(value) if np.isfinite(value) else OFFSET_SD_FLOOR
+    return float(value) if np.isfinite(value) else CutPriors().friction_sd_floor_Nm

@@ -167,9 +167,10 @@ def _halves_row(
     layout: Layout, i: int, first: HalfFit, second: HalfFit, covariance: Array, z: Array
 ) -> HalvesRow:
     parameter = layout.parameters[i]
-    low, high = (float(parameter.natural(half.mean[i])) for half in (first, second))
+    natural = parameter.transform.natural
+    low, high = (float(natural(half.mean[i])) for half in (first, second))
     middle, reach = 0.5 * (first.mean[i] + second.mean[i]), 0.5 * np.sqrt(covariance[i, i])
-    sd = float(parameter.natural(middle + reach) - parameter.natural(middle - reach))
+    sd = float(natural(middle + reach) - natural(middle - reach))
     return HalvesRow(parameter.name, parameter.unit, low, high, sd, _finite(z[i]))
 
 

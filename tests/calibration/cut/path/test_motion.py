@@ -23,7 +23,7 @@ from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, record, s
 from tests.calibration.truth import sweep
 
 COARSE = 2 * np.pi / 20_000
-FRICTION = FrictionLaw(coulomb_pos=COULOMB, coulomb_neg=COULOMB)
+FRICTION = FrictionLaw({"coulomb": COULOMB})
 
 
 def spring(opening):

@@ -19,7 +19,7 @@ from scissorcal.model import FrictionLaw
 from tests.calibration.truth import Truth, friction_recording
 
 SILENT = TorqueNoise(0.0, 0.0, 0.01)
-LAW = FrictionLaw(0.013, 0.016, 0.002, 0.002)
+LAW = FrictionLaw({"coulomb_pos": 0.013, "coulomb_neg": 0.016, "viscous": 0.002})
 INERTIA = 2e-4
 
 

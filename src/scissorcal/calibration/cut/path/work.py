@@ -62,10 +62,10 @@ def material_of(
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
     state, direction = None, np.sign(step)
-    if np.any(friction.presliding_share):
-        built = presliding_state(path, float(friction.presliding_length))
+    if np.any(friction["presliding_share"]):
+        built = presliding_state(path, float(friction["presliding_length"]))
         state = 0.5 * (built[1:] + built[:-1])
-        direction = direction + float(friction.presliding_share) * (state - direction)
+        direction = direction + float(friction["presliding_share"]) * (state - direction)
     law = friction_torque(friction, middle, _turning_rate(motion, step), 0.0, state)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2

@@ -58,9 +58,9 @@ def measured_drive(
     sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
     direction, state = np.sign(step), None
     law = truth.friction
-    if np.any(law.presliding_share):
-        state = _built(path, float(law.presliding_length))
-        direction = direction + float(law.presliding_share) * (state - direction)
+    if np.any(law["presliding_share"]):
+        state = _built(path, float(law["presliding_length"]))
+        direction = direction + float(law["presliding_share"]) * (state - direction)
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
     dry = sense * friction_torque(law, middle, step / tick_s, load, state)
     cosine, sine, number = truth.cogging
