@@ -19,8 +19,8 @@ from tests.second_rig import capture_cut, capture_friction, fine, paper, recipe_
 from scissorcal.calibration.cut import teeth
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import mean_torque, path_motion
+from scissorcal.calibration.cut.path.runs import find_runs, split
 from scissorcal.calibration.cut.scout import Scouted, belief_geometry, scout, tooth_periods
-from scissorcal.calibration.cut.segments import find_runs, split
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.model import Response

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.calibration.cut.segments import cut_into_segments, find_runs, split
+from scissorcal.calibration.cut.path.runs import find_runs, split
+from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
     GEOMETRY,
     GUESS,

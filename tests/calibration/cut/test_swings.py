@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.swings import COUNTS_A_TOOTH, swings_unseen
+from scissorcal.calibration.cut.segments import COUNTS_A_TOOTH, swings_unseen
 
 TOOTH_RAD = 1.2e-3
 TICK_S = 1e-3

@@ -37,7 +37,7 @@ def test_a_clean_recording_keeps_every_sample_and_its_step_is_known(clean):
     opening, torque = channels_of(clean)
     assert opening.step == pytest.approx(5e-5)
     assert np.isnan(torque.step)
-    assert any("opening comes in steps of 5e-05 rad" in note for note in found.notes)
+    assert any("opening has a resolution of 5e-05 rad" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -91,7 +91,7 @@ def test_flags_of_the_device_count_and_a_silent_channel_is_named(clean):
     samples["motor_torque"] = 0.25
     found = inspect_sensors((dataclasses.replace(clean, samples=samples),))
     assert not np.any(found.usable[0][5000:5100])
-    assert any("motor_torque is 0.25 N m throughout" in note for note in found.notes)
+    assert any("motor_torque is constant at 0.25 N m" in note for note in found.notes)
 
 
 def test_a_step_is_seen_and_a_smooth_channel_has_none():

@@ -49,4 +49,4 @@ def test_the_speed_that_is_hardly_used_is_named(recording):
     every = weigh((spoilt,), 75.0, sensors.usable)
     sentence = usage_of_windows((spoilt,), every, sensors.usable).sentence
     assert f"at {slow:.3g} per s: 0 s of" in sentence
-    assert "sensor spoilt" in sentence
+    assert "invalid sensor value" in sentence

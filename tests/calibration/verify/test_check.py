@@ -79,7 +79,7 @@ def test_a_rig_that_changes_between_strokes_fails_the_halves():
     """Later strokes have another level, and the halves' standard deviations do not know of it."""
     _, result = checked(made(0.0, naive=True, change=0.3), ("halves",))
     assert status(result)["halves"] == "fail"
-    assert "changes between strokes" in result.verdicts[0].why
+    assert "law or rig change between strokes" in result.verdicts[0].why
 
 
 def test_a_local_prior_is_as_wide_as_stated_and_never_wider_than_the_recipes():
@@ -135,7 +135,7 @@ def test_refusals_count_and_other_laws_are_ranked_by_what_they_share():
     assert [q.name for q in result.calibration.quantities] == ["offset", "level"]
     verdict = next(v for v in result.verdicts if v.check == "refits")
     assert verdict.status == "fail"
-    assert "100.0% took another law" in verdict.why
+    assert "100.0% chose another candidate" in verdict.why
 
 
 def test_a_fit_that_breaks_is_counted_with_its_sentence():
@@ -148,7 +148,7 @@ def test_a_fit_that_breaks_is_counted_with_its_sentence():
     assert all("broken" in record for record in records)
     result = assess(study, fit_of(experiment), ("sbc",), records)
     assert status(result) == {"calibration": "not_evaluated"}
-    assert "Every simulated fit broke" in result.not_done[0]
+    assert "Every simulated fit failed" in result.not_done[0]
 
 
 def test_equal_seeds_give_equal_fits_and_other_indices_others():

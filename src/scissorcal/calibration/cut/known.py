@@ -1,4 +1,4 @@
-"""What a cut's fit takes over from the friction's: levels, inertia, cogging, noise."""
+"""What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
 from dataclasses import dataclass
 
@@ -31,13 +31,12 @@ WITHIN_SD = (0.1587, 0.8413)
 
 @dataclass(frozen=True)
 class KnownFriction:
-    """Friction as the empty sweeps left it.
+    """Friction as fitted to the empty sweeps.
 
-    ``law`` and ``offset`` (N m) are the posterior's mean or its highest point, whichever has the
-    torques in the middle of the posterior: where parameters trade against each other along a bend,
-    their means lie beside it. ``closing_sd`` and ``opening_sd``
-    (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
-    single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
+    ``law`` and ``offset`` (N m) are the posterior's mean or its mode, whichever has torques closer
+    to the posterior median: along a curved ridge the mean lies beside it. ``closing_sd`` and
+    ``opening_sd`` (N m) are how well friction is known in either direction over all strokes,
+    ``stroke_sd`` what single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
     what the motor adds to the measured drive. ``prior`` takes the recipe's place where a study of
     simulated data states one.
     """
@@ -81,13 +80,13 @@ class KnownFriction:
 
 
 def _of_law(values: dict[str, Array]) -> dict[str, Array]:
-    """Parameters that a friction law has, without those of the drive and the noise."""
+    """Parameters of the friction law, without those of the drive and the noise."""
     others = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
     return {name: value for name, value in values.items() if name not in others}
 
 
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
-    """Values by name: means, or the highest point where its torques are nearer to the middle."""
+    """Values by name: means, or the mode where its torques are closer to the median."""
     means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
     names = [p.name for p in friction.parameters]
     highest = {**means, **dict(zip(names, np.asarray(friction.map_point), strict=True))}

@@ -1,4 +1,4 @@
-"""What of a cut's recordings enters its fit, by stroke and speed, and why the rest does not."""
+"""Which samples of a cut's recordings the fit uses, by stroke and speed, and why not the others."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ FREE = "blades free of the material"
 def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> Usage:
     """Count the samples that elastic and running segments span.
 
-    Between the end of loading and where a running crack is trusted a crack is about to start, and
-    no segment can say when. The rest of a stroke is spent free of the material, or on the turn.
+    Between the end of loading and the first running segment the crack starts at an unknown sample.
+    In the rest of a stroke the blades are free of the material, or turn.
     """
     sizes = [len(recording.samples) for recording in recordings]
     masks = {
@@ -50,7 +50,7 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
 
 
 def usage_sentence(recordings: tuple[Recording, ...], usage: Usage) -> str:
-    """How much of the closing strokes is used, and of which speed least: opening ones are free."""
+    """How much of the closing strokes is used, and of which speed least."""
     kinds = [stroke.kind for recording in recordings for stroke in recording.strokes]
     closing = [row for row in usage.rows if row.stroke >= 0 and kinds[row.stroke] != "opening"]
     if not closing:

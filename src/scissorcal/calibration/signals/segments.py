@@ -1,4 +1,4 @@
-"""What splits a recording: gaps of its clock, the sheets in place, runs of samples alike."""
+"""Divisions of a recording: pieces without gaps, sheets, runs of equal samples."""
 
 from itertools import pairwise
 
@@ -49,7 +49,7 @@ def edge_samples(rate_Hz: float) -> int:
 
 
 def still_clock(recording: Recording) -> InputError:
-    """Say that the clock of a recording stands still, so that nothing has a rate."""
+    """The error of a recording whose clock stands still."""
     return InputError(
         f"{recording.source or 'The recording'}: its clock does not advance; "
         "check the time column or the device's clock."
@@ -57,7 +57,7 @@ def still_clock(recording: Recording) -> InputError:
 
 
 def no_piece(recordings: tuple[Recording, ...]) -> InputError:
-    """Say that no piece of these recordings is long enough for a rate."""
+    """The error of recordings without a piece that is long enough for a rate."""
     names = ", ".join(recording.source or "recording" for recording in recordings)
     return InputError(
         f"{names}: no stretch without gaps is longer than {EDGES * EDGE_S:g} s and "

@@ -1,4 +1,4 @@
-"""What the sensors did to a recording: steps, ends of range, dead bands, silence."""
+"""Sensor faults in a recording: quantisation, saturation, dead bands, constant channels."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 Scope = Literal["fit.friction", "fit.cut"]
 
 SPOILT_LIMIT = 0.05
-"""Share of samples that a sensor may have spoilt before a fit is no calibration."""
+"""Share of invalid samples above which a fit fails."""
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
 """A run of equal values is one that lasts so long, and has so many samples at any rate of them."""
@@ -67,7 +67,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Sensors:
-    """All sensors over all recordings: which samples may be used, sentences, and a verdict."""
+    """All sensors of all recordings: usable samples, sentences, and a verdict."""
 
     usable: tuple[Mask, ...]
     notes: tuple[str, ...]
@@ -75,15 +75,14 @@ class Sensors:
 
 
 def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.friction") -> Sensors:
-    """Look for what sensors do to data, and mark the samples that they spoilt.
+    """Find saturation and dead bands, and mark the invalid samples.
 
     Saturation is a stretch of equal values at a channel's largest or smallest one, a dead band
-    such a stretch at zero while the joint moves. In a channel with noise chance does not hold a
-    value. A channel without any (quantised, or slow) holds values by itself: there a stretch at an
-    end is saturation if it is flat, unlike a turn, and if no level within the range is held as
-    long, unlike a plateau. A sample that is spoilt is no measurement and is left out of the
-    likelihood; where more than ``SPOILT_LIMIT`` are, what is left cannot stand for the whole, and
-    the verdict, on the fit that ``scope`` names, fails.
+    such a stretch at zero while the joint moves. In a channel with noise, values do not
+    repeat by chance. A channel without noise (quantised, or slow) repeats values: there a stretch
+    at an end is saturation if it is flat, unlike a turn, and if no level within the range is held
+    as long, unlike a plateau. Invalid samples are left out of the likelihood; where their share
+    exceeds ``SPOILT_LIMIT`` the verdict, on the fit that ``scope`` names, fails.
     """
     usable, notes = [], []
     worst, named = 0.0, ""
@@ -241,7 +240,7 @@ def _moves(opening: Array, reach: int) -> Mask:
 
 
 def _flagged(recording: Recording) -> Mask:
-    """Samples that the device itself says it could not measure."""
+    """Samples that the device flags as not measured."""
     flags = np.asarray(recording.samples["flags"], dtype=np.int64)
     wrong = ENCODER_FAULT
     if np.isfinite(recording.handle_radius_m):
@@ -256,9 +255,9 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
     )
     said = []
     if channel.constant:
-        said.append(f"{channel.name} is {channel.low:.6g} {unit} throughout.")
+        said.append(f"{channel.name} is constant at {channel.low:.6g} {unit}.")
     elif np.isfinite(channel.step):
-        said.append(f"{channel.name} comes in steps of {channel.step:.3g} {unit}.")
+        said.append(f"{channel.name} has a resolution of {channel.step:.3g} {unit}.")
     if channel.saturated.any():
         said.append(
             f"{channel.name} is at an end of its range ({channel.low:.3g} to {channel.high:.3g} "
@@ -274,13 +273,10 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
 
 def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
     if worst == 0.0:
-        why = "No sensor reached an end of its range, and none was silent around zero."
+        why = "No sensor saturated, and none has a dead band around zero."
         return Verdict(scope, "sensors", "pass", 0.0, SPOILT_LIMIT, why)
     status: Status = "pass" if worst <= SPOILT_LIMIT else "fail"
-    why = f"{named} in {worst:.1%} of the samples; they are left out."
+    why = f"{named} in {worst:.1%} of the samples (limit {SPOILT_LIMIT:.0%}); they are left out."
     if status == "fail":
-        why += (
-            " That is too many for what is left to stand for the whole: record again with a "
-            "sensor of a larger range, or slower and with gentler turns."
-        )
+        why += " Record again with a sensor of larger range, or slower and with gentler turns."
     return Verdict(scope, "sensors", status, worst, SPOILT_LIMIT, why)

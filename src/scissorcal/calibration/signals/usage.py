@@ -1,4 +1,4 @@
-"""What was recorded and is not used: seconds by stroke and speed, each with its reason."""
+"""Recorded time that a fit does not use, by stroke and speed, with the reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from scissorcal.recording.recording import Recording
 Mask = NDArray[np.bool_]
 Masks = tuple[Mask, ...]
 
-GAP, EDGE, SPOILT = "gap", "edge of a piece", "sensor spoilt"
+GAP, EDGE, SPOILT = "gap", "edge of a piece", "invalid sensor value"
 SLOW, OTHER = "rest or too slow", "no window"
 LITTLE = 0.5
-"""A stroke of which a smaller share is used is named."""
+"""Speeds of which a smaller share is used are named."""
 
 
 @dataclass(frozen=True)

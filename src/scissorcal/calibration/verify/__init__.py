@@ -1,4 +1,4 @@
-"""The trust check: are intervals right, do halves of the data agree, what does the prior do?"""
+"""The trust check: coverage of the intervals, agreement of two halves, prior sensitivity."""
 
 from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import (

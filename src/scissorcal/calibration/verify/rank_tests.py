@@ -1,4 +1,4 @@
-"""Are ranks uniform? Simultaneous bands and exact p-values for their empirical distribution."""
+"""Tests of uniform ranks: simultaneous bands and exact p-values of their distribution."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +22,7 @@ class EcdfBand:
     """Band in which the empirical distribution of ``count`` uniform ranks stays as a whole.
 
     ``z`` (k,) are shares of the ranks' range, ``low`` and ``high`` (k,) the shares of ranks below
-    it that are still in agreement; the band is left with probability ``alpha`` at most.
+    it that the band allows; a calibrated quantity leaves it with probability ``alpha`` at most.
     """
 
     count: int
@@ -116,7 +116,7 @@ def chi_square_p_value(ranks: Integers, levels: int) -> float:
 
 
 def acceptance(count: int, probability: float, alpha: float) -> tuple[float, float]:
-    """Shares that a binomial of ``count`` trials stays between, but for ``alpha`` of the times.
+    """Shares between which a binomial of ``count`` trials lies with probability 1 - ``alpha``.
 
     >>> acceptance(400, 0.9, 0.05)
     (0.87, 0.9275)

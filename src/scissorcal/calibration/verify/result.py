@@ -1,4 +1,4 @@
-"""What the trust check ends in: calibration, halves, prior sensitivity, verdicts."""
+"""The result of a trust check: calibration, halves, prior sensitivity, verdicts."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -15,10 +15,10 @@ PriorKind = Literal["local", "recipe"]
 
 @dataclass(frozen=True)
 class Coverage:
-    """How often the central interval of probability ``level`` held the truth.
+    """Share of central intervals of probability ``level`` that contain the true value.
 
-    ``share`` stays between ``low`` and ``high`` where intervals are right, for all quantities and
-    levels of one check at once.
+    For correct intervals ``share`` lies between ``low`` and ``high``, for all quantities and levels
+    of a check simultaneously.
     """
 
     level: float
@@ -29,7 +29,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class RankedQuantity:
-    """One parameter, or the effort that all of them predict, over all simulated fits.
+    """One parameter, or the predicted effort, over all simulated fits.
 
     ``ranks`` and ``truths`` (fits,) are the truth's rank among the posterior's draws and its value
     in ``unit``. ``ecdf_p`` and ``chi_square_p`` test the ranks' uniformity, by their empirical
@@ -64,14 +64,14 @@ class RankBand:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Simulation-based calibration of a whole fit over its own motion, with its own noise.
+    """Simulation-based calibration of a whole fit, with its motion and its noise.
 
-    Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` say in words what truths and
-    data were drawn from; ``spread`` is the factor by which the local prior is wider than the
-    posterior. ``escalated`` is the share of fits that went to a higher effort by themselves,
-    ``unreliable`` that of fits whose posterior failed its own diagnostics, ``broken`` the
-    sentences of fits that gave none or refused the data; ``other_law`` the share that took another
-    law, whose ranks count for the quantities that both laws have. ``effective`` is the median
+    Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` describe the distributions of
+    truths and noise; ``spread`` is the factor by which the local prior is wider than the
+    posterior. ``escalated`` is the share of fits that escalated to a higher effort,
+    ``unreliable`` that of fits whose posterior failed its diagnostics, ``broken`` the sentences of
+    fits without a posterior; ``other_law`` the share that chose another law, whose ranks count for
+    the quantities that both laws have. ``effective`` is the median
     number of independent draws of a posterior, ``seconds`` the median time of a fit.
     """
 
@@ -109,14 +109,14 @@ class HalvesRow:
 
 @dataclass(frozen=True)
 class Halves:
-    """Two fits to disjoint strokes, differenced against the uncertainty that they claim.
+    """Two fits to disjoint strokes, and the test of their difference.
 
-    ``first_strokes`` and ``second_strokes`` label the strokes, ``split`` says how they were
-    parted. ``statistic`` is the difference's squared Mahalanobis length over ``dimensions``,
-    ``p_value`` its probability, from an F distribution with ``independent`` observations.
-    ``effort_difference`` is the rms difference of the predicted effort over all the motion, as a
-    share of its rms; ``effort_expected`` what the claimed uncertainty makes one expect, and
-    ``effort_p_value`` the probability of so large a one.
+    ``first_strokes`` and ``second_strokes`` label the strokes, ``split`` describes the split.
+    ``statistic`` is the difference's squared Mahalanobis length over ``dimensions``, ``p_value``
+    its probability, from an F distribution with ``independent`` observations. ``effort_difference``
+    is the rms difference of the predicted effort over all the motion, as a share of its rms;
+    ``effort_expected`` its expectation by the posteriors, and ``effort_p_value`` the probability of
+    a larger one.
     """
 
     split: str
@@ -144,7 +144,7 @@ class SensitivityRow:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Power-scaling sensitivities, the predicted effort's last; above ``threshold`` they matter."""
+    """Power-scaling sensitivities, the predicted effort's last, and their limit ``threshold``."""
 
     threshold: float
     rows: tuple[SensitivityRow, ...]
@@ -154,8 +154,8 @@ class Sensitivity:
 class VerifyResult:
     """The trust check of one fit, as stored in fits/<what>.verify.json.
 
-    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not asked for are None;
-    ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
+    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not requested are None;
+    ``not_done`` says why a requested one could not be done. ``false_alarm`` is the
     probability that any statistical verdict fails although the fit is right.
     """
 

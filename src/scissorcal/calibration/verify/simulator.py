@@ -1,4 +1,4 @@
-"""Who makes raw recordings of a known truth, and fits them as a day's recordings are fitted."""
+"""Simulators: raw recordings of known parameters, and the whole fit of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,11 +31,11 @@ Array = NDArray[np.float64]
 
 
 class Simulator(Protocol):
-    """Data of a known truth, and the whole fit of them. Picklable, for worker processes.
+    """Data of known parameters, and the whole fit of them. Picklable, for worker processes.
 
-    ``noise`` says in words what is added to the law, by samples. ``simulate`` takes unconstrained
-    parameters (p,) of the fit's own layout; ``refit`` takes what it gave, with the prior that
-    truths are drawn from.
+    ``noise`` describes the noise that is added to the samples. ``simulate`` takes unconstrained
+    parameters (p,) of the fit's own layout; ``refit`` fits its result, with the distribution
+    of truths as prior.
     """
 
     @property
@@ -50,7 +50,7 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True)
 class FrictionSimulator:
-    """Empty motion of a rig with other friction (see :class:`Simulator`)."""
+    """Empty sweeps of a rig with other friction (see :class:`Simulator`)."""
 
     motions: tuple[Motion, ...]
     settings: FitFriction
@@ -62,7 +62,7 @@ class FrictionSimulator:
 
     @property
     def noise(self) -> str:
-        """What is added to each sample, in words."""
+        """Description of the noise of the samples."""
         return noise_in_words(self.torque_noise, self.stroke_sd, self._unit)
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
@@ -78,7 +78,7 @@ class FrictionSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, windows, cogging, ladder, posterior."""
+        """The whole fit: sensors, windows, cogging, model comparison, posterior."""
         return fit_friction(
             data, self.settings, effort=effort, rng=rng, last_chosen=self.rung, prior=prior
         )
@@ -102,7 +102,7 @@ class CutSimulator:
 
     @property
     def noise(self) -> str:
-        """What is added to each sample, in words."""
+        """Description of the noise of the samples."""
         known = KnownFriction.of(self.friction)
         return noise_in_words(known.noise, known.stroke_sd, "N m")
 
@@ -120,7 +120,7 @@ class CutSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, segments, scouting, teeth, ladder, posterior."""
+        """The whole fit: sensors, segments, preliminary fit, teeth, model comparison, posterior."""
         return fit_cut(
             data,
             self.recipe,
@@ -171,7 +171,7 @@ def cut_simulator(
 
 
 def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
-    """Describe what is added to simulated samples, for people.
+    """Describe the noise of simulated samples, for people.
 
     >>> noise_in_words(TorqueNoise(1e-3, 5e-4, 0.02), 1e-4, "N m")
     'white 0.001, over 20 ms 0.0005, by stroke 0.0001 N m'

@@ -1,4 +1,4 @@
-"""The torque that drives a motion, as a rig with a known truth would have measured it."""
+"""The drive torque that a rig with known parameters would have measured along a motion."""
 
 from dataclasses import dataclass
 
@@ -23,8 +23,7 @@ class DriveTruth:
     sine, periods per turn) of what it gives besides. ``load_share`` of the material's torque is
     added to friction. ``closing_offset`` and ``opening_offset`` (N m) are added to the
     material's torque by direction, ``stroke_sd`` (N m) is what single strokes differ by.
-    ``delay_s`` is how much later than its sample says the torque is measured, ``noise``
-    what is added to each sample.
+    ``delay_s`` is the delay of the torque measurement, ``noise`` that of each sample.
     """
 
     inertia: float
@@ -80,7 +79,7 @@ def measured_drive(
 
 
 def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator) -> Array:
-    """Noise (count,) of two time scales: white, and one that lasts."""
+    """Noise (count,): a white and an exponentially correlated part."""
     from scipy.signal import lfilter
 
     white = noise.white_Nm * rng.standard_normal(count)

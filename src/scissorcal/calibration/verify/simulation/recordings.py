@@ -1,4 +1,4 @@
-"""Raw recordings of a known truth, over the motion of recordings that there are."""
+"""Simulated recordings of friction and cuts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -62,7 +62,7 @@ def cut_truth(
 ) -> CutTruth:
     """The material and the rig that parameters of a cut's fit, by name, and its structure describe.
 
-    Friction, inertia and cogging are those of the empty sweeps; what these left open is in the
+    Friction, inertia and cogging are those of the empty sweeps; their uncertainty is in the
     offsets among ``values``. Unevenness counts only where something is cut.
     """
     cutting = cutting_from(structure, {n: np.asarray(v) for n, v in values.items()})
