@@ -37,7 +37,7 @@ def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
             ("response_force", "response_exponent", "fracture_energy", "kappa"),
             "0.5 encoder counts per sample",
         ),
-        (fitted(teeth_line=False), ("fracture_energy", "kappa"), "No line of the teeth"),
+        (fitted(teeth_line=False), ("fracture_energy", "kappa"), "No spectral line of the teeth"),
     ],
     ids=["coarse encoder", "no line"],
 )

@@ -128,7 +128,7 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     [
         (["nothing.jpg"], "nothing.jpg is too blurred", 2),
         (["mat.jpg"], "shows the blade mat, not the camera board", 2),
-        (["none.jpg"], "is not there", 2),
+        (["none.jpg"], "does not exist", 2),
     ],
 )
 def test_nothing_is_kept_where_nothing_can_be_used(

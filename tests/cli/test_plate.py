@@ -165,7 +165,7 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
     assert cli("capture", "plate", "-i", one, "--stances", album / "stances.csv").code == 0
     said = cli("fit", "plate", "--json")
     assert said.code == 3
-    assert "the rig stood in one place" in said.envelope["result"]["error"]
+    assert "the rig has the same stance in all pictures" in said.envelope["result"]["error"]
     assert not (workspace / "fits" / "plate.json").exists()
 
 
@@ -254,10 +254,10 @@ def test_no_such_camera_or_video(
     assert "Camera 97 gives no picture" in said.envelope["result"]["error"]
     said = cli("capture", what, "--camera", "gone.mp4")
     assert said.code == 2
-    assert "gone.mp4 is not there" in said.err
+    assert "gone.mp4 does not exist" in said.err
     said = cli("capture", what, "--camera", album / "stances.csv")
     assert said.code == 2
-    assert "is no video that can be read" in said.err
+    assert "is not a readable video" in said.err
     assert captured(workspace) == []
 
 
@@ -266,7 +266,7 @@ def test_a_video_without_the_target_leaves_nothing(
 ) -> None:
     cli("import", album / "camera.yml")
     for size, words in (
-        ((2000, 1500), "in 3 the picture is of one shade"),
+        ((2000, 1500), "in 3 the picture is uniform"),
         ((640, 480), "The pictures are 640 x 480 pixels"),
     ):
         path = tmp_path / f"{size[0]}.avi"

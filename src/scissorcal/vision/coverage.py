@@ -1,4 +1,4 @@
-"""Which places, sizes and slants a board has been seen in, and what is still wanted."""
+"""Coverage of a board's views: places, sizes and slants, and what is still missing."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ _SQUARE_ON = np.radians(12.0)
 
 @dataclass(frozen=True)
 class ViewCoverage:
-    """What has been seen: ninths of the picture, sizes of the board in it, ways it faces.
+    """Covered ninths of the picture, sizes of the board and its slants.
 
     A board is far where it spans less than 40 % of the picture, near where it spans more than 65 %.
     """
@@ -50,7 +50,7 @@ class ViewCoverage:
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """What no photograph has shown yet."""
+        """What no photograph has covered yet."""
         return (
             *(place for place in PLACES if place not in self.places),
             *(size for size in SIZES if size not in self.sizes),
@@ -58,7 +58,7 @@ class ViewCoverage:
         )
 
     def sentence(self) -> str:
-        """Say how much has been seen and what is wanted next."""
+        """Sentence on what is covered and what is still wanted."""
         seen = (
             f"places {len(self.places)} of {len(PLACES)}, sizes {len(self.sizes)} of {len(SIZES)}, "
             f"slants {len(self.slants)} of {len(SLANTS)}"
@@ -69,8 +69,8 @@ class ViewCoverage:
 def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
     """How a board is turned from square-on, to the right and up (rad), by a guess of the camera.
 
-    A focal length of 1.1 times the picture's longer side is right to a third for most cameras,
-    which is enough to tell slants apart.
+    A focal length of 1.1 times the picture's longer side is within a third of most cameras', which
+    is enough to classify slants.
     """
     import cv2
 
@@ -85,7 +85,7 @@ def slant_of(detection: Detection, width: int, height: int) -> tuple[float, floa
 
 
 def detection_words(photo: Photo, detection: Detection) -> str:
-    """Say what was found in a photograph: corners, size of a square, where and how the board is."""
+    """Describe a detection: corners, size of a square, size and slant of the board."""
     size = _size(detection, photo.width, photo.height)
     slant = _slant(detection, photo.width, photo.height)
     words = (

@@ -1,4 +1,4 @@
-"""Pictures for people: what was detected, and how far off a fit is, drawn over the photograph."""
+"""Overlays: detections and a fit's residuals, drawn over the photograph."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +25,7 @@ _ARROW_SHARE = 0.03
 
 
 def detection_overlay(photo: Photo, detection: Detection) -> Picture:
-    """Draw each corner that was found, the first one in red, joined in their order."""
+    """Draw the detected corners, the first one in red, connected in order."""
     import cv2
 
     canvas, scale = _canvas(photo)
@@ -41,11 +41,11 @@ def detection_overlay(photo: Photo, detection: Detection) -> Picture:
 def residual_overlay(
     photo: Photo, pixels: Array, residuals: Array, words: str = "", axes: Array | None = None
 ) -> Picture:
-    """Draw what is left between seen and predicted corners as arrows, with a bar for their scale.
+    """Draw residuals of corners as arrows, with a scale bar.
 
-    Arrows run from where the fit predicts a corner toward where it was seen. All are enlarged so
-    that the middle one is 3 % of the picture's width; those three times as long are red. ``axes``
-    (4, 2) are where a frame's origin and the ends of its x, y and z axes stand.
+    Arrows run from the predicted corner toward the detected one, enlarged so that the median is 3 %
+    of the picture's width; those three times as long are red. ``axes`` (4, 2) are the pixels of a
+    frame's origin and the ends of its x, y and z axes.
     """
     import cv2
 

@@ -39,7 +39,7 @@ def bent(spread: float):
     )
 
 
-def test_means_of_parameters_on_a_bend_are_no_law_of_the_posterior():
+def test_on_a_curved_ridge_the_mode_replaces_the_mean():
     """With Stribeck friction open by a factor of 4.5 they give 2 mN m less than every draw."""
     fit = bent(1.5)
     known = KnownFriction.of(fit)
@@ -51,7 +51,7 @@ def test_means_of_parameters_on_a_bend_are_no_law_of_the_posterior():
     assert means["coulomb"] + bell < LEVEL - 1e-3
 
 
-def test_the_spread_is_that_of_the_posteriors_core():
+def test_the_standard_deviation_is_of_the_posteriors_core():
     """Friction at 0.3 rad/s: a few draws far out do not count."""
     fit = bent(0.3)
     draws = fit.draws.copy()

@@ -72,7 +72,7 @@ def day(rng):
     return replace(made, strokes=tuple(planned))
 
 
-def test_a_whole_capture_with_a_sheet_that_was_never_put_in_is_no_calibration():
+def test_a_capture_with_a_missing_sheet_fails():
     rng = np.random.default_rng(4)
     friction = friction_of(Truth(), rng)
     recipe = paper(response="power", fracture="smooth")

@@ -99,14 +99,14 @@ def test_turning_a_straight_edge_is_shifting_the_opening():
     assert opened == pytest.approx(turned, rel=1e-3)
 
 
-def test_a_stated_zero_takes_the_place_of_half_a_millimetre():
+def test_a_stated_zero_replaces_half_a_millimetre():
     stated, _ = checks(rig(opening_zero_sd_deg=0.02))
     assert stated["opening zero"].status == "pass"
     assert stated["opening zero"].value < 0.05 * checks()[0]["opening zero"].value
     assert "0.5 mm" not in stated["opening zero"].why
 
 
-def test_an_idle_second_takes_the_place_of_the_asymmetry():
+def test_an_idle_second_replaces_the_asymmetry():
     found, _ = checks(recordings=(recording(),))
     fit = checks()[1]
     before = fit.diagnostics["not_measured"][1]["torque_Nm"]
@@ -116,7 +116,7 @@ def test_an_idle_second_takes_the_place_of_the_asymmetry():
     assert torque == pytest.approx(ZERO + 2 * NOISE / np.sqrt(1500), rel=0.2)
 
 
-def test_friction_with_an_offset_of_its_own_renders_no_zero():
+def test_friction_with_an_offset_parameter_has_no_zero_error():
     assert checks(friction=friction_fit())[0]["torque zero"].value == 0.0
 
 

@@ -84,7 +84,7 @@ def test_the_pose_is_recovered(board: MarkedBoard, tilt: float) -> None:
     assert verdict(fit, "rig frame") == "not_evaluated"
 
 
-def test_how_the_target_lies_on_the_plate_is_taken_off(
+def test_the_targets_place_on_the_plate_is_removed(
     still: tuple[Pose, list[PlatePhoto]],
 ) -> None:
     truth, photos = still
@@ -96,7 +96,7 @@ def test_how_the_target_lies_on_the_plate_is_taken_off(
     assert fit.camera_plate.matrix[2, 2] < 0, "the plate's upper face looks at the camera"
 
 
-def test_a_moved_plate_is_noticed_and_named(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_moved_plate_is_detected_and_named(still: tuple[Pose, list[PlatePhoto]]) -> None:
     """Moved a little (its corners still count), and far (they are left out)."""
     truth, photos = still
     for moved_m in (3e-4, 5e-3):
@@ -110,7 +110,7 @@ def test_a_moved_plate_is_noticed_and_named(still: tuple[Pose, list[PlatePhoto]]
     assert verdict(fit_plate(photos, SURE), "at rest") == "pass"
 
 
-def test_one_photograph_cannot_show_that_nothing_moved(
+def test_one_photograph_leaves_motion_not_evaluated(
     still: tuple[Pose, list[PlatePhoto]],
 ) -> None:
     truth, photos = still
@@ -130,7 +130,7 @@ def test_one_small_marker_square_on_is_ambiguous() -> None:
     assert verdict(fit, "size") == "fail"
 
 
-def test_a_camera_that_does_not_hold_is_told(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_wrong_camera_fails_the_checks(still: tuple[Pose, list[PlatePhoto]]) -> None:
     """Grossly: corners do not fit. Slightly: both sides of the target claim other poses."""
     _, photos = still
     fit = fit_plate(photos, SURE)

@@ -1,4 +1,4 @@
-"""Windows: the weak form is exact, both sides are treated alike, rests and spoilt samples go."""
+"""Windows: the weak form is exact, both sides are treated alike, rests and invalid samples go."""
 
 import dataclasses
 
@@ -143,7 +143,7 @@ def test_sticking_and_slipping_in_one_direction_is_a_row_of_rests():
     assert np.count_nonzero(bins.moving) > 200
 
 
-def test_windows_with_spoilt_samples_do_not_count():
+def test_windows_with_invalid_samples_do_not_count():
     time = np.arange(4000) / 1000
     one = recording(np.sin(time), np.cos(time))
     usable = np.ones(4000, dtype=bool)
@@ -154,7 +154,7 @@ def test_windows_with_spoilt_samples_do_not_count():
     assert np.all(windows.bins.moving[~touches & (windows.bins.rate > 0.5)])
 
 
-def test_held_drives_are_known_by_their_commands():
+def test_held_drives_are_recognised_by_their_commands():
     time = np.arange(1000) / 1000
     held = recording(np.sin(time), np.cos(time), commands=np.cos(time))
     assert weigh((held,), 75.0).held

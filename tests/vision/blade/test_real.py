@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.outline import refine_outline
 from scissorcal.vision.blade.photo import photograph_scissors
+from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
 from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.photo import read_photo
@@ -125,6 +126,32 @@ def drawn_curves():
     return outlines
 
 
+REACH_PX, FARTHEST_PX = 4.0, 16.0
+
+
+def refined(light, view, outline):
+    """Border crossings (m, 2) in pixels along a rough outline (n, 2), and which are clear (m,)."""
+    pixels = view.to_pixels(outline)
+    closed = np.vstack([pixels, pixels[:1]])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    count = max(int(length[-1]), 16)
+    even = np.linspace(0.0, length[-1], count, endpoint=False)
+    points = np.stack([np.interp(even, length, closed[:, k]) for k in (0, 1)], axis=1)
+    points = gaussian_filter1d(points, 2.5, axis=0, mode="wrap")
+    along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    sides = sampled(light, points, normals, REACH_PX, REACH_PX)
+    normals = normals * (1.0 if np.median(sides[:, 2] - sides[:, 0]) > 0.0 else -1.0)
+    shift = steepest(light, points, normals, REACH_PX, 1.0, innermost=False)
+    points = points + normals * shift[:, None]
+    found = crossings(light, points, normals, REACH_PX)
+    blur = float(np.median(found.blur))
+    if 4.0 * blur > REACH_PX:
+        found = crossings(light, points, normals, min(4.0 * blur, FARTHEST_PX))
+    return points + normals * found.place[:, None], found.good & (found.outer > found.inner)
+
+
 @needs_drawing
 @pytest.mark.parametrize(
     ("size", "blur", "noise", "median", "worst"),
@@ -146,7 +173,7 @@ def test_a_drawn_pair_is_outlined_to_a_fraction_of_a_pixel(size, blur, noise, me
     tree = cKDTree(np.concatenate(curves))
     away = []
     for outline in (shape.outer, *shape.others, *shape.holes):
-        pixels, clear = refine_outline(read, view, outline)
+        pixels, clear = refined(read, view, outline)
         away.append(tree.query(pixels[clear])[0])
         assert clear.mean() > 0.9
     every = np.concatenate(away)

@@ -276,8 +276,8 @@ class _Builder:
         _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
         step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
         every = split(motion.opening, low, run.high, step)
-        spoilt = np.concatenate([[0], np.cumsum(~motion.usable)])
-        for ends in _parts(every, spoilt):
+        invalid = np.concatenate([[0], np.cumsum(~motion.usable)])
+        for ends in _parts(every, invalid):
             material = self.materials[run.motion]
             path, work = free_path(motion, material, geometry, ends)
             turned = np.diff(motion.opening[ends])
@@ -315,8 +315,8 @@ def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
     return int(last[-1]) + 1 if len(last) else 0
 
 
-def _parts(ends: Integers, spoilt: Integers) -> list[Integers]:
-    good = spoilt[ends[1:] + 1] == spoilt[ends[:-1]]
+def _parts(ends: Integers, invalid: Integers) -> list[Integers]:
+    good = invalid[ends[1:] + 1] == invalid[ends[:-1]]
     parts: list[Integers] = []
     begin = 0
     for index in range(len(good) + 1):

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.calibration.signals.usage import GAP, SPOILT, Usage, count_usage
+from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording
 
 Mask = NDArray[np.bool_]
@@ -22,12 +22,12 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
     sizes = [len(recording.samples) for recording in recordings]
     masks = {
         name: tuple(np.zeros(size, dtype=bool) for size in sizes)
-        for name in ("used", "inside", SPOILT, STARTING)
+        for name in ("used", "inside", INVALID, STARTING)
     }
     for motion in segments.motions:
         span = slice(motion.start, motion.start + len(motion.opening))
         masks["inside"][motion.recording][span] = True
-        masks[SPOILT][motion.recording][span] = ~motion.usable
+        masks[INVALID][motion.recording][span] = ~motion.usable
     loaded: dict[int, list[int]] = {}
     for piece in segments.pieces:
         _mark(masks["used"], segments, piece.motion, int(piece.ends[0]), int(piece.ends[-1]))
@@ -42,7 +42,7 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
             _mark(masks[STARTING], segments, run.motion, before, low)
     reasons = {
         GAP: tuple(~inside for inside in masks["inside"]),
-        SPOILT: masks[SPOILT],
+        INVALID: masks[INVALID],
         STARTING: masks[STARTING],
         FREE: masks["inside"],
     }

@@ -1,4 +1,4 @@
-"""What the fit of a plate's pose ends in."""
+"""The result of a plate's fit."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class PlateView:
 @dataclass(frozen=True)
 class Halves:
     """How far poses of two halves of the corners lie apart, and ``square``, that difference in
-    units of what both claim: a chi-square of six degrees of freedom where the claims are honest."""
+    units of their covariance: a chi-square of six degrees of freedom for correct covariances."""
 
     rotation_deg: float
     translation_mm: float

@@ -16,12 +16,12 @@ Mask = NDArray[np.bool_]
 
 Scope = Literal["fit.friction", "fit.cut"]
 
-SPOILT_LIMIT = 0.05
+INVALID_LIMIT = 0.05
 """Share of invalid samples above which a fit fails."""
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
 """A run of equal values is one that lasts so long, and has so many samples at any rate of them."""
-FEWEST_SPOILT_S = 0.02
+FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
 """The joint moves where its position changes more than twice within so long before and after."""
 NOISY = 0.2
@@ -82,16 +82,16 @@ def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.frict
     repeat by chance. A channel without noise (quantised, or slow) repeats values: there a stretch
     at an end is saturation if it is flat, unlike a turn, and if no level within the range is held
     as long, unlike a plateau. Invalid samples are left out of the likelihood; where their share
-    exceeds ``SPOILT_LIMIT`` the verdict, on the fit that ``scope`` names, fails.
+    exceeds ``INVALID_LIMIT`` the verdict, on the fit that ``scope`` names, fails.
     """
     usable, notes = [], []
     worst, named = 0.0, ""
     for recording in recordings:
         channels = channels_of(recording)
-        spoilt = _flagged(recording)
+        invalid = _flagged(recording)
         source = recording.source or "the recording"
         for channel in channels:
-            spoilt |= channel.saturated | channel.dead
+            invalid |= channel.saturated | channel.dead
             notes += [f"{source}: {said}" for said in _sentences(channel, recording)]
             for share, what in (
                 (float(channel.saturated.mean()), "is at the end of its range"),
@@ -99,7 +99,7 @@ def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.frict
             ):
                 if share > worst:
                     worst, named = share, f"{channel.name} of {source} {what}"
-        usable.append(~spoilt)
+        usable.append(~invalid)
     return Sensors(tuple(usable), tuple(notes), _verdict(scope, worst, named))
 
 
@@ -144,7 +144,7 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     if constant or name == "opening":
         return Channel(name, constant, step, none, none, low, high)
     long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
-    fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_SPOILT_S / tick_s))
+    fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_INVALID_S / tick_s))
     hold, alike = _repetition(values)
     dead, ends = none, tuple[float, ...]()
     if alike < NOISY:
@@ -274,9 +274,9 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
 def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
     if worst == 0.0:
         why = "No sensor saturated, and none has a dead band around zero."
-        return Verdict(scope, "sensors", "pass", 0.0, SPOILT_LIMIT, why)
-    status: Status = "pass" if worst <= SPOILT_LIMIT else "fail"
-    why = f"{named} in {worst:.1%} of the samples (limit {SPOILT_LIMIT:.0%}); they are left out."
+        return Verdict(scope, "sensors", "pass", 0.0, INVALID_LIMIT, why)
+    status: Status = "pass" if worst <= INVALID_LIMIT else "fail"
+    why = f"{named} in {worst:.1%} of the samples (limit {INVALID_LIMIT:.0%}); they are left out."
     if status == "fail":
         why += " Record again with a sensor of larger range, or slower and with gentler turns."
-    return Verdict(scope, "sensors", status, worst, SPOILT_LIMIT, why)
+    return Verdict(scope, "sensors", status, worst, INVALID_LIMIT, why)

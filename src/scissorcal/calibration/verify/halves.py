@@ -58,7 +58,7 @@ class HalfFit:
 
 @dataclass(frozen=True)
 class Difference:
-    """Second minus first half (p,), its claimed covariance (p, p), and the test of both.
+    """Second minus first half (p,), its covariance (p, p), and the test of both.
 
     ``z`` (p,) is NaN where the halves repeat their prior. ``statistic`` over ``dimensions`` is
     F distributed with ``independent`` observations; ``p_value`` is NaN where no test is possible.

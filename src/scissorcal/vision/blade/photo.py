@@ -18,14 +18,14 @@ from scissorcal.vision.targets.marker_corners import linear_light
 Array = NDArray[np.float64]
 
 _SEARCH = 0.1
-"""How far, in blade lengths, shadows may lead the outline of scissors away from the metal."""
+"""Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
 
 _SCALE_SD = 0.005
 
 
 @dataclass(frozen=True)
 class BladePhoto:
-    """What one photograph shows: how the sheet is seen, the outline, and the edges of its blades.
+    """The result of one photograph: the mapping to the sheet, the outline, the blades' edges.
 
     ``scissors`` is None where a blade lies alone. ``measured`` has one row for a blade alone, two
     for open scissors (the one whose tip is farther from the handles first), none for closed ones.
@@ -108,8 +108,8 @@ def photograph_scissors(
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
-    Without the mat shapes come out up to their size; ``scale`` (metres per pixel of the whole
-    photograph) gives it, and the camera should look straight down, since its tilt stays in. Raises
+    Without the mat shapes have no scale; ``scale`` (metres per pixel of the whole photograph) gives
+    it. The camera should look straight down, since its tilt is not corrected. Raises
     InputError where the photograph shows no scissors, or cannot be used.
     """
     light = linear_light(photo.grey)

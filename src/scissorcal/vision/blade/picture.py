@@ -1,4 +1,4 @@
-"""Pictures for people: what was seen of a blade, laid over its photograph."""
+"""Overlay of a measured blade on its photograph."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -50,10 +50,10 @@ def blade_picture(
     nicks: Sequence[Sequence[NickMark]] = (),
     caption: str = "",
 ) -> Picture:
-    """Draw what was found over a photograph: bytes (rows, columns, 3), BGR.
+    """Draw a measurement over its photograph: bytes (rows, columns, 3), BGR.
 
     The segmented outline (orange), each blade's points of the edge, the fitted edge (green) where
-    ``edges`` gives e(s), the residuals as arrows, exaggerated to be seen, the nicks (red), the
+    ``edges`` gives e(s), the enlarged residuals as arrows, the nicks (red), the
     pivot and the centreline. Cropped to what matters and enlarged or reduced to `LARGEST` pixels.
     """
     canvas = _Canvas(photo, _frame(photo, view, outline, measured))
@@ -102,7 +102,7 @@ def _blade(
 
 
 def _arrows(canvas: "_Canvas", seen: Array, fitted: Array) -> float:
-    """Residuals from the fitted edge, so long that a usual one can be seen; by which factor."""
+    """Draw residuals from the fitted edge, enlarged; returns the factor."""
     off = seen - fitted
     usual = float(np.quantile(np.linalg.norm(off, axis=1), 0.9)) * canvas.scale
     factor = float(np.clip(_ARROW_PX / max(usual, 1e-6), 1.0, 1000.0))

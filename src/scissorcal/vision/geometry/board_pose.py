@@ -1,4 +1,4 @@
-"""Where a flat target stands before a camera: both poses that a plane allows, and how sure."""
+"""The pose of a flat target before a camera: both solutions of a plane, and their covariance."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LEAST_SD_PX = 0.02
-"""No corner is taken to be found better than this, however well a few of them agree."""
+"""Least standard deviation of a corner."""
 
 FAR_OFF = 6.0
-"""Corners farther off than this many robust standard deviations are left out."""
+"""Residuals above this many robust standard deviations are outliers and left out."""
 
 TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
-"""What corners are usually found to, and how many residuals that counts for: four corners of a
-marker leave only two to judge by."""
+"""Prior standard deviation of a corner, and its weight in residuals: the four corners of a marker
+have only two degrees of freedom left."""
 
 FEWEST = 4
 ROUNDS = 100
@@ -30,8 +30,8 @@ class Corners:
     """Corners of one flat target as seen by a camera at rest, in one frame or several.
 
     ``pixels`` (n, 2); ``points`` (n, 3) in the target's frame, z = 0, metres; ``frame`` and
-    ``corner`` (n,) say in which picture, and which corner of the target it is: what is wrong with a
-    corner in one picture (its print, its light) is wrong with it in the next.
+    ``corner`` (n,) say in which picture, and which corner of the target it is: a corner's
+    errors by print and light repeat from picture to picture.
     """
 
     pixels: Array
@@ -46,7 +46,7 @@ class Corners:
 
 @dataclass(frozen=True)
 class BoardPose:
-    """T_camera_target and what it rests on.
+    """T_camera_target and its diagnostics.
 
     ``other`` is the second pose that a plane allows, None where there is none. ``odds`` are those
     of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
@@ -73,9 +73,9 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
 
     Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
     are refined on all corners, those far off left out; the better one is the pose. Its covariance
-    has three parts: errors that corners have anew in every frame, errors that a corner keeps
-    from frame to frame (both estimated from the residuals), and what is unknown of the camera and
-    of the print: ``print_sd`` is how far the printer's scale may be off along either axis, a share.
+    has three parts: corner errors that are independent between frames, corner errors that
+    repeat in all frames (both estimated from the residuals), and the errors of camera and print:
+    ``print_sd`` is the relative standard deviation of the printer's scale along each axis.
 
     Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
     """

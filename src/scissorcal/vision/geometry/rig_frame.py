@@ -1,4 +1,4 @@
-"""Where the camera stands in the rig's frame: from a card of markers that rides on the rig."""
+"""The camera's pose in the rig's frame, from a card of markers on the moving rig."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,11 @@ from scissorcal.vision.targets.detect import Detection
 Array = NDArray[np.float64]
 
 OPEN = 3.0
-"""Prior standard deviation, rad and m, of what nobody said about how the card is fixed."""
+"""Prior standard deviation (rad and m) of both poses."""
 
 UNTOLD = 0.1
-"""A direction of the camera's pose whose standard deviation exceeds this (rad or m) was not told
-by the motion."""
+"""A direction of the camera's pose with a larger standard deviation (rad or m) is undetermined by
+the motion."""
 
 STEP = 1e-6
 
@@ -53,7 +53,7 @@ class RigPose:
 
     The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
     card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
-    +z. ``untold`` names what the motion left open, empty where all is known. ``by_camera`` (6, 9)
+    +z. ``untold`` names the directions that the motion does not determine. ``by_camera`` (6, 9)
     says how ``camera_rig`` moves with the camera's parameters.
     """
 
@@ -64,7 +64,7 @@ class RigPose:
     by_camera: Array
 
     def holds(self, board: BoardPose, camera: Camera) -> Pose:
-        """T_rig_target of a target that the same camera sees, whose errors are in both poses."""
+        """T_rig_target of a target seen by the same camera, with the common camera errors."""
         known = camera.covariance
         shared = np.zeros((6, 6))
         if known is not None:
@@ -76,9 +76,9 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
-    squares on all corners, both poses unknown at once. Advances tell the x axis, turns tell the
-    pivot's axis and place; with one of them only, part of the frame stays open and is named.
-    The covariance holds what is unknown of the camera and of the card's print.
+    squares on all corners, both poses unknown at once. Advances determine the x axis, turns the
+    pivot's axis and place; with one of them only, ``untold`` names the undetermined directions. The
+    covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
@@ -87,8 +87,8 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(stances) < 2:
         raise ValueError(
-            "the rig stood in one place in all pictures; move it between pictures: several "
-            "advances, and several openings"
+            "the rig has the same stance in all pictures: take pictures at several advances and "
+            "several openings"
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
@@ -178,7 +178,7 @@ def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array)
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise ValueError("the card did not move although the rig did; is it fixed to it?")
+        raise ValueError("the card did not move with the rig: fix it to the moving part")
     return np.asarray(vector / length)
 
 

@@ -1,4 +1,4 @@
-"""Blades with exactly known edges, to be photographed."""
+"""Blades with exactly known edges, for rendering."""
 
 from dataclasses import dataclass, replace
 from typing import Any

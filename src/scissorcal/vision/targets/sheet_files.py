@@ -29,7 +29,7 @@ def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
             part.write_bytes(content)
             part.replace(path)
     except OSError as error:
-        raise InputError(f"{folder} cannot take the targets: {error.strerror}.") from None
+        raise InputError(f"The targets cannot be written to {folder}: {error.strerror}.") from None
     pdf, png = contents
     return pdf, png
 
