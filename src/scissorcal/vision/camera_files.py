@@ -60,7 +60,7 @@ def read_camera_file(path: Path) -> CameraFile:
 def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "camera") -> Path:
     """Write a camera as OpenCV (.yml, .yaml, .xml or .json) or ROS camera_info (.yaml).
 
-    Covariance is not written: neither format has a place for it. Complete or not at all. Raises
+    Neither format holds a covariance. The file is written atomically. Raises
     InputError where the ending does not fit the style.
     """
     endings = (".yml", ".yaml", ".xml", ".json") if style == "opencv" else (".yaml", ".yml")

@@ -68,7 +68,7 @@ def residual_overlay(
 
 
 def write_picture(picture: Picture, path: Path) -> Path:
-    """Write a picture as PNG, complete or not at all."""
+    """Write a picture as PNG, atomically."""
     import cv2
 
     path.parent.mkdir(parents=True, exist_ok=True)

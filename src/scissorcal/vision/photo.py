@@ -193,7 +193,7 @@ def _upright(image: Picture, orientation: int) -> Picture:
 
 
 def _origin(spare: tuple[int, int], orientation: int) -> tuple[int, int]:
-    """Where the reduced picture's corner comes to lie in the whole one once both are turned.
+    """Place of the reduced picture's corner in the whole one, both upright.
 
     A reduced picture lacks (or exceeds) the whole one by ``spare`` pixels at its right and lower
     end, which the turn may bring to the left or to the top.

@@ -156,7 +156,7 @@ class Geometry:
 
         Torque is -dE/d(theta) of the stored energy E = m G(delta), so that mean force times
         -m d(delta)/d(theta) is the mean torque; the difference is taken with the contact held, at
-        either end. Equation 4 has no energy: the mean of its two levers stands there.
+        either end. Equation 4 has no energy: its lever is the mean of those at both ends.
         """
         depth, lever = self.depth_and_lever(edge, opening, contact)
         if self.closure == "eq4":

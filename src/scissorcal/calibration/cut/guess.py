@@ -20,7 +20,7 @@ PROFILE_RAD = 1e-3
 LONGEST_PROFILE = 80
 RELEASED = 0.05
 LEAST_TORQUE = 4.0
-"""A turn counts from so many times the scatter of the free motion after it."""
+"""Least torque at a turn, over the scatter of the free motion after it."""
 RUNNING_PROFILE_RAD = 10e-3
 PLACE_M = 1e-4
 """Unit of the places' corrections in the least squares."""
@@ -28,7 +28,7 @@ PLACE_M = 1e-4
 
 @dataclass(frozen=True)
 class Guess:
-    """Response and mean fracture energy (J/m), with the peak's ratio to that mean.
+    """Response and mean fracture energy (J/m), with the ratio of its peak to the mean.
 
     ``mean_energy`` is what running costs on average; a crack starts at ``peak_ratio`` times that.
     ``load`` is the share of the torque that friction takes off while the blades open.

@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
-"""Knots of the response's table, evenly in the logarithm of the indentation from and to so many
-times the reference: an exponential is within 1e-8 of its value. A power law needs two."""
+"""Number of knots of the response's table, and its range in multiples of the reference, evenly in
+the logarithm: an exponential is within 1e-8 of its value. A power law needs two knots."""
 
 
 class Evaluation(NamedTuple):
@@ -43,7 +43,7 @@ class Evaluation(NamedTuple):
 
 @dataclass(frozen=True)
 class LineDatum:
-    """What the line says: mean logarithm of the period over stretches, and its error."""
+    """The line of the teeth: mean logarithm of the period over stretches, and its error."""
 
     log_period: float
     sd: float

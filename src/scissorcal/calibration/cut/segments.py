@@ -29,13 +29,12 @@ Mask = NDArray[np.bool_]
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
-"""An elastic segment spans at least so many steps of the encoder; so many in a piece that would
-else have too few segments."""
+"""Least encoder steps of an elastic segment; the second in a piece with too few segments."""
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
-"""Running segments hold so many teeth at least: in shorter ones the teeth are
+"""Least length and least teeth of running segments: in shorter ones the teeth are
 fitted as short-range unevenness in place of the long-range one, and intervals get too narrow."""
 LOADING_END = 0.88
-"""Share of the critical indentation at which loading ends: weak places start the crack sooner."""
+"""Share of the critical indentation at which loading ends, since weak places crack earlier."""
 RUNNING_FROM = 1.6
 """Indentation over the critical one, for a crack at rest, from which running segments count."""
 FREE_SHARE = 0.4
@@ -54,10 +53,10 @@ did, 0.2 at most where they did not."""
 
 @dataclass(frozen=True)
 class Rest:
-    """A place at which a crack stands: ``place`` (m, sheet's frame) is a first estimate.
+    """A crack at rest: ``place`` (m, sheet's frame) is a first estimate.
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
-    cut yet, whose crack stands at 0.
+    cut yet, whose crack is at 0.
     """
 
     sheet: int
@@ -222,7 +221,7 @@ class _Builder:
         self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
 
     def _place_at_turn(self, run: Run) -> float | None:
-        """Where the crack stands by the unloading alone, at the guessed response."""
+        """The crack's place by the unloading alone, at the guessed response."""
         motion, geometry = self.motions[run.motion], self.geometry
         work = self.materials[run.motion].work
         opening, low = motion.opening, run.low

@@ -22,8 +22,8 @@ Complex = NDArray[np.complex128]
 SUBDIVISIONS = 32
 HALF_CYCLE = SUBDIVISIONS // 2
 WINDOW_CYCLES = 5
-"""Hann windows of so many cycles; their phases are compared one whole window apart, so that they
-share no sample and what is not periodic adds nothing on average."""
+"""Cycles of the Hann windows. Phases are compared one window apart, so that they share no sample
+and aperiodic parts cancel on average."""
 LOCAL_CYCLES = 6.0
 LEAST_TICKS = 3.5
 """Least samples per tooth of a stroke; below, teeth and samples alias."""
@@ -305,7 +305,7 @@ def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
 
 
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """The frequency, or a half or a third of it where that has teeth of its own."""
+    """The frequency, or a half or a third of it where that has enough power."""
     frequency = _strongest(signals, frequency)
     own = coherent_power(signals, frequency)
     for order in HARMONICS:

@@ -14,7 +14,7 @@ Mask = NDArray[np.bool_]
 EDGE_S = 0.05
 """Time left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
 EDGES = 4
-"""A piece is longer than so many edges, so that at least half of it can be used."""
+"""Least length of a piece in edges, so that at least half of it can be used."""
 FEWEST_SAMPLES = 20
 """Samples that a piece must exceed for a 4th-order filter and a window of one knot to fit in."""
 GAP_FACTOR = 1.5

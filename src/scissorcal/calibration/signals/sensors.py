@@ -20,29 +20,29 @@ INVALID_LIMIT = 0.05
 """Share of invalid samples above which a fit fails."""
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
-"""A run of equal values is one that lasts so long, and has so many samples at any rate of them."""
+"""Least duration and least samples of a run of equal values."""
 FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
-"""The joint moves where its position changes more than twice within so long before and after."""
+"""The joint moves where its position changes more than twice within this time before and after."""
 NOISY = 0.2
-"""A channel whose neighbouring samples are equal less often than this has noise, and then chance
-alone does not hold a value."""
+"""A channel has noise where neighbouring samples are equal less often; then values do not repeat by
+chance."""
 WIGGLES = 0.2
-"""Noise turns at so many of its values at least (white noise at two of three), motion at few."""
+"""Least share of values at which noise turns (two of three for white noise)."""
 REGULAR = 0.9
-"""A sensor that is read faster than it measures holds this share of its values equally long."""
+"""An oversampled sensor holds at least this share of its values equally long."""
 UNUSUAL = 3.0
-"""Where a channel has no noise, a run at an end counts from so many times its usual length."""
+"""Without noise, a run at an end counts from this multiple of the usual length."""
 BAND_STEPS = 4.0
 FLAT = 3.0
-"""Such a run is flat if it lasts so many times longer than the way in and out of it, through the
-last few levels. A parabola's turn lasts 0.81 times as long, a fourth power's twice."""
+"""Such a run is flat if it lasts longer than entering and leaving it, through the last few levels,
+by this factor. A parabola's turn lasts 0.81 times as long, a fourth power's twice."""
 LONGEST = 1.5
 STANDS_OUT = 2.0
-"""A flat run must last so many times longer than any within the range, or all flat runs at an end
-so many times longer than the longer runs at any level within."""
+"""A flat run must last longer by these factors than any within the range, or all flat runs at an
+end than the longer runs at any level within."""
 WITHIN = 0.5
-"""Share of moving samples that must lie within the range for its ends to stand out from them."""
+"""Least share of moving samples within the range, without which its ends are not judged."""
 STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
 """Flags of a device's state frame (docs/protocol.md)."""

@@ -31,7 +31,7 @@ class TorqueNoise:
     slow_time_error_s: float = float("nan")
 
     def variance_of_mean(self, ticks: int, tick_s: float) -> float:
-        """Variance of the mean of so many successive samples.
+        """Variance of the mean of ``ticks`` successive samples.
 
         >>> round(TorqueNoise(1e-3, 0.0, 0.01).variance_of_mean(4, 1e-3) * 1e6, 3)
         0.25

@@ -130,7 +130,7 @@ def count_usage(
 
 
 def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: Masks) -> Usage:
-    """Count what moving windows use of their recordings, each the bin that it stands for.
+    """Count what moving windows use of their recordings, each for its bin.
 
     ``every`` are all windows of the recordings, ``usable`` the masks (m,) of samples that no sensor
     invalid.

@@ -47,7 +47,7 @@ class Motion:
     rate_Hz: float
 
     def places(self, length: int) -> Integers:
-        """First samples of windows of so many samples, one for each bin."""
+        """First samples of windows of ``length`` samples, one per bin."""
         edge, width = edge_samples(self.rate_Hz), max(1, round(BIN_S * self.rate_Hz))
         return np.arange(edge, len(self.position) - edge - length, width)
 

@@ -38,7 +38,7 @@ def cumulative_distance(draws: Array, weights: Array) -> float:
 
     Nguyen and Vreeken 2015, doi:10.1007/978-3-319-23525-7_11; symmetric, normalised by its upper
     bound, and the larger one of the draws and their negatives, as the measure is not symmetric
-    about zero. Draws that are all alike have no distance.
+    about zero. Equal draws have no distance.
     """
     order = np.argsort(draws)
     x, weighted = draws[order], weights[order] / weights.sum()

@@ -80,7 +80,7 @@ class Study:
 def run(study: Study, task: Task) -> Record:
     """Do one fit; the same numbers for the same study and task, wherever it runs.
 
-    The result holds plain finite numbers alone, so that it can stand as one line of JSON. A fit
+    The result holds plain finite numbers alone, for one line of JSON. A fit
     that fails numerically, or refuses the data with an error of scissorcal, yields ``{"broken":
     sentence}``; other errors are raised.
     """

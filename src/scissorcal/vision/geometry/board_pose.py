@@ -50,10 +50,10 @@ class BoardPose:
 
     ``other`` is the second pose that a plane allows, None where there is none. ``odds`` are those
     of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
-    1 where both explain the picture alike. ``rms_px`` and ``sd_px`` are the rms error and the
-    standard deviation that corners were found to have; ``used`` (n,) marks the corners that count,
-    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and ``by_print``
-    (6, 2) say how the pose moves with the camera's parameters and the print's scales.
+    1 where both explain the picture equally well. ``rms_px`` and ``sd_px`` are the rms error and
+    the standard deviation that corners were found to have; ``used`` (n,) marks the corners that
+    count, ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and
+    ``by_print`` (6, 2) say how the pose moves with the camera's parameters and the print's scales.
     """
 
     pose: Pose
@@ -202,7 +202,7 @@ def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> tuple[float, float]:
-    """Variances of a coordinate: anew in every frame, and kept by a corner from frame to frame."""
+    """Variances of a coordinate: independent between frames, and constant for a corner."""
     frames = len(np.unique(corners.frame[used]))
     seen = residuals[used]
     labels, place = np.unique(corners.corner[used], return_inverse=True)

@@ -21,7 +21,7 @@ class Camera:
     ``x' = x/z, y' = y/z, r^2 = x'^2 + y'^2`` of a point in the camera's frame (x right, y down,
     z forward) are bent to ``x'(1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x'y' + p2 (r^2 + 2x'^2)`` (y'
     alike; divided by ``1 + k4 r^2 + k5 r^4 + k6 r^6`` where ``distortion`` has eight numbers) and
-    stand at pixel ``(fx x'' + cx, fy y'' + cy)`` (Brown 1971, as OpenCV writes it). The centre of
+    project to pixel ``(fx x'' + cx, fy y'' + cy)`` (Brown 1971, as OpenCV writes it). The centre of
     the first pixel is (0, 0). ``distortion`` is (k1, k2, p1, p2, k3[, k4, k5, k6]).
 
     ``covariance`` is (9, 9) over `PARAMETERS` (zero rows for fixed parameters); None means

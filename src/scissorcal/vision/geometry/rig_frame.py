@@ -32,8 +32,8 @@ STEP = 1e-6
 
 @dataclass(frozen=True)
 class CardView:
-    """The card in one picture, with where the rig stood: ``advance_m`` and, for a card on a moving
-    blade, ``blade_angle_rad`` by which that blade had turned (zero for a card on the carriage)."""
+    """The card in one picture, and the rig's stance: ``advance_m`` and, for a card on a moving
+    blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
     corners: Corners
     advance_m: float

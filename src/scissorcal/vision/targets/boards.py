@@ -178,7 +178,7 @@ MAT_FIELD_M = (0.024, 0.024, 0.231, 0.153)
 """The mat's empty field in its frame: left, top, right, bottom. White except for the pivot mark."""
 
 MAT_PIVOT_M = (0.062, 0.0885)
-"""Where the mat's pivot mark stands in its frame: a small cross to lay the blade's pivot on."""
+"""Place of the mat's pivot mark in its frame: a small cross for the blade's pivot."""
 
 PLATE_STRIP = MarkerBoard(
     "plate strip",

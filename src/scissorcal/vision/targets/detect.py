@@ -108,7 +108,7 @@ def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = Tru
 
 
 def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None = None) -> Markers:
-    """Find every marker of a dictionary; ``board`` helps to find more of its own.
+    """Find every marker of a dictionary; ``board`` helps to find more of its markers.
 
     Markers are read with twice the default pixels per cell, which finds those blurred by half a
     cell; corners are then measured from the markers' sides.

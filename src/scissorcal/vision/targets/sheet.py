@@ -145,7 +145,7 @@ def _ruler(x: float, y: float, length: float, *, across: bool) -> list[Rectangle
     ticks = []
     for at in range(round(length) + 1):
         long = 3.0 if at % 10 == 0 else 2.0 if at % 5 == 0 else 1.2
-        # Outer faces of the end ticks, middles of all others, stand at whole millimetres.
+        # outer faces of the end ticks, centres of all others, are at whole millimetres
         shift = 0.0 if at == 0 else -thin if at == round(length) else -0.5 * thin
         if across:
             ticks.append(Rectangle(x + at + shift, y - long, thin, long))

@@ -15,11 +15,11 @@ Mask = NDArray[np.bool_]
 
 STRIDES = (1, 2, 4, 8, 16)
 CLEAR = 3.0
-"""The change of torque is measured at the shortest stride at which its differences exceed those
-of the encoder's steps so many times."""
+"""The change of torque is measured at the shortest stride at which its differences exceed those of
+the encoder's steps by this factor."""
 WALK_S, WALK_ROUNDS = 0.03, 6
-"""The change of torque is also measured over such a time, two swings at 80 Hz of blades that the
-material holds at a turn, in so many rounds of smoothing. On a virtual rig of 20,000 counts a turn
+"""The change of torque is also measured over this time (two oscillations at 80 Hz of blades that
+the material holds at a turn) in these rounds of smoothing. On a virtual rig of 20,000 counts a turn
 positions were wrong there by 187 urad with one walk for all, by 91, 64, 59, 57, 56, 56 urad after
 each round."""
 WALKS = 9
@@ -29,8 +29,8 @@ FINEST_STEP = 1e-7
 LEAST_PLACE_SD_M = 1e-6
 """Error of a place along the cut where the sledge's encoder shows no coarser steps."""
 STILL_S, STILL_STEPS, STILL_RAD_PER_S = 0.02, 4.0, 0.01
-"""Blades stand while they turn, over such a time, by less than so many steps of the encoder or at
-less than such a rate, a tenth of the slowest stroke's. Slower than four steps in 20 ms they may
+"""Blades rest while they turn, over this time, by fewer encoder steps or more slowly than these, a
+tenth of the slowest stroke's rate. Slower than four steps in 20 ms they may
 move back at 30 Hz by less than a step, which is unresolved."""
 RATE_WEIGHTS = np.array([-1.0, 8.0, 0.0, -8.0, 1.0]) / 12.0
 """Of five neighbouring positions, the last one first: exact for a polynomial of fourth degree."""

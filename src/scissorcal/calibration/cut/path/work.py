@@ -78,7 +78,7 @@ def material_of(
 
 
 def _turning_rate(motion: PathMotion, step: Array) -> Array:
-    """Rate (n - 1,) between samples; its mean for as long as the blades stand."""
+    """Rate (n - 1,) between samples; its mean while the blades rest."""
     rate = step / motion.tick_s
     still = np.concatenate([[False], motion.standing[1:] & motion.standing[:-1], [False]])
     starts, ends = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2).T

@@ -49,8 +49,8 @@ def measured_drive(
         inertia * acceleration = drive - friction - offset - cogging + material
 
     holds exactly for means around each sample, as the second difference of the positions weighs
-    them; a sample shows it a delay later. Dry friction of a joint that is nearly at rest may be
-    anything up to its level: it is taken in proportion to the speed there.
+    them; a sample shows it a delay later. Dry friction of a joint nearly at rest is anything up to
+    its level; it is taken in proportion to the speed there.
     """
     path, tick_s = piece.opening, piece.tick_s
     step = np.diff(path)

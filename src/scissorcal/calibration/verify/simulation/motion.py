@@ -55,7 +55,7 @@ class Motion:
     torque_step: float
 
     def with_drive(self, drives: Sequence[Array]) -> Recording:
-        """The recording with the same motion, quantised anew, and with other drives.
+        """The recording with the same motion, quantised again, and with other drives.
 
         ``drives`` are by piece and sample (N m): motor less handle. The handle's force, labels and
         time stamps are kept; samples outside the pieces stay as they were.

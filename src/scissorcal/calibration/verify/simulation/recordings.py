@@ -110,7 +110,7 @@ def simulate_friction(
 def simulate_cut(
     motions: tuple[Motion, ...], truth: CutTruth, rng: np.random.Generator
 ) -> tuple[Recording, ...]:
-    """Recordings of cuts (or presses), raw samples; every sheet is drawn anew.
+    """Recordings of cuts (or presses), raw samples; every sheet is a new draw.
 
     A sheet that lies in two pieces of a recording, with a gap between them, is walked as one.
     """
