@@ -1,6 +1,8 @@
 """What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +66,7 @@ class KnownFriction:
         )
         stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", OFFSET_SD_FLOOR))
         return cls(
-            law=friction_law(_of_law(means), centre),
+            law=friction_law(law_values(means), centre),
             offset=float(means.get("offset", 0.0)),
             inertia=float(means["inertia"]),
             cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
@@ -79,10 +81,10 @@ class KnownFriction:
         return material_of(motion, self.law, self.offset, self.cogging)
 
 
-def _of_law(values: dict[str, Array]) -> dict[str, Array]:
+def law_values(values: Mapping[str, Any]) -> dict[str, Array]:
     """Parameters of the friction law, without those of the drive and the noise."""
     others = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
-    return {name: value for name, value in values.items() if name not in others}
+    return {name: np.asarray(v) for name, v in values.items() if name not in others}
 
 
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
@@ -109,5 +111,5 @@ def _spread(friction: FitResult, centre: float, rate: float) -> float:
 
 def _level(values: dict[str, Array], centre: float, rate: float) -> Array:
     """Friction and offset together at one rate, of one set of values or of many draws."""
-    torque = friction_torque(friction_law(_of_law(values), centre), centre, rate)
+    torque = friction_torque(friction_law(law_values(values), centre), centre, rate)
     return np.asarray(torque + values.get("offset", np.asarray(0.0)))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.known import KnownFriction, law_values
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -18,8 +18,6 @@ from scissorcal.model import Cutting
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
-
-_NO_FRICTION = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
 
 
 @dataclass(frozen=True)
@@ -41,10 +39,9 @@ def friction_truth(
 
     ``noise`` and ``stroke_sd`` (N m) are by sample and by stroke.
     """
-    law = {n: np.asarray(v) for n, v in values.items() if n not in _NO_FRICTION}
     return DriveTruth(
         inertia=float(values["inertia"]),
-        friction=friction_law(law, float(structure["angle_center"])),
+        friction=friction_law(law_values(values), float(structure["angle_center"])),
         noise=noise,
         offset=float(values.get("offset", 0.0)),
         cogging=(
