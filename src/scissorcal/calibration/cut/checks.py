@@ -69,12 +69,11 @@ def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
 def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:
     """Notes on the line of the teeth, unresolved strokes, and the budget of lack of fit."""
     notes = []
-    if scouted.accepted and scouted.line is not None:
-        speeds = ", ".join(
-            f"{speed:.2g}" for speed, _, gain in scouted.line.speeds if gain > COHERENT
-        )
+    line = scouted.accepted_line
+    if line is not None:
+        speeds = ", ".join(f"{speed:.2g}" for speed, _, gain in line.speeds if gain > COHERENT)
         notes.append(
-            f"{scouted.line.sd:.2%} is the standard deviation of the period of the running crack's "
+            f"{line.sd:.2%} is the standard deviation of the period of the running crack's "
             f"teeth, a spectral line at stroke speeds of {speeds} rad/s. Without it kappa would "
             f"be {scouted.without:.2g}, with a large uncertainty."
         )
@@ -115,8 +114,8 @@ def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Ver
 
 def _line(scouted: Scouted) -> tuple[Verdict, ...]:
     """A line at a multiple of the teeth's frequency would bias kappa by tens of percent."""
-    line = scouted.line
-    if line is None or not scouted.accepted:
+    line = scouted.accepted_line
+    if line is None:
         return ()
     worst = max(line.half, line.third)
     if worst < SUBHARMONIC:

@@ -160,7 +160,7 @@ def cut_experiment(
     ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
     ended |= {p.name: p.mean for p in fit.nuisance}
     return make_experiment(
-        scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.line_datum
+        scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.accepted_line
     )
 
 
@@ -216,7 +216,7 @@ def _climb(
             law,
             data.known,
             begin,
-            scouted.line_datum,
+            scouted.accepted_line,
         )
         rung = design.rung(design.observed)
         found.append((climb(rung, design.series, design.strokes, stop), design))

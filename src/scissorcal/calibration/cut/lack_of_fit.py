@@ -53,8 +53,6 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
     step = 0.1 * natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
     shifts = {}
     for kind, changed in _changed(design).items():
-        if changed is None:
-            continue
         other = changed.rung(changed.observed).problem(changed.series)
 
         def gained(u: Array, other: object = other, problem: object = problem) -> Array:
@@ -68,7 +66,7 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
     return Budget(shares, shifts)
 
 
-def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
+def _changed(design: CutExperiment) -> dict[str, CutExperiment]:
     """Designs in which one kind of segment was measured larger by ``PERTURBATION``.
 
     Elastic segments may also be wrong in proportion to their torque, from less to more within a
@@ -88,14 +86,12 @@ def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
         "unloading, by its torque": np.concatenate([unloading * slope, rest]),
         "running": (np.arange(count) >= elastic).astype(np.float64),
     }
-    found: dict[str, CutExperiment | None] = {}
+    found = {}
     for kind, weight in weights.items():
-        measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
-        found[kind] = (
-            replace(design, likelihood=replace(design.likelihood, measured=measured), _last={})
-            if np.any(weight)
-            else None
-        )
+        if np.any(weight):
+            measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
+            likelihood = replace(design.likelihood, measured=measured)
+            found[kind] = replace(design, likelihood=likelihood, _last={})
     line = design.likelihood.line
     if line is not None:
         moved = replace(line, log_period=line.log_period + PERTURBATION)

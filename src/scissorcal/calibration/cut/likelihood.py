@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.calibration.cut.segments import Segments
+from scissorcal.calibration.cut.teeth import Line
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,
@@ -42,15 +43,6 @@ class Evaluation(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LineDatum:
-    """The line of the teeth: mean logarithm of the period over stretches, and its error."""
-
-    log_period: float
-    sd: float
-    stretches: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class CutLikelihood:
     """Segments with their geometry, ready to be compared with parameters by name.
 
@@ -62,7 +54,7 @@ class CutLikelihood:
     segments: Segments
     geometry: Geometry
     fracture: str
-    line: LineDatum | None = None
+    line: Line | None = None
     measured: Array | None = field(default=None, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:

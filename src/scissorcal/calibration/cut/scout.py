@@ -11,7 +11,7 @@ from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess, NoUnloadingError, first_guess
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
-from scissorcal.calibration.cut.likelihood import CutLikelihood, LineDatum
+from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.path.runs import find_runs
@@ -49,11 +49,9 @@ class Scouted:
     evaluations: int
 
     @property
-    def line_datum(self) -> LineDatum | None:
-        """The line as the likelihood takes it."""
-        if self.line is None or not self.accepted:
-            return None
-        return LineDatum(self.line.log_period, self.line.sd, self.line.stretches)
+    def accepted_line(self) -> Line | None:
+        """The line if it is used."""
+        return self.line if self.accepted else None
 
 
 def scout(
@@ -106,7 +104,7 @@ def make_experiment(
     law: CutLaw,
     known: KnownFriction,
     values: Mapping[str, float],
-    line: LineDatum | None = None,
+    line: Line | None = None,
 ) -> CutExperiment:
     """One law over segments, with priors from the recipe; a search begins at ``values``."""
     layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
@@ -185,8 +183,7 @@ def _with_line(
     values, line, evaluations = dict(found.values), first, found.evaluations
     for _ in range(ROUNDS):
         values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        datum = LineDatum(line.log_period, line.sd, line.stretches)
-        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
+        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, line)
         with_line = find_optimum(design.rung(design.observed).problem(design.series))
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
