@@ -32,7 +32,7 @@ SOUND = Measurements(
 )
 
 
-def test_a_sound_rig_passes_everything() -> None:
+def test_a_healthy_rig_passes_every_check() -> None:
     assert {verdict.status for verdict in judge(SOUND, "/dev/ttyUSB0")} == {"pass"}
 
 
@@ -50,7 +50,7 @@ def test_a_sound_rig_passes_everything() -> None:
         ({"lateness": BAD}, "wake-up lateness", "real-time priority"),
     ],
 )
-def test_each_trouble_fails_its_own_check_and_names_the_mend(
+def test_each_problem_fails_its_check_and_names_the_remedy(
     wrong: dict[str, object], check: str, mend: str
 ) -> None:
     measured = Measurements(**{**vars(SOUND), **wrong})
@@ -92,7 +92,7 @@ def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
     assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) == 16.0
 
 
-def test_a_rig_with_a_bad_line_is_found_out() -> None:
+def test_a_line_with_losses_fails_its_checks() -> None:
     told: list[float] = []
     with (
         SimProcess("office-paper", seed=3, faults=("drop=0.01", "garble=0.01")) as sim,

@@ -33,7 +33,7 @@ def test_the_stored_schema_is_the_code_s() -> None:
     jsonschema.Draft202012Validator.check_schema(stored())
 
 
-def test_what_stands_in_a_file_follows_the_schema(tmp_path: Path) -> None:
+def test_the_metadata_of_a_file_follows_the_schema(tmp_path: Path) -> None:
     path = write_recording(made_recording(50), tmp_path / "a.mcap")
     with path.open("rb") as stream:
         found = [record.metadata for record in make_reader(stream).iter_metadata()]

@@ -1,4 +1,4 @@
-"""Bytes on the wire: CRC-16, frames around payloads, and a decoder that survives garbage."""
+"""Bytes on the wire: CRC-16, frames, and a decoder that resynchronises after garbled bytes."""
 
 from scissorcal.kernel._kernel import ffi, lib
 
@@ -30,9 +30,9 @@ def encode_frame(payload: bytes) -> bytes:
 
 
 class FrameDecoder:
-    """Cuts a stream of bytes into payloads whose CRC is right; everything else is counted.
+    """Extracts the payloads with a correct CRC from a stream of bytes; counts the other frames.
 
-    After a lost or garbled byte the decoder is back in step at the next delimiter.
+    After a lost or garbled byte the decoder is synchronised again at the next delimiter.
 
     >>> decoder = FrameDecoder()
     >>> decoder.feed(b"noise" + bytes(1) + encode_frame(b"hello"))
@@ -47,7 +47,7 @@ class FrameDecoder:
         lib.sc_decoder_init(self._decoder)
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take bytes as they arrive, in pieces of any size; give the payloads they complete."""
+        """Take bytes as they arrive, in pieces of any size; return the payloads they complete."""
         view = ffi.from_buffer(data)
         self._taken[0] = 0
         payloads = []
@@ -57,10 +57,10 @@ class FrameDecoder:
 
     @property
     def garbled(self) -> int:
-        """Frames thrown away: malformed, too long, or with a wrong CRC."""
+        """Frames discarded: malformed, too long, or with a wrong CRC."""
         return int(self._decoder.garbled)
 
     @property
     def bytes_received(self) -> int:
-        """Bytes fed since the start, sound or not."""
+        """Bytes fed since the start, valid or not."""
         return int(self._decoder.bytes_received)

@@ -1,4 +1,4 @@
-"""Hand a recording to other programs: Parquet and CSV, with the units in the columns' names."""
+"""Export a recording to Parquet or CSV, with units in the columns' names."""
 
 import math
 from pathlib import Path
@@ -17,7 +17,7 @@ SUFFIXES = (".parquet", ".csv")
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write the samples as a table; the ending of ``path`` (.parquet or .csv) says which.
+    """Write the samples as a table; the extension of ``path`` (.parquet or .csv) says which.
 
     One row a sample, one column a field of SAMPLE_DTYPE, named with its unit (``opening_rad``,
     or ``opening_m`` for a linear joint), and ``time_s``, the device clock from the first sample.
@@ -25,18 +25,19 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     (the metadata of ``data_schemas/recording.schema.json``) and notes, under the keys
     ``scissorcal.recording`` and ``scissorcal.notes``.
 
-    The file appears whole or not at all. Raises InputError for another ending, a missing folder,
-    or a file that stands already, unless ``overwrite``.
+    The file is written whole or not at all. Raises InputError for another extension, a missing
+    folder, or an existing file, unless ``overwrite``.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
-            f"{path}: tables are written as {' or '.join(SUFFIXES)}. Give the name such an ending."
+            f"{path}: tables are written as {' or '.join(SUFFIXES)}. Choose one of these "
+            "extensions."
         )
     if path.exists() and not overwrite:
-        raise InputError(f"{path} stands already. Choose another name, or allow overwriting.")
+        raise InputError(f"{path} exists. Choose another name, or allow overwriting.")
     if not path.parent.is_dir():
-        raise InputError(f"{path.parent} is no folder. Make it first, or choose another.")
+        raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
     draft = path.with_name(path.name + layout.PART_SUFFIX)
     try:
         _write(_as_table(recording), draft, path.suffix.lower())
@@ -44,8 +45,8 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     except OSError as error:
         draft.unlink(missing_ok=True)
         raise ScissorcalError(
-            f"{path} could not be written: {error.strerror or error}. The recording itself is "
-            "untouched; free some space or choose another folder."
+            f"{path} could not be written: {error.strerror or error}. The recording is "
+            "unchanged. Free disk space or choose another folder."
         ) from error
     return path
 

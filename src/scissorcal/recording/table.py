@@ -1,4 +1,4 @@
-"""A table of numbers from a file of any kind, and how its columns are named and found."""
+"""A table of numbers from a file, and how its columns are found by name."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -40,14 +40,14 @@ class Table:
         return max((len(column.values) for column in self.columns.values()), default=0)
 
     def place(self, row: int, channel: str | None = None) -> str:
-        """Name a row (from 0), and a channel's column, as a person finds them in the file."""
+        """Name a row (from 0), and a channel's column, as they are found in the file."""
         where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
         column = f", column {self.columns[channel].heading!r}" if channel else ""
         return f"{self.path}, {where}{column}"
 
 
 def find_column(path: Path, headings: Sequence[str], column: str | int, channel: str) -> int:
-    """Return the number of the column that is meant: by heading, heading without unit, or number.
+    """Return the number of a column given by heading, heading without unit, or number.
 
     >>> find_column(Path("log.csv"), ["t [s]", "Torque [Nm]"], "torque", "motor_torque")
     1

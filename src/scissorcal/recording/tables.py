@@ -1,4 +1,4 @@
-"""Read the wanted columns of a table: text, Parquet or MATLAB, by the file's ending."""
+"""Read the wanted columns of a table: text, Parquet or MATLAB, by the file's extension."""
 
 from pathlib import Path
 
@@ -9,13 +9,13 @@ from scissorcal.recording.table import Table, Wanted
 
 
 def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
-    """Read the wanted columns of a table; the file's ending says what it is.
+    """Read the wanted columns of a table; the file's extension says its format.
 
     ``.mat`` is MATLAB, ``.parquet`` and ``.pq`` are Parquet, everything else is text with one
     row a line. Every number is finite. Raises InputError naming file, place and remedy.
     """
     if not path.is_file():
-        raise InputError(f"{path} is no file. Check the name and the folder.")
+        raise InputError(f"{path} is not a file. Check the name and the folder.")
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty (0 bytes). Name a table with numbers in it.")
     suffix = path.suffix.lower()
@@ -46,8 +46,8 @@ def _check_lengths(table: Table) -> None:
         )
     if table.length < 2:
         raise InputError(
-            f"{table.path} holds {table.length} rows of numbers; a motion needs two at least. "
-            "Check that the right file and columns are named."
+            f"{table.path} holds {table.length} rows of numbers; a motion needs at least two. "
+            "Check the names of file and columns."
         )
 
 
@@ -62,6 +62,6 @@ def _check_finite(table: Table) -> None:
         value = table.columns[channel].values[bad[channel]]
         count = sum(int(np.sum(~np.isfinite(table.columns[name].values))) for name in bad)
         raise InputError(
-            f"{table.place(bad[channel], channel)}: {value} is no measurement ({count} such cells "
-            "in all). Remove those rows, or repair them where the log was made."
+            f"{table.place(bad[channel], channel)}: {value} is not a measurement ({count} such "
+            "cells in total). Remove those rows, or export the log again."
         )

@@ -1,4 +1,4 @@
-"""Percentiles of the loop's latency, exact, from the samples it left."""
+"""Exact percentiles of the loop's latency, from its samples."""
 
 import numpy as np
 from numpy.typing import ArrayLike
