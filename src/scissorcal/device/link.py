@@ -8,7 +8,6 @@ import select
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
 from scissorcal.device.ports import open_port
@@ -104,12 +103,7 @@ class PortLink(AbstractContextManager["PortLink"]):
         with suppress(OSError):
             self._port.close()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def send(self, message: Message) -> None:
@@ -280,18 +274,11 @@ def check_identity(name: str, identity: Identity) -> Identity:
             f"{SCHEMA_HASH:016x}. Update the device's firmware to this scissorcal's "
             "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
         )
-    fields = (
-        "torque_limit",
-        "force_limit",
-        "opening_min",
-        "opening_max",
-        "advance_min",
-        "advance_max",
-        "opening_resolution",
-        "advance_resolution",
-        "handle_radius",
-    )
-    wrong = [field for field in fields if not math.isfinite(getattr(identity, field))]
+    wrong = [
+        name
+        for name, value in identity._asdict().items()
+        if isinstance(value, float) and not math.isfinite(value)
+    ]
     if not identity.torque_limit > 0:
         wrong.append("torque_limit")
     if not identity.opening_min < identity.opening_max:

@@ -19,13 +19,10 @@ from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.messages import ConfigEcho
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    EnergyLedger,
     Mode,
     ServoConfig,
-    ServoCounters,
+    ServoView,
     StopReason,
-    counters_of,
-    ledger_of,
     reference_arrays,
 )
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
@@ -93,7 +90,7 @@ class Histogram:
         return float(min(self.edges_us[index + 1], self.largest_us))
 
 
-class LoopBlock:
+class LoopBlock(ServoView):
     """Shared memory between the loop and its supervisor.
 
     It has no name in the system: the memory exists as long as a process holds it, so a killed
@@ -106,6 +103,7 @@ class LoopBlock:
         self._memory = mmap.mmap(fd, size)
         self._keep = ffi.from_buffer(self._memory, require_writable=True)
         self.pointer = ffi.cast("sc_block *", self._keep)
+        self._servo = ffi.addressof(self.pointer, "servo")
         self._cursor = ffi.new("uint64_t *")
         self._lost = ffi.new("uint64_t *")
 
@@ -164,7 +162,7 @@ class LoopBlock:
             self._fd = -1
 
     def _unmap(self) -> None:
-        self.pointer = ffi.NULL
+        self.pointer = self._servo = ffi.NULL
         ffi.release(self._keep)
         self._memory.close()
 
@@ -240,37 +238,9 @@ class LoopBlock:
         return bool(self.pointer.running)
 
     @property
-    def mode(self) -> Mode:
-        """The mode in force, DAMP after a missing heartbeat of the supervisor."""
-        return Mode(self.pointer.servo.mode)
-
-    @property
     def stop_reason(self) -> StopReason:
         """Why the loop ended or is about to; NONE while it runs."""
-        return StopReason(self.pointer.exit_reason or self.pointer.servo.stop_reason)
-
-    @property
-    def exit_errno(self) -> int:
-        """The system's error number behind HANGUP or LINE_ERROR, 0 if there was none."""
-        return int(self.pointer.exit_errno)
-
-    @property
-    def track_index(self) -> int:
-        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
-        return int(self.pointer.servo.track_index)
-
-    @property
-    def crack(self) -> float:
-        """The rendered crack tip X (m, plate frame)."""
-        return float(self.pointer.servo.crack.crack)
-
-    @property
-    def ledger(self) -> EnergyLedger:
-        return ledger_of(self.pointer.servo)
-
-    @property
-    def counters(self) -> ServoCounters:
-        return counters_of(self.pointer.servo)
+        return StopReason(self.pointer.exit_reason or self._servo.stop_reason)
 
     @property
     def line(self) -> LoopCounters:

@@ -186,7 +186,48 @@ class ServoCounters:
     faults: int
 
 
-class Servo:
+class ServoView:
+    """What can be read off a C servo, be it one's own or the one in a loop's block."""
+
+    _servo: Any
+
+    @property
+    def mode(self) -> Mode:
+        """The mode in force, DAMP after a missing heartbeat of the supervisor."""
+        return Mode(self._servo.mode)
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """Why it stopped; NONE while it has not."""
+        return StopReason(self._servo.stop_reason)
+
+    @property
+    def track_index(self) -> int:
+        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
+        return int(self._servo.track_index)
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """Estimated rates of opening (rad/s) and advance (m/s)."""
+        return float(self._servo.motion.opening_rate), float(self._servo.motion.advance_rate)
+
+    @property
+    def crack(self) -> float:
+        """The rendered crack tip X (m, plate frame)."""
+        return float(self._servo.crack.crack)
+
+    @property
+    def ledger(self) -> EnergyLedger:
+        ledger = self._servo.ledger
+        return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
+
+    @property
+    def counters(self) -> ServoCounters:
+        names = (field.name for field in fields(ServoCounters))
+        return ServoCounters(*(int(getattr(self._servo, name)) for name in names))
+
+
+class Servo(ServoView):
     """The servo on its own, for lockstep runs, tests and other loops.
 
     ``tables`` is needed for RENDER only. It starts in IDLE with a fresh sheet (crack at 0).
@@ -312,39 +353,6 @@ class Servo:
         data = bytes(ffi.buffer(ffi.addressof(self._servo, "sample")))
         return np.frombuffer(data, dtype=SAMPLE_DTYPE)
 
-    @property
-    def mode(self) -> Mode:
-        """The mode in force, DAMP after a missing heartbeat of the supervisor."""
-        return Mode(self._servo.mode)
-
-    @property
-    def stop_reason(self) -> StopReason:
-        """Why it stopped; NONE while it has not."""
-        return StopReason(self._servo.stop_reason)
-
-    @property
-    def track_index(self) -> int:
-        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
-        return int(self._servo.track_index)
-
-    @property
-    def rates(self) -> tuple[float, float]:
-        """Estimated rates of opening (rad/s) and advance (m/s)."""
-        return float(self._servo.motion.opening_rate), float(self._servo.motion.advance_rate)
-
-    @property
-    def crack(self) -> float:
-        """The rendered crack tip X (m, plate frame)."""
-        return float(self._servo.crack.crack)
-
-    @property
-    def ledger(self) -> EnergyLedger:
-        return ledger_of(self._servo)
-
-    @property
-    def counters(self) -> ServoCounters:
-        return counters_of(self._servo)
-
 
 def reference_arrays(
     opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
@@ -360,13 +368,3 @@ def reference_arrays(
     if np.any(np.abs(places[0]) > math.pi):
         raise ValueError("A reference's opening must stay within half a turn.")
     return places[0], places[1], places[2], strokes
-
-
-def ledger_of(servo: Any) -> EnergyLedger:
-    """Read the ledger out of a C servo."""
-    return EnergyLedger(*(getattr(servo.ledger, field.name) for field in fields(EnergyLedger)))
-
-
-def counters_of(servo: Any) -> ServoCounters:
-    """Read the counters out of a C servo."""
-    return ServoCounters(*(int(getattr(servo, field.name)) for field in fields(ServoCounters)))

@@ -15,8 +15,7 @@ from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_note
-from scissorcal.recording.table import Table
-from scissorcal.recording.tables import read_table
+from scissorcal.recording.table import Table, read_table
 
 GAP_FACTOR = 1.5
 """A step longer than this many usual ones is a gap: a sample is missing."""

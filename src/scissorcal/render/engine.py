@@ -18,8 +18,7 @@ from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter, label_strokes
-from scissorcal.render.latency import latency_of
-from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.result import AppliedLimits, RenderResult, latency_of, render_verdicts
 
 Progress = Callable[[float, str], None]
 
