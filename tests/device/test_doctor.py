@@ -1,4 +1,4 @@
-"""The doctor measures what is there, and names the mend of what is wrong."""
+"""The doctor measures what is there, and names the remedy for what is wrong."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def test_a_healthy_rig_passes_every_check() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "check", "mend"),
+    ("wrong", "check", "remedy"),
     [
         ({"round_trip": BAD}, "round trip", "latency timer to 1 ms"),
         ({"unanswered": 2}, "round trip", "no hub"),
@@ -51,12 +51,12 @@ def test_a_healthy_rig_passes_every_check() -> None:
     ],
 )
 def test_each_problem_fails_its_check_and_names_the_remedy(
-    wrong: dict[str, object], check: str, mend: str
+    wrong: dict[str, object], check: str, remedy: str
 ) -> None:
     measured = Measurements(**{**vars(SOUND), **wrong})
     (verdict,) = failed(judge(measured, "/dev/ttyUSB0"))
     assert verdict.check == check
-    assert mend in verdict.why
+    assert remedy in verdict.why
 
 
 def test_what_was_not_measured_is_not_judged() -> None:

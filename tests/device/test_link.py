@@ -138,11 +138,13 @@ def test_other_schema_gives_both_hashes(far_end: Make) -> None:
     assert "Update the device's firmware" in str(caught.value)
 
 
-@pytest.mark.parametrize(("version", "mend"), [(0, "the device's firmware"), (9, "scissorcal")])
-def test_other_protocol_version_says_what_to_update(far_end: Make, version: int, mend: str) -> None:
+@pytest.mark.parametrize(("version", "remedy"), [(0, "the device's firmware"), (9, "scissorcal")])
+def test_other_protocol_version_says_what_to_update(
+    far_end: Make, version: int, remedy: str
+) -> None:
     later = struct.pack("<BB30s", 0x11, version, b"")
     end = far_end(lambda message: [encode_frame(later)])
-    with pytest.raises(DeviceError, match=f"version {version}, .* update {mend}"):
+    with pytest.raises(DeviceError, match=f"version {version}, .* update {remedy}"):
         open_link(end.port)
 
 

@@ -244,7 +244,7 @@ def _package_step(
     if not path.is_file():
         return Step(name, "missing", "not built yet", why, command)
     try:
-        manifest = open_package(path).manifest
+        manifest = open_package(path, warn=False).manifest
     except InputError:
         return Step(name, "stale", f"{workspace.relative(path)} is damaged", why, command)
     expected = expected_package_hash(workspace, recipe, fits)

@@ -49,7 +49,7 @@ def render_workspace(
     from scissorcal.render import open_writer, render
 
     recipe = workspace.recipe()
-    package = open_package(package_path or workspace.package_path(recipe))
+    package = open_package(package_path or workspace.package_path(recipe), warn=False)
     with open_rig(device, recipe.specimen, seed) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
         path = workspace.new_recording("render") if record else None
@@ -77,7 +77,9 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
     from scissorcal.package import open_package
 
     try:
-        package = open_package(package_path or workspace.package_path(workspace.recipe()))
+        package = open_package(
+            package_path or workspace.package_path(workspace.recipe()), warn=False
+        )
     except ScissorcalError:
         return ()
     return package.warnings
@@ -92,7 +94,7 @@ def package_has_fallen_behind(workspace: Workspace) -> bool:
 
     recipe = workspace.recipe()
     try:
-        manifest = open_package(workspace.package_path(recipe)).manifest
+        manifest = open_package(workspace.package_path(recipe), warn=False).manifest
     except ScissorcalError:
         return False
     try:
