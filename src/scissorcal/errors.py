@@ -1,4 +1,4 @@
-"""The errors scissorcal raises on purpose, each with the exit code its command ends with.
+"""The errors of scissorcal, each with the exit code its command ends with.
 
 Every message is a whole sentence that names the file or device, the place in it, and the remedy.
 """
@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 class ScissorcalError(Exception):
-    """Base of all errors that scissorcal raises on purpose (exit code 1).
+    """Base of all errors that scissorcal raises deliberately (exit code 1).
 
-    ``kept`` are the files that hold what was done before it.
+    ``kept`` are the files that hold what was done before the error.
     """
 
     exit_code = 1
@@ -24,7 +24,7 @@ class InputError(ScissorcalError):
 
 
 class VerdictError(ScissorcalError):
-    """A verdict failed, so what was asked for is not handed out (exit code 3)."""
+    """A verdict failed, so the result is not handed out (exit code 3)."""
 
     exit_code = 3
 
@@ -36,7 +36,7 @@ class DeviceError(ScissorcalError):
 
 
 class MissingError(ScissorcalError):
-    """Something that must come first is not there yet: nothing captured or fitted (exit code 5)."""
+    """A previous step is missing: nothing captured, fitted or built yet (exit code 5)."""
 
     exit_code = 5
 

@@ -136,7 +136,7 @@ def test_stepped_ripple_averages_to_the_torque_that_is_stated(
     assert stepped == pytest.approx(stated, rel=0.02)
 
 
-def test_coarse_tables_state_a_coarse_bound(tmp_path: Path) -> None:
+def test_coarse_tables_state_a_larger_bound(tmp_path: Path) -> None:
     chosen = recipe("press-only")
     fit = cut_fit(chosen, energy=None, exponent=2.5)
     shares = [

@@ -114,7 +114,7 @@ def test_covers_names_where_the_package_may_be_used(paper: PackageSummary) -> No
     assert not package.covers(0.4, 0.5, 0.2)
 
 
-def test_each_kernel_has_a_crack_of_its_own(paper: PackageSummary) -> None:
+def test_each_kernel_has_its_own_crack(paper: PackageSummary) -> None:
     package = open_package(paper.path)
     first, second = package.kernel(), package.kernel()
     first.reset(0.0)

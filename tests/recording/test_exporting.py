@@ -36,7 +36,7 @@ def test_every_number_reads_back_the_same(tmp_path: Path, suffix: str, kind: str
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".csv"])
-def test_an_export_is_imported_without_saying_a_unit(tmp_path: Path, suffix: str) -> None:
+def test_an_export_is_imported_without_stating_units(tmp_path: Path, suffix: str) -> None:
     recording = made_recording(2500)
     path = export_table(recording, tmp_path / f"a{suffix}")
     channels = ("advance", "motor_torque", "handle_force", "torque_command", "force_command")
@@ -67,18 +67,18 @@ def test_parquet_carries_the_description(tmp_path: Path) -> None:
     assert json.loads(metadata[b"scissorcal.notes"]) == ["Two frames were garbled."]
 
 
-def test_what_stands_is_kept_and_wrong_names_are_refused(tmp_path: Path) -> None:
+def test_existing_files_are_kept_and_wrong_names_are_refused(tmp_path: Path) -> None:
     recording = made_recording(20)
     path = tmp_path / "a.csv"
     path.write_text("precious")
-    with pytest.raises(InputError, match=r"a\.csv stands already"):
+    with pytest.raises(InputError, match=r"a\.csv exists"):
         export_table(recording, path)
     assert path.read_text() == "precious"
     export_table(recording, path, overwrite=True)
     assert path.read_text().startswith("sequence,")
     with pytest.raises(InputError, match=r"written as \.parquet or \.csv"):
         export_table(recording, tmp_path / "a.xlsx")
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         export_table(recording, tmp_path / "nowhere" / "a.csv")
 
 

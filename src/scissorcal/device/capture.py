@@ -1,4 +1,4 @@
-"""Capture friction and cuts: drive the rig, or let a hand move it, and record what it does."""
+"""Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,17 +30,17 @@ FAULT_CLEARINGS_PER_S = 1.0
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut's capture: a second of it tells zeros of sensors."""
+"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
 
 CLEAR_REQUEST = (
-    "Take everything out from between the blades and keep clear: they will open, and the sledge "
-    "will go to its start."
+    "Take everything out from between the blades and keep clear: they open, and the sledge "
+    "moves to its start."
 )
 
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """What a capture recorded, what it met on the way, and how the servo did."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
 
     sample_count: int
     coverage: CoverageGrid
@@ -51,7 +51,7 @@ class CaptureReport:
 def open_writer(
     path: Path, kind: Kind, link: Link, recipe: Recipe, recipe_toml: str, *, hand: bool = False
 ) -> RecordingWriter:
-    """Open the recording of a capture, with everything that is known before it starts.
+    """Open the recording of a capture and write all that is known before it starts.
 
     ``recipe_toml`` is the recipe's text, as it stands in its file. Raises as RecordingWriter
     does, and as the plan of the capture does.
@@ -81,7 +81,7 @@ def capture_friction(
     *,
     confirm: Confirm | None = None,
 ) -> CaptureReport:
-    """Drive empty sweeps and a swing, and record them.
+    """Drive sweeps with empty blades and an excitation, and record them.
 
     ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
@@ -106,7 +106,7 @@ def capture_cut(
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
 ) -> CaptureReport:
-    """Drive strokes through sheet after sheet (or presses), or watch a hand make them.
+    """Drive strokes through sheets (or presses), or record those of a hand.
 
     With ``hand`` the motors are off while the hand moves; strokes are found from the motion. On
     a simulator the virtual hand does it, and motors bring the rig back before each sheet.
@@ -141,8 +141,8 @@ def capture_cut(
 def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
 
-    A computer that hesitates for 10 ms makes the device brake and latch a fault. That spoils a few
-    samples and no capture, so it is cleared, unless it comes more often than once a second.
+    A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
+    samples only, so the fault is cleared, unless there are more than one per second.
     """
     limits, control = recipe.limits, recipe.rig.control
     return ServoConfig(
@@ -181,7 +181,7 @@ def identity_of(facts: Mapping[str, Any]) -> Identity:
 
 
 class _Drive:
-    """Runs segments of a plan and tells how far it is."""
+    """Runs segments of a plan and reports progress."""
 
     def __init__(
         self, motion: Motion, recorder: Recorder, plan: Plan, progress: CaptureProgress | None
@@ -196,21 +196,21 @@ class _Drive:
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
         for samples in self._motion.track(segment.reference.head()):
-            self._take(samples, "going to where the next piece is loaded")
+            self._take(samples, "moving to where the next piece is loaded")
 
     def follow(self, segment: Segment) -> None:
         """Run a segment and record it."""
         begun = self._done
         for samples in self._motion.track(segment.reference):
-            passed = self._motion.track_index - self._motion.way_there
+            passed = self._motion.track_index - self._motion.approach_ticks
             self._done = max(self._done, begun + min(passed, len(segment.reference)))
             self._take(samples, self._doing(samples))
         self._done = begun + len(segment.reference)
 
     def idle(self) -> None:
-        """Record a second with the motors off, which shows the zeros of the sensors."""
+        """Record with the motors off, which shows the sensor zeros."""
         for samples in self._motion.idle(IDLE_S):
-            self._take(samples, "motors off, to see where the sensors have their zeros")
+            self._take(samples, "motors off, measuring sensor zeros")
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)

@@ -4,7 +4,7 @@
     python src/scissorcal/kernel/write_wire.py --check    # exit code 1 where a file differs
 
 Generated are the C structs with their packing (``c/sc_messages.h`` and ``.c``), the Python
-messages (``messages.py``), and the tables between the markers in ``docs/protocol.md``.
+messages (``messages.py``), and the tables of the messages in ``docs/protocol.md``.
 """
 
 import hashlib
@@ -176,9 +176,11 @@ def _meaning(field: Mapping[str, Any]) -> str:
 
 
 def _page(wire: Mapping[str, Any], page: str) -> str:
-    """Replace what stands between the markers of each message."""
+    """Replace the sentence and the table under the heading of each message."""
     for name, message in wire["messages"].items():
         rows = [
+            f"### `{name}`, 0x{message['type']:02X}",
+            "",
             f"{_sender(message)}, {message['size']} bytes. {message['meaning']}",
             "",
             "| offset | type | field | unit | meaning |",
@@ -188,9 +190,10 @@ def _page(wire: Mapping[str, Any], page: str) -> str:
             cells = (field["offset"], field["type"], field["name"], field.get("unit", ""))
             rows.append("| " + " | ".join(map(str, (*cells, field["meaning"]))) + " |")
         table = "\n".join(rows).replace("|  |", "| |")
-        start, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-        before, _, rest = page.partition(start)
-        page = f"{before}{start}{table}\n{end}{rest.partition(end)[2]}"
+        old = re.search(rf"### `{name}`, [^\n]*\n\n[^\n]*\n\n(?:\|[^\n]*\n)+", page)
+        if old is None:
+            raise ValueError(f"docs/protocol.md has no heading '### `{name}`, ...' with a table.")
+        page = f"{page[: old.start()]}{table}\n{page[old.end() :]}"
     return page
 
 

@@ -1,4 +1,4 @@
-"""From fits to a package that a 1 kHz loop can trust: tables with a bound, checked and hashed."""
+"""From fits to a package for a 1 kHz loop: tables with an error bound, checked and hashed."""
 
 import importlib
 from typing import TYPE_CHECKING, Any

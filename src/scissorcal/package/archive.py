@@ -1,7 +1,7 @@
-"""The package file: one zip whose bytes follow from its content, read with suspicion.
+"""The package file: one reproducible zip, checked before use.
 
 Nothing in a package is executed, unpickled or unpacked to disk. What its manifest does not name,
-or states otherwise, is refused before it is used.
+or names with another content, is refused before use.
 """
 
 import hashlib
@@ -47,7 +47,7 @@ _DAMAGE = (
     ValueError,
     OverflowError,
 )
-"""What the standard library raises on a damaged or foreign archive."""
+"""What the standard library raises for a damaged archive or another file."""
 
 Arrays = Mapping[str, NDArray[Any]]
 

@@ -1,4 +1,4 @@
-"""The exact law that a package's tables stand for: float64, no tables, any number of draws."""
+"""The exact model that a package's tables approximate: float64, no tables, any number of draws."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from scissorcal.model.cutting import torque_at
 Array = NDArray[np.float64]
 
 MOST_AT_ONCE = 500_000
-"""Draws times points evaluated in one sweep, so that a large grid does not fill the memory."""
+"""Draws times points evaluated in one sweep, to limit the memory of a large grid."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ExactModel:
         return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))
 
     def settled(self, opening: ArrayLike, contact: ArrayLike) -> Array:
-        """Contact x_c after the crack has run outwards as far as it must, in metres."""
+        """Contact x_c (m) after the crack has run outwards until it rests."""
         place = np.asarray(contact, dtype=np.float64)
         if self.cutting.fracture_energy is None:
             return place
@@ -64,7 +64,7 @@ class ExactModel:
 
 @dataclass(frozen=True)
 class FitDraws:
-    """What of one fit defines its law: discrete choices, and parameter draws (draws, names)."""
+    """What defines the law of one fit: discrete choices, and parameter draws (draws, names)."""
 
     structure: Mapping[str, Any]
     names: tuple[str, ...]

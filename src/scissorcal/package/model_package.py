@@ -1,4 +1,4 @@
-"""A package in memory: torque, its band, and the step that the loop runs."""
+"""A package in memory: torque, its band, and the kernel that the loop steps."""
 
 import warnings
 from collections.abc import Mapping
@@ -173,20 +173,20 @@ class ModelPackage:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What whoever renders this package should know beforehand, as sentences."""
+        """What to know before rendering this package, as sentences."""
         record = self.manifest.provenance
         left_out = record.cut.left_out + (record.friction.left_out if record.friction else ())
         return self.review_warnings + self.fit_warnings + left_out
 
     @property
     def review_warnings(self) -> tuple[str, ...]:
-        """What is wrong with its review: missing, of other fits, or a rejection."""
+        """Why its review is not valid: missing, of other fits, or a rejection."""
         why = against(self.manifest.review, self.manifest.fit_hashes)
         return (f"The package {self.manifest.name} {why}.",) if why else ()
 
     @property
     def draws(self) -> int:
-        """How many posterior draws the band is made of."""
+        """Number of posterior draws in the band."""
         return len(self.arrays["draws/cut.npy"])
 
     @cached_property
@@ -234,7 +234,9 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
     try:
         _ = package.tables, package.exact, package.average
     except (ValueError, KeyError) as error:
-        raise InputError(f"{path}: its parts make no model ({error}). {REMEDY}") from error
+        raise InputError(
+            f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
+        ) from error
     for sentence in package.fit_warnings if warn else ():
         warnings.warn(sentence, FailedFitsWarning, stacklevel=2)
     return package

@@ -1,4 +1,4 @@
-"""Hand a recording to other programs: Parquet and CSV, with the units in the columns' names."""
+"""Export a recording to Parquet or CSV, with units in the columns' names."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from scissorcal.recording.schema import RecordingMetadata, stroke_records, versi
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write the samples as a table; the ending of ``path`` (.parquet or .csv) says which.
+    """Write the samples as a table; the extension of ``path`` (.parquet or .csv) says which.
 
     One row a sample, one column a field of SAMPLE_DTYPE, named with its unit (``opening_rad``,
     or ``opening_m`` for a linear joint), and ``time_s``, the device clock from the first sample.
@@ -22,18 +22,19 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     (the metadata of ``data_schemas/recording.schema.json``) and notes, under the keys
     ``scissorcal.recording`` and ``scissorcal.notes``.
 
-    The file appears whole or not at all. Raises InputError for another ending, a missing folder,
-    a file that stands already, unless ``overwrite``, or Parquet without pyarrow.
+    The file is written whole or not at all. Raises InputError for another extension, a missing
+    folder, an existing file, unless ``overwrite``, or Parquet without pyarrow.
     """
     path = Path(path)
     if path.suffix.lower() not in _WRITERS:
         raise InputError(
-            f"{path}: tables are written as {' or '.join(_WRITERS)}. Give the name such an ending."
+            f"{path}: tables are written as {' or '.join(_WRITERS)}. Choose one of these "
+            "extensions."
         )
     if path.exists() and not overwrite:
-        raise InputError(f"{path} stands already. Choose another name, or allow overwriting.")
+        raise InputError(f"{path} exists. Choose another name, or allow overwriting.")
     if not path.parent.is_dir():
-        raise InputError(f"{path.parent} is no folder. Make it first, or choose another.")
+        raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
     draft = path.with_name(path.name + layout.PART_SUFFIX)
     try:
         _WRITERS[path.suffix.lower()](recording, draft)

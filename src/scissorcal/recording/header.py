@@ -132,13 +132,18 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
                 stream.seek(offset + HEAD.size)
                 name, entries = _metadata(stream.read(length - HEAD.size))
                 found.setdefault(name, []).append(entries)
-        described = [e for e in found.get(METADATA_NAME, ()) if e.get("crc32") == checksum(e)]
+        described = [e for e in found.get(METADATA_NAME, ()) if _is_sound(e)]
         if count is None or duration_ns is None or not described:
             return None
         notes = tuple(entries.get("note", "") for entries in found.get(NOTE_NAME, ()))
         return _header(described[0], notes, count, duration_ns * 1e-9)
     except (struct.error, KeyError, ValueError, TypeError):
         return None
+
+
+def _is_sound(entries: Mapping[str, str]) -> bool:
+    right = entries.get("format") == "scissorcal-recording/1"
+    return right and entries.get("crc32") == checksum(entries)
 
 
 def _records(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -168,10 +173,13 @@ def _metadata(body: bytes) -> tuple[str, dict[str, str]]:
 
 
 def _header(
-    entries: Mapping[str, str], notes: tuple[str, ...], count: int, duration_s: float
-) -> RecordingHeader | None:
-    if entries.get("format") != "scissorcal-recording/1":
-        return None
+    entries: Mapping[str, str],
+    notes: tuple[str, ...],
+    count: int,
+    duration_s: float,
+    *,
+    finished: bool = True,
+) -> RecordingHeader:
     radius = json.loads(entries["handle_radius_m"])
     strokes = json.loads(entries["strokes"])
     return RecordingHeader(
@@ -188,26 +196,16 @@ def _header(
         notes=notes,
         sample_count=count,
         duration_s=duration_s,
-        finished=True,
+        finished=finished,
     )
 
 
 def _from_scan(path: Path) -> RecordingHeader:
     from scissorcal.recording.scan import scan_file
+    from scissorcal.recording.schema import to_entries
 
     scan = scan_file(path)
-    metadata, samples = scan.metadata, scan.samples()
-    time_ns = samples["host_time_ns"]
-    return RecordingHeader(
-        kind=metadata.kind,
-        joint=metadata.joint_of_recording,
-        handle_radius_m=math.nan if metadata.handle_radius_m is None else metadata.handle_radius_m,
-        strokes=metadata.strokes_of_recording,
-        min_travel=metadata.min_travel,
-        recipe_toml=metadata.recipe_toml,
-        device=metadata.device,
-        notes=scan.notes(),
-        sample_count=len(samples),
-        duration_s=float(time_ns[-1] - time_ns[0]) * 1e-9 if len(samples) else 0.0,
-        finished=scan.finished,
-    )
+    time_ns = scan.samples()["host_time_ns"]
+    duration_s = float(time_ns[-1] - time_ns[0]) * 1e-9 if len(time_ns) else 0.0
+    entries = to_entries(scan.metadata)
+    return _header(entries, scan.notes(), len(time_ns), duration_s, finished=scan.finished)

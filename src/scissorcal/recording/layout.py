@@ -1,9 +1,9 @@
-"""How one sample stands in the file and in a table: bytes, units and names, all in one place.
+"""The layout of a sample in a file and in a table: bytes, units and names.
 
 A sample is one MCAP message in the CDR encoding (little-endian, four bytes of encapsulation
 header, then the 80 bytes of SAMPLE_DTYPE unchanged: its fields are naturally aligned, so CDR adds
-no padding). The schema is a plain message definition, so viewers that know CDR plot a recording
-without a plug-in and without ROS being installed.
+no padding). The schema is a plain message definition, so viewers of CDR plot a recording without
+a plug-in and without ROS.
 """
 
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -71,7 +71,7 @@ The servo loop writes the same bytes (``sc_sample`` in kernel/c/sc_servo.h), whi
 """
 
 SAMPLE_DTYPE = np.dtype([(channel.name, channel.dtype) for channel in SAMPLE])
-"""One sample as it stands in a recording and in the servo loop's ring: 80 bytes, little-endian.
+"""One sample as in a recording and in the servo loop's ring: 80 bytes, little-endian.
 
 ``device_time_us`` is unwrapped (it does not fall back after 2**32 us); ``stroke`` is the index into
 the recording's strokes, -1 between them; ``latency_ns`` runs from the state frame's arrival to the

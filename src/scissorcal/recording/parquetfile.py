@@ -20,7 +20,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
         data = file.read(columns=sorted({headings[number] for number in chosen.values()}))
     except (pa.ArrowException, OSError) as error:
         raise InputError(
-            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it anew, or "
+            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it again, or "
             "export it as CSV."
         ) from error
     columns = {}

@@ -1,4 +1,4 @@
-"""What a recording is, once it is in memory: arrays with time first, strokes, and provenance."""
+"""A recording in memory: arrays with time first, strokes, and provenance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,8 +24,8 @@ class Recording:
     ``samples`` has SAMPLE_DTYPE, shape (N,). For a linear joint ``opening`` holds metres and
     ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
-    SHA-256 of the file it was read from. ``notes`` are sentences about what reading had to do
-    (recovered tail, garbled frames, gaps), for the report.
+    SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
+    it found (recovered end, garbled frames, gaps), for the report.
     """
 
     kind: Kind

@@ -1,4 +1,4 @@
-"""The MCAP side of writing: samples, notes and attachments into one open file, in small chunks."""
+"""MCAP encoding: samples, notes and attachments into one open file, in small chunks."""
 
 from typing import IO, Any
 
@@ -10,15 +10,15 @@ from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, to_entries
 
 FLUSH_SPAN_NS = 125_000_000
-"""Host time that samples may wait in memory for their chunk: half of what is promised (0.25 s),
-so that the promise holds for a caller who appends eight times a second or oftener."""
+"""Host time that samples wait in memory for their chunk: half of the promised 0.25 s, so that the
+promise holds for callers that append at least eight times a second."""
 
 CHUNK_BYTES = 64 * 1024
-"""A chunk is closed at this size even where the samples' clock stands still (imports)."""
+"""A chunk is closed at this size even if the samples' clock does not advance (imports)."""
 
 
 class SampleFile:
-    """An MCAP file being written; knows the encoding, not names, locks or renaming.
+    """An MCAP file being written: the encoding only, not names, locks or renaming.
 
     The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it.
     """
@@ -68,7 +68,7 @@ class SampleFile:
         self.flush_if_due(times[-1])
 
     def flush_if_due(self, host_time_ns: int) -> None:
-        """Write the chunk out if its oldest sample has waited long enough by this clock."""
+        """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""
         if self._flushed_at is None:
             return
         if abs(host_time_ns - self._flushed_at) >= FLUSH_SPAN_NS:
@@ -92,7 +92,7 @@ class SampleFile:
         self._mark(NOTE_NAME, {"note": sentence})
 
     def mark_sheet(self, sheet: int) -> None:
-        """Say that from the next sample on this sheet of material is loaded (-1: none)."""
+        """Record that this sheet of material is loaded from the next sample on (-1: none)."""
         self._mark(layout.SHEET_NAME, {"sheet": str(sheet)})
 
     def finish(self) -> None:

@@ -1,4 +1,4 @@
-"""What a recording holds, in numbers: duration, rate, gaps, strokes and ranges."""
+"""A recording in numbers: duration, rate, gaps, strokes and ranges."""
 
 from dataclasses import dataclass
 
@@ -98,12 +98,13 @@ def find_gaps(samples: NDArray[np.void]) -> Gaps:
 
 
 def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
-    """Say in one sentence which frames are missing; nothing where none is."""
+    """One sentence on missing frames; none where no frame is missing."""
     gaps = find_gaps(samples)
     if not gaps.places:
         return ()
+    where = "1 gap" if gaps.places == 1 else f"{gaps.places} gaps"
     return (
-        f"{gaps.missing} frames are missing in {gaps.places} places, the longest gap "
+        f"{gaps.missing} frames are missing in {where}, the longest "
         f"({gaps.longest} frames) at {gaps.longest_at_s:.3f} s.",
     )
 

@@ -90,11 +90,11 @@ def package(path: Path) -> Facts:
     """Facts of a model package."""
     from scissorcal.package import open_package
 
-    manifest = open_package(path).manifest
+    manifest = open_package(path, warn=False).manifest
     return {
         "inputs": manifest.provenance.inputs_hash,
         "label": f"error bound {manifest.bound.stated_Nm:.2g} N m",
-        "failed": list(getattr(manifest.provenance, "failed_checks", ())),
+        "failed": list(manifest.failed_checks),
         "content": manifest.content_hash,
         "review": manifest.review.model_dump(mode="json") if manifest.review else None,
     }

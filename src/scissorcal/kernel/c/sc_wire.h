@@ -25,12 +25,12 @@ size_t sc_encode_frame(const uint8_t *payload, size_t size, uint8_t *frame, size
 
 void sc_decoder_init(sc_decoder *decoder);
 
-/* Take one byte. Returns the payload's size when it completes a sound frame (the payload then
+/* Take one byte. Returns the payload's size when it completes a valid frame (the payload then
  * stands at the start of decoder->buffer until the next byte), 0 while there is none, and -1 when
- * a frame was thrown away, which garbled counts. */
+ * a frame was discarded, which garbled counts. */
 int sc_decoder_push(sc_decoder *decoder, uint8_t byte);
 
-/* Take bytes until a sound frame completes or they are used up. Adds what was taken to *taken;
+/* Take bytes until a valid frame completes or they are used up. Adds what was taken to *taken;
  * returns the payload's size, 0 when the bytes ran out. */
 int sc_decoder_feed(sc_decoder *decoder, const uint8_t *data, size_t size, size_t *taken);
 

@@ -273,7 +273,7 @@ def _render(
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
 
-    package = open_package(workspace.package_path(recipe))
+    package = open_package(workspace.package_path(recipe), warn=False)
     path = workspace.new_recording("render")
     with open_writer(path, link, package, read_text(workspace.recipe_path)) as writer:
         result = render(link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer)

@@ -48,7 +48,7 @@ def render_workspace(
     from scissorcal.render import open_writer, render
 
     recipe = workspace.recipe()
-    package = open_package(package_path or workspace.package_path(recipe))
+    package = open_package(package_path or workspace.package_path(recipe), warn=False)
     with open_rig(device, recipe.specimen, seed) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
         path = workspace.new_recording("render") if record else None
@@ -77,7 +77,7 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
 
     engine = Engine.of(workspace)
     try:
-        package = open_package(package_path or engine.file("package build"))
+        package = open_package(package_path or engine.file("package build"), warn=False)
     except ScissorcalError:
         return ()
     if package_path is not None:

@@ -139,7 +139,7 @@ def _package_sheets(engine: Engine) -> "list[FactSheet]":
     if not path.is_file():
         return []
     try:
-        manifest = open_package(path).manifest
+        manifest = open_package(path, warn=False).manifest
     except InputError as error:
         return [sheet_from_mapping("Package", "package", {}, notes=[str(error)])]
     facts = {
