@@ -147,7 +147,7 @@ def test_nothing_is_kept_where_nothing_can_be_used(
     [
         ("board-0.jpg", "One photograph alone", 5),
         ("flat-*.jpg", "focal length is not determined", 3),
-        (None, "There is no photograph", 5),
+        (None, "Nothing to fit", 5),
     ],
 )
 def test_a_fit_that_cannot_be_is_refused_and_writes_nothing(
@@ -182,7 +182,7 @@ def test_photographs_of_other_sizes_turns_and_boards_are_left_out(
     assert "given twice" in said.err
     said = cli("capture", "camera", "--board", "chessboard:9x6:25", "-i", boards(album)[2])
     assert said.code == 2
-    assert "a fit takes one board" in said.err
+    assert "one fit uses one board" in said.err
 
 
 def test_pictures_are_picked_from_a_video(

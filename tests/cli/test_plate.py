@@ -172,12 +172,12 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
 def test_what_must_come_first_is_said(cli: Cli, workspace: Path, album: Path) -> None:
     said = cli("fit", "plate", "--json")
     assert said.code == 5
-    assert "There is no camera yet" in said.envelope["result"]["error"]
+    assert "scissorcal capture plate" in said.envelope["result"]["error"]
     assert cli("capture", "track", "--camera", "sim").code == 5
     cli("import", album / "camera.yml")
     said = cli("fit", "plate")
     assert said.code == 5
-    assert "There is no photograph of the plate's target" in said.err
+    assert "Nothing to fit (capture plate: " in said.err
 
 
 def test_photographs_of_another_size_are_refused(
@@ -189,7 +189,7 @@ def test_photographs_of_another_size_are_refused(
     assert cli("capture", "plate", "-i", half).code == 0
     said = cli("fit", "plate")
     assert said.code == 2
-    assert "has 1000 x 750 pixels, the camera was fitted at 2000 x 1500" in said.err
+    assert "has 1000 x 750 pixels, and the camera was fitted at 2000 x 1500" in said.err
 
 
 def test_a_video_is_tracked_and_its_drop_outs_named(

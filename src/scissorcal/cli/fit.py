@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from scissorcal.cli.lazy import LazyGroup, group
+from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder, Seed, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
-from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.fit import FitOutcome
@@ -41,6 +40,16 @@ _SHOWN = {
 }
 """Which module says what a fit found: its ``text`` for people, its ``facts`` for ``--json``."""
 
+_EXAMPLES = {
+    "camera": "camera: 2000 x 1500, 15 photographs of the camera board, k1, k2, p1, p2",
+    "blade": "blade: arc, 74.92 mm long, 3 photographs",
+    "plate": "plate: 5 photographs of the plate board, rms 0.03 px",
+    "friction": "friction: stribeck + angle, symmetric (standard)",
+    "cut": "cut: power response, rippled fracture (standard)",
+    "all": "friction: stribeck + angle, symmetric (standard)",
+}
+"""What the help of each command shows as its first line of output."""
+
 Effort = Annotated[
     Literal["draft", "standard", "thorough"] | None,
     typer.Option(
@@ -58,17 +67,7 @@ MaxMinutes = Annotated[
 ]
 
 
-class _FitGroup(LazyGroup):
-    """Refuses options of ``fit`` itself in front of a subcommand, where they would be lost."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        given = {"effort", "force", "seed", "folder"}
-        if any(ctx.params.get(name) for name in given):
-            raise InputError("Give the options after the subcommand, not in front of it.")
-        return super().resolve_command(ctx, args)
-
-
-@group(_COMMANDS, cls=_FitGroup, runs_alone=True)
+@group(_COMMANDS, runs_alone=True)
 @command
 def fit(
     effort: Effort = None,
@@ -111,7 +110,14 @@ def _command_of(*wanted: str) -> Callable[..., None]:
         return _run(wanted, folder, effort, force, max_minutes, seed)
 
     what = wanted[0] if wanted else "all"
-    fit_one.__doc__ = f"{_COMMANDS[what][1]} See 'scissorcal fit --help'."
+    fit_one.__doc__ = f"""{_COMMANDS[what][1]} See 'scissorcal fit --help'.
+
+    \b
+    Example:
+      $ scissorcal fit {what}
+      {_EXAMPLES[what]}
+      ...
+    """
     return command(fit_one)
 
 

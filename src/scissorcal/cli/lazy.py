@@ -54,10 +54,7 @@ class LazyGroup(TyperGroup):
 
 
 def group(
-    commands: Commands,
-    cls: type[LazyGroup] = LazyGroup,
-    runs_alone: bool = False,
-    **settings: Any,
+    commands: Commands, runs_alone: bool = False, **settings: Any
 ) -> Callable[[Callable[..., None]], typer.Typer]:
     """Make a group of ``commands``, described by the docstring of the decorated function.
 
@@ -69,7 +66,7 @@ def group(
         name = function.__name__
         return typer.Typer(
             name=name,
-            cls=type(name, (cls,), {"lazy": commands}),
+            cls=type(name, (LazyGroup,), {"lazy": commands}),
             callback=function,
             invoke_without_command=runs_alone,
             no_args_is_help=not runs_alone,

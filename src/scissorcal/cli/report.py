@@ -1,15 +1,14 @@
 """``scissorcal report``"""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from scissorcal.cli.lazy import LazyGroup, group
+from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command
-from scissorcal.errors import InputError
 
 _COMMANDS = {
     "compare": ("scissorcal.cli.report:compare", "Put two runs side by side."),
@@ -17,16 +16,7 @@ _COMMANDS = {
 }
 
 
-class _ReportGroup(LazyGroup):
-    """Refuses options of ``report`` itself in front of a subcommand, where they would be lost."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        if any(ctx.params.values()):
-            raise InputError("Give the options after the subcommand, not in front of it.")
-        return super().resolve_command(ctx, args)
-
-
-@group(_COMMANDS, cls=_ReportGroup, runs_alone=True)
+@group(_COMMANDS, runs_alone=True)
 @command
 def report(
     anew: Annotated[

@@ -171,7 +171,7 @@ def load_result(engine: Engine, what: str) -> Any:
     """
     step = BY_NAME[f"fit {what}"]
     state = engine.state(step.name)
-    if state.state == "missing":
+    if state.state == "missing" or not engine.file(step.name).exists():
         raise MissingError(f"There is no fit of {what} yet: run '{step.command}' first.")
     if state.state == "stale":
         raise MissingError(
@@ -239,7 +239,7 @@ def _refuse_without_data(engine: Engine, capture: Step) -> None:
     notes = "".join(f" {sentence}" for sentence in state.notes)
     sim = " (or --device sim)" if capture.kind == "recordings" else ""
     raise MissingError(
-        f"Nothing to fit: {capture.name} has {state.found}.{notes} Run '{capture.command}'{sim} "
+        f"Nothing to fit ({capture.name}: {state.found}).{notes} Run '{capture.command}'{sim} "
         "first."
     )
 
