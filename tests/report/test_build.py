@@ -50,7 +50,7 @@ def test_the_twin_holds_the_facts_of_the_fits(whole: Built) -> None:
     told = values_of(panel_of(whole.twin, "cut-parameters"))
     assert list(told) == [p.name for p in fit.parameters]
     for parameter in fit.parameters:
-        mean, median = told[parameter.name]["mean"], told[parameter.name]["median"]
+        mean, median = told[parameter.name]["mean"], told[parameter.name]["median, 90 %"]
         assert (mean["number"], mean["sd"], mean["unit"]) == (
             parameter.mean,
             parameter.sd,

@@ -49,6 +49,7 @@ class SceneFacts:
     thickness_mm: float
     closure: str
     render_friction: bool
+    tolerance_percent: float
 
 
 @dataclass(frozen=True)
@@ -228,6 +229,7 @@ def scene_facts(recipe: Recipe) -> SceneFacts:
         recipe.material.thickness_mm,
         recipe.scene.closure,
         recipe.scene.render_friction,
+        recipe.scene.tolerance_percent,
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 
-from scissorcal.report.numbers import Number, short, significant, unit_text
+from scissorcal.report.numbers import Number, short, significant, unit_text, with_decimals
 from scissorcal.report.panel import Axis, Chart, Look, Series
 
 WIDTH, HEIGHT = 460, 300
@@ -129,6 +129,8 @@ def _extent(chart: Chart, key: str) -> tuple[float, float]:
     if axis.categories:
         return -0.5, len(axis.categories) - 0.5
     known = _values(chart.series, key)
+    for one in chart.series:
+        known += _rims(one, key, axis) if one.kind == "cells" else []
     if key == ("x" if chart.y.categories else "y"):
         for one in chart.series:
             known += [v for v in (*one.low, *one.high) if v is not None]
@@ -145,6 +147,17 @@ def _extent(chart: Chart, key: str) -> tuple[float, float]:
     else:
         below, above = low - 0.04 * (high - low), high + 0.04 * (high - low)
     return below if axis.low is None else low, above if axis.high is None else high
+
+
+def _rims(one: Series, key: str, axis: Axis) -> list[float]:
+    """The outer ends of the cells along an axis."""
+    values = sorted({v for v in getattr(one, key) if v is not None})
+    if len(values) < 2 or axis.high is not None:
+        return []
+    a, b, y, z = values[0], values[1], values[-2], values[-1]
+    if axis.log:
+        return [a * math.sqrt(a / b), z * math.sqrt(z / y)]
+    return [a - 0.5 * (b - a), z + 0.5 * (z - y)]
 
 
 def _ticks(axis: Axis, extent: tuple[float, float]) -> _Ticks:
@@ -165,8 +178,9 @@ def _ticks(axis: Axis, extent: tuple[float, float]) -> _Ticks:
     step = 10.0 ** math.floor(math.log10((high - low) / 4))
     step *= next(m for m in (1, 2, 5, 10) if (high - low) / (m * step) <= 6.5)
     first = math.ceil(low / step)
-    places = [round(k * step, 12) for k in range(first, math.floor(high / step) + 1)]
-    return _Ticks(low, high, tuple((v, short(v, 4)) for v in places))
+    places = [k * step for k in range(first, math.floor(high / step) + 1)]
+    decimals = max(0, -math.floor(math.log10(step) + 1e-9))
+    return _Ticks(low, high, tuple((v, with_decimals(v, decimals)) for v in places))
 
 
 def _grid(
@@ -183,7 +197,8 @@ def _grid(
         if xs.low < 0 < xs.high and not sx.log:
             parts.append(f'<path class="zero" d="M{sx(0.0):.1f} {TOP}V{bottom}"/>')
     parts.append("</g>")
-    for v, text in xs.labels:
+    room = CHARACTER * sum(len(text) + 2 for _, text in xs.labels)
+    for v, text in xs.labels[:: 1 + int(room / (right - left))]:
         parts.append(f'<text x="{sx(v):.1f}" y="{bottom + 17}" class="mid">{escape(text)}</text>')
     for number, (v, text) in enumerate(ys.labels):
         label = f'<text x="{left - 7:.1f}" y="{sy(v) + 3.5:.1f}" class="end">{escape(text)}</text>'
@@ -303,7 +318,7 @@ def _cells(one: Series, sx: _Scale, sy: _Scale) -> str:
         parts.append(
             f'<rect {place} fill-opacity="{shade:.2f}"><title>{short(value)}</title></rect>'
         )
-        if label:
+        if label and sx.start + 11 < 0.5 * (a + b) < sx.end - 11:
             at = f'x="{0.5 * (a + b):.1f}" y="{0.5 * (c + d) + 3:.1f}"'
             parts.append(f'<text {at} class="mid cell">{short(value, 2)}</text>')
     return "".join(parts)
