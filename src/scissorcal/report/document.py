@@ -97,7 +97,9 @@ def compose(
     version: str,
 ) -> ReportDocument:
     """Gather all panels; draws nothing and touches no file."""
-    named: dict[str, FitResult] = {fit.what: fit for fit in reversed(fits)}
+    named: dict[str, FitResult] = {}
+    for fit in fits:
+        named.setdefault(fit.what, fit)
     geometry, missing = _required(recipe, evidence.geometry)
     checks = {w: evidence.checks[w] for w, fit in named.items() if _is_of(evidence, fit)}
     keyed = dict(zip(_anchors(fits), fits, strict=True))

@@ -189,7 +189,7 @@ def _signature(review: Review | None) -> str:
     note = f"<p>{escape(review.note)}</p>" if review.note else ""
     return (
         f"<h2>{done}</h2><p>Signed by <strong>{escape(review.name)}</strong> on "
-        f"{escape(review.time_utc[:10])}.</p>{note}"
+        f'<span class="whole">{escape(review.time_utc[:10])}</span>.</p>{note}'
     )
 
 

@@ -60,23 +60,22 @@ class _Scale:
 
 
 def svg(chart: Chart) -> str:
-    """Draw a chart; its title and what it shows in words are those of the figure."""
+    """Draw a chart; what it shows stands in words in its label (a title would cover the values)."""
     categories = len(chart.y.categories)
     width, height = SMALL if chart.small else (WIDTH, HEIGHT)
     if categories:
         height = TOP + BOTTOM + ROW * max(categories, 2)
     ys = _ticks(chart.y, _extent(chart, "y"))
     left = 30 + CHARACTER * max((len(label) for _, label in ys.labels), default=0)
-    x_scale_room = (left, width - RIGHT)
     xs = _ticks(chart.x, _extent(chart, "x"))
-    sx = _Scale(xs.low, xs.high, *x_scale_room, chart.x.log)
+    sx = _Scale(xs.low, xs.high, left, width - RIGHT, chart.x.log)
     ends = (TOP, height - BOTTOM) if categories or chart.y.reverse else (height - BOTTOM, TOP)
     sy = _Scale(ys.low, ys.high, *ends, chart.y.log)
     clip = f"{chart.id}-clip"
     parts = [
         f'<svg viewBox="0 0 {width} {height}" role="{"group" if chart.y.links else "img"}" '
         f'aria-label="{escape(reading(chart))}" data-x="{sx.data}" data-y="{sy.data}">',
-        f"<title>{escape(chart.title)}</title><desc>{escape(reading(chart))}</desc>",
+        f"<desc>{escape(reading(chart))}</desc>",
         f'<clipPath id="{clip}"><rect x="{left:.1f}" y="{TOP - 5}" '
         f'width="{width - RIGHT - left:.1f}" height="{height - BOTTOM - TOP + 10}"/></clipPath>',
         _grid(chart, xs, ys, sx, sy, (left, width, height)),
