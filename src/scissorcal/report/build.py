@@ -63,7 +63,8 @@ def build_report(
     read. ``sheets`` are further parts, such as what a package states (:func:`sheet_from_mapping`);
     ``checks`` are trust checks by fit, ``geometry`` what photographs gave, whose pictures the page
     carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
-    used, cell by cell. The page shows ``review`` where it was given to this very twin.
+    used, cell by cell. The page shows ``review`` (by default the one in ``signature.json`` there)
+    where it was given to this very twin.
     ``created`` must carry its time zone. The same input gives the same bytes; a report that says
     the same as the one in ``output_dir`` keeps the time of that one.
 
@@ -100,7 +101,7 @@ def build_report(
         Path(output_dir) / "report.html", Path(output_dir) / "report.json", document
     )
     document, twin = _with_earlier_time(document, files.json)
-    page = report_page(document, geometry, _signed(review, twin))
+    page = report_page(document, geometry, _signed(review, twin, files.json.parent))
     _write_both(files, page, twin)
     return replace(files, document=document)
 
@@ -144,10 +145,13 @@ def sign_page(html: Path, review: Review) -> None:
         ) from error
 
 
-def _signed(review: Review | None, twin: str) -> Review | None:
-    """The review, if it is of this twin."""
+def _signed(review: Review | None, twin: str, folder: Path) -> Review | None:
+    """The review, or the one in the folder, if it is of this twin."""
     if review is None:
-        return None
+        try:
+            review = Review.model_validate_json((folder / "signature.json").read_bytes())
+        except (OSError, ValueError):
+            return None  # not signed, or damaged, which `plan` says
     digest = hashlib.sha256(twin.encode("utf-8")).hexdigest()
     return review if review.report_sha256 == digest else None
 

@@ -246,10 +246,14 @@ def _verdicts(first: ReportDocument, second: ReportDocument) -> Panel:
     rows = []
     for name in dict.fromkeys([*outcomes[0], *outcomes[1]]):
         a, b = (own.get(name, "not made") for own in outcomes)
-        rows.append(Row(name, (words("A", a), words("B", b)), marked=a != b))
+        both = all(name in own for own in outcomes)
+        rows.append(Row(name, (words("A", a), words("B", b)), marked=both and a != b))
     rows.sort(key=lambda row: not row.marked)
     changed = sum(row.marked for row in rows)
-    sentence = f"{changed} of {len(rows)} checks have another outcome."
+    both_made = set(outcomes[0]) & set(outcomes[1])
+    sentence = f"{changed} of {len(both_made)} checks that both made have another outcome."
+    if len(rows) > len(both_made):
+        sentence += f" {len(rows) - len(both_made)} checks were made by one alone."
     return Panel("verdicts-all", "verdicts", "Verdicts", sentence, tuple(rows))
 
 
@@ -276,14 +280,17 @@ def _torque(first: Side, second: Side) -> Panel:
     scale = float(size.max())
     felt = size >= FELT_SHARE * scale
     apart = felt & ((a[:, 1] > b[:, 2]) | (b[:, 1] > a[:, 2]))
-    shares = [float(np.mean(flags[felt])) if felt.any() else 0.0 for flags in (apart,)]
+    tolerance = 0.01 * (scenes[0].tolerance_percent if scenes[0] else 0.0)
+    beyond = felt & (np.abs(difference) > tolerance * size)
+    shares = [float(np.mean(flags[felt])) if felt.any() else 0.0 for flags in (apart, beyond)]
     at = int(np.argmax(np.abs(difference)))
     most = abs(float(difference[at]))
     sentence = (
         f"Rendered torque differs by at most {significant(most)} N m "
         f"({percent(most / scale if scale else None)} of the largest torque, at "
-        f"{pairs[at][0].name}); the bands do not meet at {percent(shares[0])} of the places that "
-        "can be felt."
+        f"{pairs[at][0].name}); by more than the tolerance of {percent(tolerance)} at "
+        f"{percent(shares[1])} of the places that can be felt, and the bands do not meet at "
+        f"{percent(shares[0])}."
     )
     rows = (
         Row("largest difference", (number("B − A", difference[at], "N m"),), pairs[at][0].name),

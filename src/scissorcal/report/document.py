@@ -49,6 +49,7 @@ class SceneFacts:
     thickness_mm: float
     closure: str
     render_friction: bool
+    tolerance_percent: float
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,9 @@ def compose(
     version: str,
 ) -> ReportDocument:
     """Gather all panels; draws nothing and touches no file."""
-    named: dict[str, FitResult] = {fit.what: fit for fit in reversed(fits)}
+    named: dict[str, FitResult] = {}
+    for fit in fits:
+        named.setdefault(fit.what, fit)
     geometry, missing = _required(recipe, evidence.geometry)
     checks = {w: evidence.checks[w] for w, fit in named.items() if _is_of(evidence, fit)}
     keyed = dict(zip(_anchors(fits), fits, strict=True))
@@ -229,6 +232,7 @@ def scene_facts(recipe: Recipe) -> SceneFacts:
         recipe.material.thickness_mm,
         recipe.scene.closure,
         recipe.scene.render_friction,
+        recipe.scene.tolerance_percent,
     )
 
 

@@ -24,54 +24,45 @@ SAID: dict[Stance, str] = {
 }
 DRAFT_SKIPS = "k-hat"
 
-ADVICE: tuple[tuple[tuple[str, ...], str], ...] = (
-    (
-        ("k-hat",),
+ADVICE: dict[str, str] = {
+    "k-hat": (
         "The posterior is far from its approximation: record more varied strokes, or choose a "
-        "simpler candidate in the recipe's `[fit]` table.",
+        "simpler candidate in the recipe's `[fit]` table."
     ),
-    (
-        ("optimum",),
+    "optimum": (
         "The search did not settle: check the recording's units and signs, then fit again, with "
-        "`--effort standard` if this was a draft.",
+        "`--effort standard` if this was a draft."
     ),
-    (
-        ("bound",),
+    "bound": (
         "A parameter ended at the edge of the search: check the recording's units and signs, then "
-        "its prior in the recipe.",
+        "its prior in the recipe."
     ),
-    (
-        ("whiteness",),
+    "whiteness": (
         "The residuals are autocorrelated: look at the worst strokes, then record longer or more "
-        "varied motion, or try a richer candidate in the recipe's `[fit]` table.",
+        "varied motion, or try a richer candidate in the recipe's `[fit]` table."
     ),
-    (
-        ("held-out",),
+    "held-out": (
         "New strokes are not predicted well: record more strokes at the speeds of the worst ones, "
-        "or try a richer candidate.",
+        "or try a richer candidate."
     ),
-    (
-        ("r-squared",),
+    "r-squared": (
         "The law explains too little: check the recording's units and signs, and that what was "
-        "recorded is what the recipe says.",
+        "recorded is what the recipe says."
     ),
-    (
-        ("calibration", "refits"),
+    "calibration|refits": (
         "Intervals do not hold the truth as often as they claim on data simulated from the fit: "
-        "fit with more effort, or choose a simpler candidate in the recipe's `[fit]` table.",
+        "fit with more effort, or choose a simpler candidate in the recipe's `[fit]` table."
     ),
-    (
-        ("trust", "halves"),
+    "trust|halves": (
         "Two halves of the data disagree by more than they claim: check that nothing moved or "
-        "warmed up during the capture, then capture again.",
+        "warmed up during the capture, then capture again."
     ),
-    (
-        ("identifiability",),
+    "identifiability": (
         "Some parameters repeat their prior: record the speeds or openings that inform them, or "
-        "choose a candidate without them.",
+        "choose a candidate without them."
     ),
-)
-"""What to do about a check that failed, by a word in its name."""
+}
+"""What to do about a check that failed, by words in its name, parted by bars."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +172,7 @@ def _advice(fit: FitResult, checks: Sequence[str]) -> tuple[str, ...]:
     steps: list[str] = []
     for check in checks:
         said = check.lower()
-        known = [step for keys, step in ADVICE if any(key in said for key in keys)]
+        known = [step for keys, step in ADVICE.items() if any(k in said for k in keys.split("|"))]
         steps += known[:1] or [f"Read why {check} failed, correct that, and fit again."]
     again = f"Then run `scissorcal fit {fit.what}` and `scissorcal report` again."
     return (*dict.fromkeys(steps), again)

@@ -7,7 +7,6 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.report.numbers import short, unit_text
@@ -40,25 +39,21 @@ DECISIONS = {
 }
 """Texts that are set as badges, and how those look."""
 
-Images = Mapping[tuple[str, str], Image]
-
 
 def report_page(document: ReportDocument, geometry: Geometry, review: Review | None) -> str:
     """Write the page with as many pictures as it can carry and stay below `PAGE_BYTES`."""
-    files = _files(document, geometry)
-    page = _report(document, review, {})
-    if not files:
-        return page
+    page = _report(document, review)
+    shown = [(panel.part, picture) for panel in document.panels for picture in panel.pictures]
+    files: dict[str, list[PictureFile]] = {}
+    for part, picture in shown:
+        paths = (path for path in geometry.pictures.get(part, ()) if path.name == picture.file)  # type: ignore[call-overload]
+        files.setdefault(part, []).append(PictureFile(next(paths), picture.widest_px))
     # the words around pictures take room too: some hundred bytes each
-    words = 1000 * sum(len(own) for own in files.values())
-    room = min(PAGE_BYTES - len(page.encode()) - words, PICTURE_BYTES)
-    placed = place_pictures(files, room)
-    images = {
-        (part, file.path.name): image
-        for part, own in files.items()
-        for file, image in zip(own, placed[part], strict=True)
-    }
-    return _report(document, review, images)
+    room = min(PAGE_BYTES - len(page.encode()) - 1000 * len(shown), PICTURE_BYTES)
+    images = {part: iter(own) for part, own in place_pictures(files, room).items()}
+    for part, picture in shown:
+        page = page.replace(_place(part, picture), _photo(picture, next(images[part])), 1)
+    return page
 
 
 def comparison_page(found: Comparison) -> str:
@@ -73,7 +68,7 @@ def comparison_page(found: Comparison) -> str:
         f'<h1>A and B</h1><dl>{sides}</dl><p class="finding">{prose(found.sentence)}</p>{made}'
         f"</section>{_tools([(p.id, p.title) for p in found.panels])}"
     )
-    body += "".join(_panel(panel, {}, open_=True) for panel in found.panels)
+    body += "".join(_panel(panel, open_=True) for panel in found.panels)
     return _page("Comparison of two calibration reports", body + "</main>")
 
 
@@ -96,7 +91,7 @@ def prose(sentence: str) -> str:
     )
 
 
-def _report(document: ReportDocument, review: Review | None, images: Images) -> str:
+def _report(document: ReportDocument, review: Review | None) -> str:
     body = ['<main id="report">', _decision(document, review)]
     body.append(_tools([(part.id, part.title.partition(":")[0]) for part in document.parts]))
     for part in document.parts:
@@ -105,9 +100,9 @@ def _report(document: ReportDocument, review: Review | None, images: Images) -> 
         inner = "".join(
             _panel(
                 panel,
-                images,
                 open_=len(panels) < 3,
-                whole=len(panels) == 1 and panel.sentence == part.sentence,
+                above=part.sentence,
+                whole=len(panels) == 1 and panel.sentence in {"", part.sentence},
             )
             for panel in panels
         )
@@ -194,7 +189,7 @@ def _signature(review: Review | None) -> str:
     note = f"<p>{escape(review.note)}</p>" if review.note else ""
     return (
         f"<h2>{done}</h2><p>Signed by <strong>{escape(review.name)}</strong> on "
-        f"{escape(review.time_utc[:10])}.</p>{note}"
+        f'<span class="whole">{escape(review.time_utc[:10])}</span>.</p>{note}'
     )
 
 
@@ -208,9 +203,14 @@ def _tools(parts: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def _panel(panel: Panel, images: Images, *, open_: bool, whole: bool = False) -> str:
-    """A panel that opens on demand; one that is its whole part stands open."""
-    sentence = f'<p class="finding">{prose(panel.sentence)}</p>' if panel.sentence else ""
+def _panel(panel: Panel, *, open_: bool, above: str = "", whole: bool = False) -> str:
+    """A panel that opens on demand; ``whole`` says that it is all of its part.
+
+    Its sentence is left out where it stands ``above`` already.
+    """
+    sentence = f'<p class="finding">{prose(panel.sentence)}</p>'
+    if panel.sentence in {"", above}:
+        sentence = ""
     head = f"<h3>{escape(panel.title)}</h3>"
     body = _notes(panel.notes) + _charts(panel.charts)
     if panel.rows:
@@ -218,8 +218,9 @@ def _panel(panel: Panel, images: Images, *, open_: bool, whole: bool = False) ->
     if panel.verdicts:
         body += _verdicts(panel.verdicts)
     if panel.pictures:
-        body += '<div class="photos">' + "".join(_photo(p, panel, images) for p in panel.pictures)
-        body += "</div>"
+        body += (
+            f'<div class="photos">{"".join(_place(panel.part, p) for p in panel.pictures)}</div>'
+        )
     if whole:
         return f'<div class="panel" id="{escape(panel.id)}">{body}</div>'
     if not body:
@@ -266,11 +267,14 @@ def _key(chart: Chart) -> str:
         if not word or word in entries or (chart.small and not chart.id.count("-prior-")):
             continue
         group = f' data-group="{escape(one.group or str(number))}"' if one.toggle else ""
-        entries[word] = (
+        fixed = "" if one.toggle else "~"  # those that are switched stand first
+        entries[word] = fixed + (
             f'<li class="{one.kind} {one.look} {one.style}"{group} title="{escape(one.name)}">'
             f"{escape(word)}</li>"
         )
-    return f'<ul class="key">{"".join(entries.values())}</ul>' if len(entries) > 1 else ""
+    listed = sorted(entries.values(), key=lambda entry: entry.startswith("~"))
+    items = "".join(entry.removeprefix("~") for entry in listed)
+    return f'<ul class="key">{items}</ul>' if len(entries) > 1 else ""
 
 
 def _table(panel: Panel) -> str:
@@ -311,7 +315,7 @@ def _num(numeric: bool) -> str:
 
 def _worded(row: Row, name: str) -> bool:
     value = row.value(name)
-    return value is not None and bool(value.text)
+    return value is not None and value.text not in {"", "–"}
 
 
 def _linked(row: Row) -> str:
@@ -340,26 +344,27 @@ def _verdicts(verdicts: Sequence[Verdict]) -> str:
         for v in verdicts
     )
     return (
-        '<div class="scroll" role="region" tabindex="0" aria-label="Verdicts"><table>'
-        '<thead><tr><th scope="col">Outcome</th><th scope="col">Check</th><th scope="col" '
-        'class="num">Value</th><th scope="col">Limit</th><th scope="col">Why</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
+        '<div class="scroll" role="region" tabindex="0" aria-label="Verdicts">'
+        '<table class="verdicts"><thead><tr><th scope="col">Outcome</th><th scope="col">Check</th>'
+        '<th scope="col" class="num">Value</th><th scope="col">Limit</th><th scope="col">Why</th>'
+        f"</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
 
-def _photo(picture: Picture, panel: Panel, images: Images) -> str:
-    image = images.get((panel.part, picture.file))
-    shown, caption = "", picture.caption
-    if image is not None and image.data:
-        shown = (
-            f'<img src="{image.data}" width="{image.width}" height="{image.height}" '
-            f'alt="{escape(picture.alt)}">'
-        )
-    elif image is not None:
-        caption = image.missing
+def _place(part: str, picture: Picture) -> str:
+    """Where a picture goes, once it is known how many the page can carry."""
+    return f"<!--picture {escape(part)} {escape(picture.file)}-->"
+
+
+def _photo(picture: Picture, image: Image) -> str:
+    shown = (
+        f'<img src="{image.data}" width="{image.width}" height="{image.height}" '
+        f'alt="{escape(picture.alt)}">'
+    )
+    caption = picture.caption if image.data else image.missing
     return (
-        f'<figure class="photo" tabindex="0"><p class="title">{escape(picture.title)}</p>{shown}'
-        f"<figcaption>{prose(caption)}</figcaption></figure>"
+        f'<figure class="photo" tabindex="0"><p class="title">{escape(picture.title)}</p>'
+        f"{shown if image.data else ''}<figcaption>{prose(caption)}</figcaption></figure>"
     )
 
 
@@ -370,17 +375,3 @@ def _recipe(document: ReportDocument) -> str:
         '<pre role="region" tabindex="0" aria-label="Text of the recipe">'
         f"{escape(provenance.recipe_text)}</pre>"
     )
-
-
-def _files(document: ReportDocument, geometry: Geometry) -> dict[str, list[PictureFile]]:
-    """The picture files of what the panels show, by part, in the order in which they matter."""
-    paths: dict[tuple[str, str], Path] = {
-        (kind, path.name): path for kind, own in geometry.pictures.items() for path in own
-    }
-    files: dict[str, list[PictureFile]] = {}
-    for panel in document.panels:
-        for picture in panel.pictures:
-            path = paths.get((panel.part, picture.file))
-            if path is not None:
-                files.setdefault(panel.part, []).append(PictureFile(path, picture.widest_px))
-    return files

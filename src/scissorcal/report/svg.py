@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 
-from scissorcal.report.numbers import Number, short, significant, unit_text
+from scissorcal.report.numbers import Number, short, significant, unit_text, with_decimals
 from scissorcal.report.panel import Axis, Chart, Look, Series
 
 WIDTH, HEIGHT = 460, 300
@@ -60,23 +60,22 @@ class _Scale:
 
 
 def svg(chart: Chart) -> str:
-    """Draw a chart; its title and what it shows in words are those of the figure."""
+    """Draw a chart; what it shows stands in words in its label (a title would cover the values)."""
     categories = len(chart.y.categories)
     width, height = SMALL if chart.small else (WIDTH, HEIGHT)
     if categories:
         height = TOP + BOTTOM + ROW * max(categories, 2)
     ys = _ticks(chart.y, _extent(chart, "y"))
     left = 30 + CHARACTER * max((len(label) for _, label in ys.labels), default=0)
-    x_scale_room = (left, width - RIGHT)
     xs = _ticks(chart.x, _extent(chart, "x"))
-    sx = _Scale(xs.low, xs.high, *x_scale_room, chart.x.log)
+    sx = _Scale(xs.low, xs.high, left, width - RIGHT, chart.x.log)
     ends = (TOP, height - BOTTOM) if categories or chart.y.reverse else (height - BOTTOM, TOP)
     sy = _Scale(ys.low, ys.high, *ends, chart.y.log)
     clip = f"{chart.id}-clip"
     parts = [
         f'<svg viewBox="0 0 {width} {height}" role="{"group" if chart.y.links else "img"}" '
         f'aria-label="{escape(reading(chart))}" data-x="{sx.data}" data-y="{sy.data}">',
-        f"<title>{escape(chart.title)}</title><desc>{escape(reading(chart))}</desc>",
+        f"<desc>{escape(reading(chart))}</desc>",
         f'<clipPath id="{clip}"><rect x="{left:.1f}" y="{TOP - 5}" '
         f'width="{width - RIGHT - left:.1f}" height="{height - BOTTOM - TOP + 10}"/></clipPath>',
         _grid(chart, xs, ys, sx, sy, (left, width, height)),
@@ -129,6 +128,8 @@ def _extent(chart: Chart, key: str) -> tuple[float, float]:
     if axis.categories:
         return -0.5, len(axis.categories) - 0.5
     known = _values(chart.series, key)
+    for one in chart.series:
+        known += _rims(one, key, axis) if one.kind == "cells" else []
     if key == ("x" if chart.y.categories else "y"):
         for one in chart.series:
             known += [v for v in (*one.low, *one.high) if v is not None]
@@ -145,6 +146,17 @@ def _extent(chart: Chart, key: str) -> tuple[float, float]:
     else:
         below, above = low - 0.04 * (high - low), high + 0.04 * (high - low)
     return below if axis.low is None else low, above if axis.high is None else high
+
+
+def _rims(one: Series, key: str, axis: Axis) -> list[float]:
+    """The outer ends of the cells along an axis."""
+    values = sorted({v for v in getattr(one, key) if v is not None})
+    if len(values) < 2 or axis.high is not None:
+        return []
+    a, b, y, z = values[0], values[1], values[-2], values[-1]
+    if axis.log:
+        return [a * math.sqrt(a / b), z * math.sqrt(z / y)]
+    return [a - 0.5 * (b - a), z + 0.5 * (z - y)]
 
 
 def _ticks(axis: Axis, extent: tuple[float, float]) -> _Ticks:
@@ -165,8 +177,9 @@ def _ticks(axis: Axis, extent: tuple[float, float]) -> _Ticks:
     step = 10.0 ** math.floor(math.log10((high - low) / 4))
     step *= next(m for m in (1, 2, 5, 10) if (high - low) / (m * step) <= 6.5)
     first = math.ceil(low / step)
-    places = [round(k * step, 12) for k in range(first, math.floor(high / step) + 1)]
-    return _Ticks(low, high, tuple((v, short(v, 4)) for v in places))
+    places = [k * step for k in range(first, math.floor(high / step) + 1)]
+    decimals = max(0, -math.floor(math.log10(step) + 1e-9))
+    return _Ticks(low, high, tuple((v, with_decimals(v, decimals)) for v in places))
 
 
 def _grid(
@@ -183,7 +196,8 @@ def _grid(
         if xs.low < 0 < xs.high and not sx.log:
             parts.append(f'<path class="zero" d="M{sx(0.0):.1f} {TOP}V{bottom}"/>')
     parts.append("</g>")
-    for v, text in xs.labels:
+    room = CHARACTER * sum(len(text) + 2 for _, text in xs.labels)
+    for v, text in xs.labels[:: 1 + int(room / (right - left))]:
         parts.append(f'<text x="{sx(v):.1f}" y="{bottom + 17}" class="mid">{escape(text)}</text>')
     for number, (v, text) in enumerate(ys.labels):
         label = f'<text x="{left - 7:.1f}" y="{sy(v) + 3.5:.1f}" class="end">{escape(text)}</text>'
@@ -303,7 +317,7 @@ def _cells(one: Series, sx: _Scale, sy: _Scale) -> str:
         parts.append(
             f'<rect {place} fill-opacity="{shade:.2f}"><title>{short(value)}</title></rect>'
         )
-        if label:
+        if label and sx.start + 11 < 0.5 * (a + b) < sx.end - 11:
             at = f'x="{0.5 * (a + b):.1f}" y="{0.5 * (c + d) + 3:.1f}"'
             parts.append(f'<text {at} class="mid cell">{short(value, 2)}</text>')
     return "".join(parts)

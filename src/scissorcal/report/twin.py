@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.report.document import ReportDocument
@@ -57,4 +58,19 @@ def _schema_text(kind: type, title: str) -> str:
         "title": title,
         **{name: value for name, value in schema.items() if name != "title"},
     }
-    return json.dumps(whole, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    text = json.dumps(_short(whole), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
+def _short(schema: Any) -> Any:
+    """The schema with "a number or null" as one type."""
+    if isinstance(schema, list):
+        return [_short(entry) for entry in schema]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {name: _short(entry) for name, entry in schema.items()}
+    kinds = plain.get("anyOf", [])
+    if kinds and all(set(kind) == {"type"} for kind in kinds):
+        del plain["anyOf"]
+        plain["type"] = [kind["type"] for kind in kinds]
+    return plain

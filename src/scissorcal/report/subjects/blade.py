@@ -18,7 +18,6 @@ from scissorcal.report.panel import (
     Row,
     absent,
     band,
-    clean,
     count,
     curve,
     number,
@@ -97,7 +96,6 @@ def _shape(fit: BladeFit, where: str, which: str) -> Panel:
     )
     return Panel(
         f"{where}-shape", PART, f"The edge{which}", _precision(fit), tuple(rows), charts,
-        verdicts=tuple(clean(verdict) for verdict in fit.verdicts),
         notes=(note,), caption=f"Parameters of the {fit.family}.",
     )  # fmt: skip
 

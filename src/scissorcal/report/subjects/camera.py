@@ -17,7 +17,6 @@ from scissorcal.report.panel import (
     Row,
     Series,
     Value,
-    clean,
     count,
     curve,
     number,
@@ -81,10 +80,9 @@ def _parameters(fit: CameraFit) -> Panel:
         f"{camera.width} × {camera.height} pixels, {short(float(across))}° across, {source}. "
         f"Distortion: {fit.rung}."
     )
-    verdicts = tuple(clean(verdict) for verdict in fit.verdicts)
     return Panel(
         f"{PART}-parameters", PART, "Camera parameters", _precision(fit, finite(sd[0])),
-        tuple(rows), verdicts=verdicts, notes=(note, *fit.notes),
+        tuple(rows), notes=(note, *fit.notes),
     )  # fmt: skip
 
 

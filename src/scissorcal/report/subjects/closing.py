@@ -16,7 +16,7 @@ from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
 from scissorcal.report.numbers import display, scalar
-from scissorcal.report.panel import Panel, Row, Value, clean, count, number, words
+from scissorcal.report.panel import Panel, Row, Value, count, number, words
 from scissorcal.report.strokes import split_source, summary_of
 from scissorcal.report.subjects.candidates import passed_over
 
@@ -191,10 +191,7 @@ def sheet_panel(sheet: FactSheet) -> Panel:
     """Take a sheet of facts over; its part's name holds only letters, digits and hyphens."""
     part = "sheet-" + re.sub(r"[^A-Za-z0-9]+", "-", sheet.anchor).strip("-")
     rows = tuple(Row(fact.label, (_fact(scalar(fact.value), fact.unit),)) for fact in sheet.facts)
-    verdicts = tuple(clean(verdict) for verdict in sheet.verdicts)
-    return Panel(
-        f"{part}-facts", part, sheet.title, rows=rows, verdicts=verdicts, notes=sheet.notes
-    )
+    return Panel(f"{part}-facts", part, sheet.title, rows=rows, notes=sheet.notes)
 
 
 def _fact(value: object, unit: str) -> Value:

@@ -86,7 +86,7 @@ def _response_chart(found: ResponseCurve, id_: str) -> Chart:
     series = [
         points("measured", 1e3 * at[some], force[some], "blue", toggle=True),
         band("90 % of the response", x, found.low, found.high),
-        curve("used, beyond the data", x, found.force, style="dashed"),
+        curve("beyond the data", x, found.force, style="dashed"),
         curve("used", x, np.where(known, found.force, np.nan)),
     ]
     drawn = sorted((o for o in found.others if o.force is not None), key=lambda o: not o.equivalent)

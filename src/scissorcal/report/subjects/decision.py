@@ -176,11 +176,19 @@ def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult])
         if check is None:
             said = f"not done: `scissorcal verify {fit.what}`"
         else:
-            failed = [v.check for v in check.verdicts if v.status == "fail"]
-            outcome = f"failed: {', '.join(failed)}" if failed else "passed"
+            outcome = _outcome(check)
             said = "; ".join(part for part in (outcome, coverage_found(check)) if part)
         rows.append(Row(fit.what, (words("trust check", said),), marked=check is None))
     return Panel(f"{PART}-checked", PART, "Trust check", rows=tuple(rows))
+
+
+def _outcome(check: VerifyResult) -> str:
+    """What a trust check ended in."""
+    for status, word in (("fail", "failed"), ("not_evaluated", "not evaluated")):
+        named = [verdict.check for verdict in check.verdicts if verdict.status == status]
+        if named:
+            return f"{word}: {', '.join(named)}"
+    return "passed"
 
 
 def felt_panel(

@@ -14,7 +14,6 @@ from scissorcal.report.panel import (
     Picture,
     Row,
     Value,
-    clean,
     number,
     words,
 )
@@ -63,9 +62,8 @@ def _pose(fit: PlateFit) -> Panel:
         "Position of the plate's frame and its rotation vector; ± is the standard deviation, for a "
         "turn that of a small one about the axis."
     )
-    verdicts = tuple(clean(verdict) for verdict in fit.verdicts)
     return Panel(
-        f"{PART}-pose", PART, "Pose of the plate", _sentence(fit), rows, verdicts=verdicts,
+        f"{PART}-pose", PART, "Pose of the plate", _sentence(fit), rows,
         notes=tuple(notes), caption=caption,
     )  # fmt: skip
 

@@ -224,7 +224,7 @@ def _row(parameter: FittedParameter, caveats: tuple[str, ...]) -> Row:
             words("meaning", parameter.meaning or " "),
             Value("mean", scaled(parameter.mean), unit, sd=sd, digits=4),
             Value(
-                "median",
+                "median, 90 %",
                 scaled(parameter.q50),
                 unit,
                 low=scaled(parameter.q05),

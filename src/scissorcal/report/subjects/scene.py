@@ -15,6 +15,7 @@ from scissorcal.report.panel import (
     Panel,
     Row,
     Series,
+    Style,
     absent,
     band,
     curve,
@@ -175,19 +176,20 @@ def _support(found: SceneTorque) -> Chart:
     wide = known & (share > found.tolerance)
     touching, supported = grid.touching[here], grid.supported[here]
     x, y = DEGREES * grid.opening[here], 1e3 * grid.contact[here]
-    kinds: tuple[tuple[str, np.ndarray, Look], ...] = (
-        ("data nearby", known & touching & supported & ~wide, "blue"),
-        ("no data, within tolerance", known & touching & ~supported & ~wide, "orange"),
-        ("friction alone", known & ~touching & ~wide, "muted"),
-        ("wider than tolerance", wide, "vermillion"),
+    kinds: tuple[tuple[str, np.ndarray, Look, Style], ...] = (
+        ("data nearby", known & touching & supported & ~wide, "blue", "full"),
+        ("no data (within tolerance)", known & touching & ~supported & ~wide, "purple", "full"),
+        ("friction alone", known & ~touching & ~wide, "muted", "open"),
+        ("wider than tolerance", wide, "vermillion", "full"),
     )
-    counts = ", ".join(f"{name}: {int(flags.sum())}" for name, flags, _ in kinds)
+    counts = ", ".join(f"{name}: {int(flags.sum())}" for name, flags, *_ in kinds)
     caption = (
         f"Closing at {short(abs(float(pace)), 2)} rad/s. Of {int(known.sum())} places, {counts}. "
         "Where friction acts alone, the edge is off the material."
     )
     series = tuple(
-        points(name, x[flags], y[flags], look, toggle=True) for name, flags, look in kinds
+        points(name, x[flags], y[flags], look, style=style, toggle=True)
+        for name, flags, look, style in kinds
     )
     axes = (Axis("opening", "°"), Axis("contact", "mm"))
     return Chart("scene-support", "Where data support the torque", *axes, series, caption)

@@ -148,18 +148,13 @@ def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) 
             name.label if name else stroke_label(Stroke(0, kind), error.stroke, fit.position_unit)
         )
         speed = name.speed if name and name.speed is not None else finite(error.speed)
-        rows.append(
-            Row(
-                label,
-                (
-                    percent_of("relative", error.relative_rms),
-                    number("rms", error.rms, fit.effort_unit),
-                ),
-                link=name.anchor if name else "",
-            )
+        values = (
+            percent_of("relative", error.relative_rms),
+            number("rms", error.rms, fit.effort_unit),
         )
+        rows.append(Row(label, values, link=name.anchor if name else ""))
         if speed and finite(error.relative_rms) is not None:
-            marks.append((speed, 100 * error.relative_rms, kind, label))
+            marks.append((speed, 100 * error.relative_rms, kind))
     middle, worst = held_out_summary(fit)
     charts = (_held_out_chart(fit, marks, f"{part}-heldout-speed"),) if marks else ()
     sentence = (
@@ -176,15 +171,13 @@ def held_out_summary(fit: FitResult) -> tuple[Number, Number]:
     return finite(median(shares)), finite(shares.max()) if len(shares) else None
 
 
-def _held_out_chart(
-    fit: FitResult, marks: Sequence[tuple[float, float, str, str]], id_: str
-) -> Chart:
-    kinds = dict.fromkeys(kind for _, _, kind, _ in marks)
+def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], id_: str) -> Chart:
+    kinds = dict.fromkeys(kind for *_, kind in marks)
     series = tuple(
         points(
             kind_word(kind, fit.position_unit),
-            [speed for speed, _, own, _ in marks if own == kind],
-            [error for _, error, own, _ in marks if own == kind],
+            [speed for speed, _, own in marks if own == kind],
+            [error for _, error, own in marks if own == kind],
             look_of(kind),
         )
         for kind in kinds

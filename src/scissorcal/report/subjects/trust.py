@@ -16,7 +16,6 @@ from scissorcal.report.panel import (
     Style,
     absent,
     band,
-    clean,
     curve,
     number,
     percent_of,
@@ -49,8 +48,7 @@ def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple
     if check.not_done or not panels:
         why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.what}`."
         panels.append(absent(f"{id_}-open", part, f"{title}: not done", why))
-    verdicts = tuple(clean(verdict) for verdict in check.verdicts)
-    return (Panel(**{**vars(panels[0]), "verdicts": verdicts}), *panels[1:])
+    return tuple(panels)
 
 
 def coverage_found(check: VerifyResult | None) -> str:
