@@ -45,7 +45,7 @@ def _one(motion: Motion) -> Any:
 
 def _load(motion: Motion) -> Any:
     if motion.load is None:
-        raise ValueError("no load was measured")
+        raise ValueError("this term needs a load, and none was measured")
     return motion.load
 
 
@@ -225,27 +225,16 @@ _LAW = (
 )
 """The drive's and the law's parameters, in the order in which fits have them."""
 
+_REPEATS = "torque that repeats over the opening, in the drive"
 _COGGING = Prior(
     (0.0, 0.02, "small motors cog by 1 to 20 mN m"),
     (0.0, 20.0, "motors cog by 1 to 20 N"),
     "cogging",
 )
 _NUISANCE = (
-    Term(
-        "cogging_cos",
-        "torque that repeats over the opening, in the drive",
-        Role.DRIVE,
-        EFFORT,
-        prior=_COGGING,
-        nuisance=True,
-    ),
-    Term(
-        "cogging_sin",
-        "torque that repeats over the opening, in the drive",
-        Role.DRIVE,
-        EFFORT,
-        prior=_COGGING,
-        nuisance=True,
+    *(
+        Term(f"cogging_{wave}", _REPEATS, Role.DRIVE, EFFORT, prior=_COGGING, nuisance=True)
+        for wave in ("cos", "sin")
     ),
     Term(
         "delay",
@@ -406,11 +395,4 @@ def evaluate(names: tuple[str, ...], motion: Motion) -> Array:
 
     if not names:
         return np.zeros((len(motion.rate), 0))
-    columns = []
-    for name in names:
-        if TERMS[name].needs_load and motion.load is None:
-            raise ValueError(f'the term "{name}" needs a load, and none was measured')
-        value = TERMS[name].value
-        assert value is not None
-        columns.append(np.broadcast_to(value(motion), np.shape(motion.rate)))
-    return np.stack(columns, axis=1)
+    return np.stack([TERMS[name].column(motion) for name in names], axis=1)

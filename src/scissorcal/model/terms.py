@@ -144,6 +144,14 @@ class Term:
         below = [_power(u, -p) for u, p in zip(units, self.powers, strict=True) if p < 0]
         return " ".join(above or ["1"]) + ("/" + " ".join(below) if below else "")
 
+    def column(self, motion: Motion, *scale: Any) -> Array:
+        """What the parameter multiplies, of the shape of the motion's rate."""
+        import numpy as np
+
+        if self.value is None:
+            raise ValueError(f"{self.name} multiplies nothing by itself")
+        return np.asarray(np.broadcast_to(self.value(motion, *scale), np.shape(motion.rate)))
+
     def names(self, symmetric: bool) -> tuple[str, ...]:
         """Names of the parameters that the row brings."""
         if self.sided and not symmetric:

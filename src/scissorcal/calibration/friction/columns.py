@@ -89,7 +89,7 @@ class FrictionBasis:
     def coupled(self, rate: int, length: int) -> Array:
         """What Stribeck friction still lacks after a reversal, at every other node of a scale."""
         if (rate, length) not in self._coupled:
-            bell = self._bell(self.stribeck.scale_of(COARSER * rate))
+            bell = _SCALED.column(self.motion, self.stribeck.scale_of(COARSER * rate))
             late = self._late_at(COARSER * length)
             self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
         return self._coupled[rate, length]
@@ -181,7 +181,7 @@ class FrictionBasis:
         return [bins.acceleration, np.ones(len(windows.first)), windows.slope, *waves]
 
     def _free(self) -> list[Array]:
-        return [self.windows.average(self._value(term)) for term in self._plain]
+        return [self.windows.average(term.column(self.motion)) for term in self._plain]
 
     def _levels(self) -> list[Array]:
         sign = self.motion.direction
@@ -192,20 +192,13 @@ class FrictionBasis:
         """What each parameter of some terms multiplies (m,): one column for each direction."""
         rate, columns = self.windows.rate, []
         for term in terms:
-            value = self._value(term)
+            value = term.column(self.motion)
             columns += [value * (rate > 0), value * (rate < 0)] if term.sided else [value]
         return columns
 
-    def _value(self, term: Term) -> Array:
-        assert term.value is not None
-        return np.asarray(np.broadcast_to(term.value(self.motion), self.windows.rate.shape))
-
-    def _bell(self, scale: float) -> Array:
-        assert _SCALED.value is not None
-        return np.asarray(_SCALED.value(self.motion, scale))
-
     def _stribeck_at(self, rate: float) -> Array:
-        return np.column_stack(self._weigh([self.motion.direction * self._bell(rate)]))
+        bell = _SCALED.column(self.motion, rate)
+        return np.column_stack(self._weigh([self.motion.direction * bell]))
 
     def _lag_at(self, length: float) -> Array:
         late = self._late(length)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -75,42 +76,30 @@ def fit_friction(
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
-    drive = inertia * acceleration + F(opening, rate) + offset + noise, with the candidate laws of
-    :mod:`scissorcal.model.friction_terms`, each symmetric or not. An asymmetric law has no offset:
-    unequal Coulomb levels contain it. Where both explain the data alike, a linear joint gets the
-    offset, and scissors the unequal levels: those are felt through the handles, and an offset of a
-    sensor is not. The cheapest law is taken whose error on held-out strokes is not distinguishable
-    from the best, unless ``settings`` name one. Units follow the recordings' joint. Two or more
-    recordings are also fitted each by itself, and draws widened by what they differ in.
+    drive = inertia * acceleration + F(opening, rate) + offset + noise. The cheapest candidate law
+    is taken whose error on held-out strokes is not distinguishable from the best, unless
+    ``settings`` name one. Units follow the recordings' joint. Two or more recordings are also
+    fitted each by itself, and draws widened by what they differ in.
 
-    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
-    InputError where the recordings hold too little motion, and says what is missing.
-    ``last_chosen`` is the law that draft effort fits where the recipe leaves several; ``stop`` says
-    whether the time allowed is used up. ``prior`` is one that a study of simulated data states.
+    ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
+    of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
+    ``stop`` says whether the time is used up. Raises InputError where there is too little motion.
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
-    every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
+    again = partial(weigh, recordings, settings.cutoff_Hz, sensors.usable)
+    every = again()
     windows = every.where(every.bins.moving)
-    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
-    _refuse_terms(settings, windows, joint)
+    _refuse(recordings, settings, every, windows, sensors)
     every_law, cogging = _laws(windows, settings, joint, prior)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     climbed, chosen = _compare(laws, stop, tell)
     law = next(design for design in laws if design.name == chosen.rung.name)
-    tell(0.6, f"friction: inferring {chosen.rung.name}")
-    posterior = infer(
-        chosen.rung.problem(law.series),
-        effort,
-        rng,
-        checkpoint=checkpoint,
-        optimum=chosen.optimum,
-        stop=stop,
-        progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
-    )
+    infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
+    problem = chosen.rung.problem(law.series)
+    posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
-    usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
         what="friction",
         effort=effort,
@@ -121,7 +110,7 @@ def fit_friction(
         bins=law.bins,
         strokes=law.strokes,
         measured=law.observed,
-        contact=np.full(len(law.observed), np.nan),
+        contact=np.full_like(law.observed, np.nan),
         recordings=recordings,
         joint=joint,
         inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
@@ -131,16 +120,15 @@ def fit_friction(
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
-            _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
+            _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(
             *sensors.notes,
-            *_notes(every, windows, posterior, joint),
+            *_notes(every, windows, posterior, joint, cogging),
             *draft_note(effort, every_law, laws),
-            *cogging_notes(cogging, posterior, joint),
-            usage.sentence,
+            usage_of_windows(recordings, every, sensors.usable).sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics=_diagnostics(law, chosen, between),
@@ -191,6 +179,11 @@ def _compare(
     return climbed, climbed[place]
 
 
+def _last_part(tell: Progress) -> Progress:
+    """The progress of inference, as the last part of the fit's."""
+    return lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}")
+
+
 def _diagnostics(
     law: FrictionExperiment, chosen: Climbed, between: BetweenRecordings | None
 ) -> dict[str, Any]:
@@ -208,15 +201,16 @@ def _diagnostics(
 
 
 def _bandwidth(
-    recordings: tuple[Recording, ...],
-    settings: FitFriction,
-    sensors: Sensors,
+    weighed: Callable[..., Windows],
     law: FrictionExperiment,
     chosen: Climbed,
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
-    """Fit the same law over shorter windows, starting from the optimum."""
+    """Fit the same law over shorter windows, starting from the optimum.
+
+    ``weighed`` (window_Hz) weighs the recordings over windows that pass half there.
+    """
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
         return Verdict("fit.friction", "bandwidth", "not_evaluated", None, None, why)
@@ -224,7 +218,7 @@ def _bandwidth(
     if other_Hz is None:
         why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
         return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
-    every = weigh(recordings, settings.cutoff_Hz, sensors.usable, window_Hz=other_Hz)
+    every = weighed(window_Hz=other_Hz)
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
@@ -243,8 +237,10 @@ def _bandwidth(
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 
 
-def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
-    """Notes on the time that is left out, on window length and on the delay of the torque."""
+def _notes(
+    every: Windows, windows: Windows, posterior: Posterior, joint: Joint, cogging: Cogging
+) -> tuple[str, ...]:
+    """Notes on the time that is left out, window length, delay of the torque and cogging."""
     left = 1.0 - len(windows.first) / len(every.first)
     notes = [
         f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
@@ -262,12 +258,25 @@ def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint)
             f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
             f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
         )
-    return tuple(notes)
+    return (*notes, *cogging_notes(cogging, posterior, joint))
 
 
 def _tails_if_heavy(chosen: Climbed) -> dict[str, float]:
     tails = chosen.rung.likelihood.tails
     return {"tails": tails} if np.isfinite(tails) else {}
+
+
+def _refuse(
+    recordings: tuple[Recording, ...],
+    settings: FitFriction,
+    every: Windows,
+    windows: Windows,
+    sensors: Sensors,
+) -> None:
+    """Raise InputError where the moving windows cannot determine what ``settings`` ask for."""
+    joint = recordings[0].joint
+    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
+    _refuse_terms(settings, windows, joint)
 
 
 def _refuse_poor_motion(
@@ -340,9 +349,12 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 def _laws(
     windows: Windows, settings: FitFriction, joint: Joint, prior: StatedPrior | None
 ) -> tuple[list[FrictionExperiment], Cogging]:
-    """The laws to be compared, over columns that they share, with cogging where there is any.
+    """The candidate laws, cheapest first, over columns that they share, and the cogging found.
 
-    Cheapest first; those of the load only where one was measured.
+    Laws of the load only where one was measured; each symmetric or not. An asymmetric law has no
+    offset: unequal Coulomb levels contain it. Where both explain the data alike, a linear joint
+    gets the offset, and scissors the unequal levels: those are felt through the handles, and an
+    offset of a sensor is not.
     """
     names = [law for law in CANDIDATES if windows.bears_load or not needs_load(law)]
     names = names if settings.rung == "auto" else [settings.rung]

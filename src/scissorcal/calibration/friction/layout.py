@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.friction_terms import PARAMETERS, REFERENCE, TERMS, terms_of
 from scissorcal.model.terms import Term
@@ -76,8 +74,7 @@ def _adopted(names: tuple[str, ...], joint: Joint, priors: FrictionPriors) -> li
     """Adopted terms: normal around 0, with the recipe's sd of their effort at the reference."""
     rows = []
     for term in (TERMS[name] for name in names):
-        assert term.value is not None
-        size = abs(float(np.asarray(term.value(REFERENCE[joint.kind]))))
+        size = abs(float(term.column(REFERENCE[joint.kind])))
         unit = term.unit(joint.position_unit, joint.effort_unit)
         sd = priors.adopted(joint.kind) / size
         rows.append(Parameter(term.name, unit, term.transform, 0.0, sd, f"adopted: {term.meaning}"))

@@ -198,8 +198,7 @@ class FrictionExperiment:
         """Usual size of what a level multiplies; 1 for one that depends on a scale."""
         if term.scale or term.value is None:
             return 1.0
-        values = np.broadcast_to(term.value(self.basis.motion), self.windows.rate.shape)
-        return max(float(np.sqrt(np.mean(values**2))), 1e-12)
+        return max(float(np.sqrt(np.mean(term.column(self.basis.motion) ** 2))), 1e-12)
 
 
 def design(
