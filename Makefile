@@ -11,19 +11,21 @@ RUN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch])
 PYTEST_ARGS ?=
+# All cores; the tests of one file stay in one process, so that they share their fixtures.
+PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check c-tests kernel setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests kernel setup clean
 
 demo: $(STAMP)
 	$(RUN)/scissorcal demo
 
 test: $(STAMP)
-	$(RUN)/pytest -m "not slow" $(PYTEST_ARGS)
+	$(PYTEST) -m "not slow" $(PYTEST_ARGS)
 
 test-slow: $(STAMP)
-	$(RUN)/pytest -m slow $(PYTEST_ARGS)
+	$(PYTEST) -m slow $(PYTEST_ARGS)
 
 lint: $(STAMP)
 	$(RUN)/ruff check .
@@ -40,9 +42,18 @@ types: $(STAMP)
 
 schemas: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --write
+	$(RUN)/python src/scissorcal/kernel/write_wire.py
 
 schemas-check: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --check
+	$(RUN)/python src/scissorcal/kernel/write_wire.py --check
+
+# docs/api and the table of docs/verdicts.md, from the docstrings.
+api: $(STAMP)
+	$(RUN)/python docs/make_api.py --write
+
+api-check: $(STAMP)
+	$(RUN)/python docs/make_api.py --check
 
 # Strict, and again under the address and undefined-behaviour sanitizers.
 c-tests:

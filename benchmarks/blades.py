@@ -1,12 +1,11 @@
-"""Rendered blades under all disturbances: error, coverage, refusals, seconds.
+"""Accuracy of blades in rendered photographs: error, coverage, rejections, seconds.
 
     python benchmarks/blades.py --count 200 --width 2000
 
-Truth comes from the renderer, which shares no code with what measures. Each blade is another shape
-(line, arc, cubic or wavy), photographed by another camera from another place, with blur, noise,
-vignetting, shadow, glare, a tone curve that is not sRGB's, a printer that is a little off, and
-JPEG. Half of the photographs come with a camera fit (itself drawn with an error of its stated
-covariance), half without.
+The renderer gives the true values and shares no code with the measurement. Each photograph has
+another blade shape (line, arc, cubic or wavy), camera and viewpoint, with blur, noise, vignetting,
+shadow, reflections, a tone curve other than sRGB's, a printer scale error, and JPEG. Half of the
+photographs have a camera fit (with errors drawn from its stated covariance), half have none.
 """
 
 import argparse
@@ -39,14 +38,14 @@ from scissorcal.vision.sim import (
 from scissorcal.vision.targets.boards import BLADE_MAT, MAT_PIVOT_M
 
 CAMERA_SD = np.array([2.0, 2.0, 2.0, 2.0, 2e-3, 4e-3, 1e-4, 1e-4, 0.0])
-"""How well a camera of 2000 pixels is known: focal lengths and centre in pixels, distortion."""
+"""Standard deviations of a camera of 2000 pixels: focal lengths, centre (px), distortion."""
 
 CHECKED = np.array([0.2, 0.35, 0.5, 0.65, 0.8, 0.93])
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One rendered photograph and its truth."""
+    """One rendered photograph and its true values."""
 
     photo: Photo
     camera: Camera | None
@@ -83,7 +82,7 @@ def main() -> None:
 
 
 def photographed(width: int, strength: float, rng: np.random.Generator, *, known: bool) -> Setting:
-    """Render one blade on the mat as somebody would photograph it."""
+    """Render one blade on the mat from a plausible viewpoint."""
     height = width * 3 // 4
     focal = width * rng.uniform(0.75, 1.1)
     centre = (width / 2 - 0.5 + rng.normal(0, 6), height / 2 - 0.5 + rng.normal(0, 6))
@@ -175,7 +174,7 @@ def _any_shape(rng: np.random.Generator) -> BladeShape:
 
 
 def believed(lens: Lens, rng: np.random.Generator) -> Camera:
-    """The camera as a fit would have it: off by its own covariance."""
+    """A camera fit: the true camera with errors drawn from its covariance."""
     truth = np.array([lens.focal_px, lens.focal_px, *lens.centre_px, *lens.distortion])
     sd = CAMERA_SD * np.r_[np.full(4, lens.width / 2000.0), np.ones(5)]
     # a fit knows both focal lengths to be nearly one
@@ -187,7 +186,7 @@ def believed(lens: Lens, rng: np.random.Generator) -> Camera:
 
 
 def true_edge(shape: BladeShape, stations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edge and its slope angle in the frame whose x axis halves the blade."""
+    """Edge and its slope angle in the frame whose x axis is the centreline."""
     turn = shape.centreline_turn()
     s = np.linspace(0.0, shape.length_m, 40_001)
     e = shape.edge_at(s)
@@ -197,7 +196,7 @@ def true_edge(shape: BladeShape, stations: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[str, Any]:
-    """Measure and fit one photograph, and compare with its truth."""
+    """Measure and fit one photograph, and compare it with the true values."""
     start = time.perf_counter()
     try:
         photo: BladePhoto = photograph_blade(setting.photo, setting.camera)
@@ -235,7 +234,7 @@ def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[st
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """The table: medians, worst, coverage of 90 % intervals, share refused."""
+    """The table: medians, worst, coverage of 90 % intervals, share rejected."""
     good = [row for row in rows if "refused" not in row]
     out: dict[str, Any] = {"photographs": len(rows), "refused": len(rows) - len(good)}
     for said in {row["refused"].split(":")[-1][:60] for row in rows if "refused" in row}:

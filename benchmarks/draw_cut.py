@@ -1,9 +1,9 @@
-"""Draw the pictures of docs/model.md: a cut's segments, and the line of its teeth.
+"""Draw the pictures of docs/model.md: a cut's segments, and its tooth line.
 
     python -m benchmarks.draw_cut [--out docs/pictures] [--seed 5]
 
-Run it where `tests` lies too: the captures are those of the second virtual rig. Paper is
-cut in steps (kappa 0.75) and one smoothly (kappa 1); friction and segments are the product's own.
+Run it in the source tree: the captures come from the second virtual rig in `tests`. One sheet of
+paper is cut in steps (kappa 0.75), one smoothly (kappa 1). scissorcal fits friction and segments.
 The same seed gives the same files. It takes some minutes of processor time.
 """
 
@@ -19,8 +19,8 @@ from tests.second_rig import capture_cut, capture_friction, fine, paper, recipe_
 from scissorcal.calibration.cut import teeth
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import mean_torque, path_motion
+from scissorcal.calibration.cut.path.runs import find_runs, split
 from scissorcal.calibration.cut.scout import Scouted, belief_geometry, scout, tooth_periods
-from scissorcal.calibration.cut.segments import find_runs, split
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.model import Response
@@ -53,7 +53,7 @@ FREQUENCIES = np.exp(np.arange(np.log(0.25), np.log(2.5), 0.01))
 
 @dataclass(frozen=True)
 class Cut:
-    """A virtual cut, cut into segments, with what its line is looked for in."""
+    """A virtual cut: its segments, and the signals in which its tooth line is searched."""
 
     name: str
     colour: str

@@ -1,23 +1,21 @@
-"""What each effort costs: effective samples per second, optimum and Hessian included.
+"""Cost of each effort: effective samples per second, optimum and Hessian included.
 
     python benchmarks/inference.py [--case stribeck|sblri|nist] [--data ../shared/data] [--seed 0]
 
-One log-posterior at a time is given to every effort, to emcee's default (32 walkers, stretch
-moves) and, where the extra `bench` is installed, to NumPyro's NUTS (4 chains, 500 steps of warm-up
-and 1000 kept, double precision).
+Each log-posterior is sampled with every effort, with emcee's default (32 walkers, stretch moves)
+and, if the extra `bench` is installed, with NumPyro's NUTS (4 chains, 500 steps of warm-up and 1000
+kept, double precision).
 Effective samples are those of the worst parameter: 1 / sum of squared weights for importance
-sampling, bulk ESS (Vehtari et al. 2021) for chains. They are given per second of processor time of
-this process and its threads, which a busy machine does not blur as it does the wall time; imports
-come before. Errors are the largest over parameters
-against a long run of ensembles: of the mean in standard deviations, of the standard deviation, and
-of any correlation. NUTS counts gradients, the others log-posteriors; its compilation is given
-beside.
+sampling, bulk ESS (Vehtari et al. 2021) for chains. They are per second of processor time of
+this process and its threads, which depends less on other load than wall time; imports are not
+included. Errors are the largest over parameters against a long run of ensembles: of the mean in
+standard deviations, of the standard deviation, and of any correlation. NUTS counts gradients, the
+others log-posteriors; its compilation is listed separately.
 
 The case `nist` searches every regression of NIST StRD that lies in the folder, from both of its
-starts: matching digits of the polished optimum, evaluations of the search, and what it said. Of 26
-sets (all but Nelson), 52 searches: 52 are solved to four digits, in 55 to 6,514 evaluations, half
-of them in 150 at most; BOBYQA alone solved 39, in 97 to 2,675, and took two ends on a plateau for
-settled.
+starts: matching digits of the polished optimum, evaluations and status of the search. Of 52
+searches (26 sets, all but Nelson), 52 reach four digits, in 55 to 6,514 evaluations (median 150);
+BOBYQA alone reached them in 39, in 97 to 2,675, and reported two plateaus as optima.
 """
 
 import argparse
@@ -101,9 +99,9 @@ def run(case: Case, seed: int) -> None:
     """Measure every method on one case and print the table."""
     reference = long_reference(case.problem, seed)
     rows = [
-        by_effort(case.problem, "draft", seed),
-        by_effort(case.problem, "standard", seed),
-        by_effort(case.problem, "thorough", seed),
+        one_effort(case.problem, "draft", seed),
+        one_effort(case.problem, "standard", seed),
+        one_effort(case.problem, "thorough", seed),
         emcee_default(case.problem, seed),
         *nuts(case, seed),
     ]
@@ -128,7 +126,7 @@ def run(case: Case, seed: int) -> None:
 
 
 def nist_table(folder: Path) -> None:
-    """Search every set of NIST StRD in a folder from both starts, and print what became of it."""
+    """Search every set of NIST StRD in a folder from both starts, and print the result of each."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.inference import reference
 
@@ -155,8 +153,8 @@ def nist_table(folder: Path) -> None:
     )
 
 
-def by_effort(problem: Problem, effort: Any, seed: int) -> Row:
-    """One effort, from the search on."""
+def one_effort(problem: Problem, effort: Any, seed: int) -> Row:
+    """One effort, search included."""
     clock = Clock()
     found = infer(problem, effort, np.random.default_rng(seed), count=4000)
     wall, cpu = clock.read()
@@ -165,7 +163,7 @@ def by_effort(problem: Problem, effort: Any, seed: int) -> Row:
 
 
 def remark_of(found: Posterior) -> str:
-    """k-hat or R-hat, and whether that is trusted."""
+    """k-hat or R-hat, and whether it is within its limit."""
     if found.effort_reached == "thorough":
         said = f"tau {found.tau.max():.0f}, R-hat {found.r_hat.max():.3f}"
     else:
@@ -192,7 +190,7 @@ def emcee_default(problem: Problem, seed: int) -> Row:
 
 
 def nuts(case: Case, seed: int) -> list[Row]:
-    """NumPyro's NUTS on the same log-posterior, chain after chain; nothing where not installed."""
+    """NumPyro's NUTS on the same log-posterior, chain by chain; nothing if not installed."""
     try:
         import jax
         import numpyro
@@ -247,7 +245,7 @@ def bulk_ess(chains: Array) -> float:
 
 
 def long_reference(problem: Problem, seed: int) -> Array:
-    """Draws of one long ensemble of difference moves, independent of all that is measured."""
+    """Draws of one long ensemble of difference moves, independent of the methods compared."""
     import emcee
 
     found = infer(problem, "draft", np.random.default_rng(seed + 1000), count=REFERENCE_WALKERS)

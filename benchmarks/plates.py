@@ -1,12 +1,12 @@
-"""Rendered views of the plate's targets: errors, flips, coverage, refusals, against one marker.
+"""Accuracy of plate poses in rendered views: errors, flips, coverage, rejections; one marker alone.
 
     python benchmarks/plates.py --count 500
 
-Truth comes from the renderer, which shares no code with what measures. Each view has another camera
-(its fit drawn with an error of its stated covariance), another pose - one in six square-on, one in
-six grazing - a printer that is a little off, blur, noise, vignetting, a tone curve that is not
-sRGB's, JPEG, and in one of four a shadow or something over a part of the target. One marker of the
-same picture goes through OpenCV's detector and ``cv2.solvePnP`` (IPPE_SQUARE) alone.
+The renderer gives the true values and shares no code with the measurement. Each view has another
+camera (its fit with errors drawn from the stated covariance), another pose (one in six from the
+front, one in six grazing), a printer scale error, blur, noise, vignetting, a tone curve other than
+sRGB's, JPEG, and in one of four a shadow or an object over a part of the target. For comparison,
+one marker of the same picture is located by OpenCV's detector and ``cv2.solvePnP`` (IPPE_SQUARE).
 """
 
 import argparse
@@ -29,21 +29,21 @@ from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, MarkedBoa
 from scissorcal.vision.targets.detect import find_board
 
 CAMERA_SD = np.array([1.2, 1.2, 1.2, 1.2, 2e-3, 4e-3, 1e-4, 1e-4, 0.0])
-"""How well a camera of 1280 pixels is known: focal lengths and centre in pixels, distortion."""
+"""Standard deviations of a camera of 1280 pixels: focal lengths, centre (px), distortion."""
 
 PRINT_SD = 1e-3
 WIDTH, HEIGHT = 1280, 720
 KINDS = ("square-on", "middling", "middling", "middling", "middling", "grazing")
 FLIP_DEG = 1.0
-"""A pose is flipped where its normal lies nearer to the truth's mirrored at the line of sight than
-to the truth's, as far as these two differ by more than this."""
+"""A pose counts as flipped if its normal is nearer to the true normal mirrored at the line of sight
+than to the true one, provided that these differ by more than this angle."""
 
 Z90 = 1.645
 
 
 @dataclass(frozen=True)
 class View:
-    """A picture of ``board``, the camera as a fit would have it, and the truth."""
+    """A picture of ``board``, a camera fit, and the true pose."""
 
     photo: Photo
     board: MarkedBoard
@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
-    """Render one view of a target as somebody would photograph it."""
+    """Render one view of a target from a plausible viewpoint."""
     board: MarkedBoard = PLATE_BOARD if rng.uniform() < 0.5 else PLATE_STRIP
     focal = WIDTH * rng.uniform(0.8, 1.2)
     centre = (0.5 * WIDTH + rng.normal(0, 6), 0.5 * HEIGHT + rng.normal(0, 6))
@@ -111,7 +111,7 @@ def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
 
 
 def _thing(board: MarkedBoard, truth: Stand, rng: np.random.Generator) -> Layer:
-    """A finger's breadth of something dark with a soft shadow, over one end of the target."""
+    """A dark object with a soft shadow over one end of the target."""
     left = rng.uniform(-0.03, 0.2) * board.width_m
     bar = np.array([[left - 0.02, -0.05], [left, -0.05], [left + 0.01, 0.2], [left - 0.01, 0.2]])
     shift = (rng.uniform(0.004, 0.02), 0.003)
@@ -119,7 +119,7 @@ def _thing(board: MarkedBoard, truth: Stand, rng: np.random.Generator) -> Layer:
 
 
 def believed(lens: Lens, rng: np.random.Generator) -> Camera:
-    """The camera as a fit would have it: off by its own covariance."""
+    """A camera fit: the true camera with errors drawn from its covariance."""
     covariance = np.diag(CAMERA_SD**2)
     covariance[0, 1] = covariance[1, 0] = 0.98 * CAMERA_SD[0] * CAMERA_SD[1]
     truth = np.array([lens.focal_px, lens.focal_px, *lens.centre_px, *lens.distortion])
@@ -129,7 +129,7 @@ def believed(lens: Lens, rng: np.random.Generator) -> Camera:
 
 
 def measured(view: View) -> dict[str, Any]:
-    """Find and fit one view, and compare with its truth."""
+    """Find and fit one view, and compare it with the true pose."""
     start = time.perf_counter()
     try:
         found = PlatePhoto("rendered.jpg", find_board(view.photo, view.board))
@@ -155,7 +155,7 @@ def measured(view: View) -> dict[str, Any]:
 
 
 def one_marker(view: View) -> dict[str, Any]:
-    """The pose that the target's middle marker tells by itself, by OpenCV alone."""
+    """The pose from the target's middle marker alone, by OpenCV."""
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     detector = cv2.aruco.ArucoDetector(dictionary(view.board.dictionary), settings)
@@ -180,13 +180,13 @@ def one_marker(view: View) -> dict[str, Any]:
 
 
 def off(matrix: np.ndarray, shift: np.ndarray, truth: Stand) -> np.ndarray:
-    """What takes the truth to a pose: rotation vector (rad), translation (m)."""
+    """Difference from the true pose: rotation vector (rad), translation (m)."""
     turn = cv2.Rodrigues(matrix @ truth.rotation.T)[0].ravel()
     return np.concatenate([turn, shift - truth.shift_m])
 
 
 def errors(matrix: np.ndarray, shift: np.ndarray, view: View) -> dict[str, Any]:
-    """Angle, and how far the target's middle is off: in all, across the sight, along it."""
+    """Angle, and the error of the target's middle: total, across the line of sight, along it."""
     away = off(matrix, shift, view.truth)
     middle = np.array([0.5 * view.board.width_m, 0.5 * view.board.height_m, 0.0])
     place = view.truth.rotation @ middle + view.truth.shift_m
@@ -208,7 +208,7 @@ def _flipped(normal: np.ndarray, truth: np.ndarray, sight: np.ndarray) -> bool:
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Medians, 95 %, flips, coverage of 90 % intervals, what was refused or doubted."""
+    """Medians, 95 %, flips, coverage of 90 % intervals, share rejected or ambiguous."""
     good = [row for row in rows if "refused" not in row]
     sure = [row for row in good if not row["ambiguous"]]
     out: dict[str, Any] = {"views": len(rows), "refused": len(rows) - len(good)}

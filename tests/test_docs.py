@@ -1,12 +1,31 @@
-"""What the documentation points at is there, and its place-holders are filled."""
+"""The documentation: links, words, drawings, generated pages, commands and code of the README."""
 
+import json
 import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from scissorcal.cli.root import run
+from scissorcal.device.lockstep import LockstepLink
+from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+GENERATED = ROOT / "docs" / "api"
+PROSE = [
+    *(page for page in PAGES if page.parent == ROOT / "docs"),
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+]
+EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 
@@ -33,13 +52,240 @@ def test_links_resolve(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_nothing_is_left_to_fill_in(page):
-    assert "<!--" not in page.read_text(encoding="utf-8")
+    comments = re.findall(r"<!--.*?-->", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert not [text for text in comments if not re.fullmatch(r"<!-- (end of )?[A-Z_]+ -->", text)]
 
 
-def test_every_decision_has_a_number_of_its_own():
+def test_every_decision_has_its_number_once():
     pages = [page for page in PAGES if page.parent.name == "decisions"]
     numbers = [page.name[:3] for page in pages]
     assert len(set(numbers)) == len(numbers)
     for page in pages:
         title = page.read_text(encoding="utf-8").splitlines()[0]
         assert title.startswith(f"# {page.name[:3]} "), page.name
+
+
+# ------------------------------------------------------------------------------------- words
+
+
+def words_not_used() -> list[str]:
+    """The first column of the glossary's last table."""
+    table = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").partition("do not use |")[2]
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| ")]
+    return [word.strip() for row in rows for word in row.split(",")]
+
+
+def prose_of(page: Path) -> str:
+    """A page without code, link targets, generated rows, and the list of words itself."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    text = text.partition("## Words not used")[0]
+    generated = re.compile(r"    |\| [a-z.]+ \| \*|\| \d+ \| ")
+    text = "\n".join(row for row in text.splitlines() if not generated.match(row))
+    return re.sub(r"`[^`]*`|\]\([^)]*\)", " ", text)
+
+
+def test_the_list_of_words_is_read():
+    assert {"rung", "ladder", "mend", "told apart", "came from nothing"} <= set(words_not_used())
+
+
+@pytest.mark.parametrize("page", PROSE, ids=[page.name for page in PROSE])
+def test_pages_use_the_words_of_the_glossary(page):
+    text = " ".join(prose_of(page).split())
+    found = [w for w in words_not_used() if re.search(rf"\b{re.escape(w)}\b", text, re.IGNORECASE)]
+    assert not found
+
+
+def test_the_glossary_defines_every_promise():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    promises = text.partition("## Words that promise something")[2].partition("\n## ")[0]
+    for word in ("done", "complete", "trusted", "verified", "safe", "signed", "stale"):
+        assert re.search(rf"^\| \*\*[^|]*\b{word}\b", promises, re.MULTILINE), word
+
+
+def test_names_in_the_glossary_are_in_the_files_it_links_to():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| `(\w+)`[^|]*\|[^|]*\|[^|]*\| \[[\w.]+\]\(([^)]*)\)", text)
+    assert len(rows) > 20
+    for name, path in rows:
+        code = (ROOT / "docs" / path).read_text(encoding="utf-8")
+        assert re.search(rf"\b{name}", code), (name, path)
+
+
+def test_the_table_of_rooms_is_that_of_the_import_rules():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    stated: dict[str, set[str]] = {}
+    for rooms, may in re.findall(r"^\| (`.*?) \| [^|]* \| ([^|]*) \|$", text, re.MULTILINE):
+        above = set(stated) - LEAVES
+        words = {"all of the above": above, "-": set()}
+        allowed = words.get(may) if may in words else set(may.split(", "))
+        stated |= dict.fromkeys(re.findall(r"`(\w+)`", rooms), allowed)
+    assert stated == {room: may for room, may in MAY_IMPORT.items() if room != "<root>"}
+
+
+# --------------------------------------------------------------------------- generated pages
+
+
+def test_api_pages_and_verdict_table_are_up_to_date():
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs" / "make_api.py", "--check"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_stale_api_page_is_reported(tmp_path):
+    copy = tmp_path / "docs"
+    shutil.copytree(ROOT / "docs", copy)
+    (copy / "api" / "scissorcal.errors.md").write_text("# Old\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, copy / "make_api.py", "--check"], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert "scissorcal.errors.md is not up to date: run 'make api'." in done.stderr
+
+
+def test_drawings_are_those_of_the_script(tmp_path):
+    command = [sys.executable, "-m", "benchmarks.draw_docs", "--out", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["dataflow.svg", "loop.svg", "scissors.svg", "stroke.svg"]
+    for name in names:
+        committed = (ROOT / "docs" / "pictures" / name).read_text(encoding="utf-8")
+        assert committed == (tmp_path / name).read_text(encoding="utf-8"), name
+
+
+# --------------------------------------------------------------------------- README: commands
+
+
+def readme_blocks(language: str) -> list[list[str]]:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return [block.splitlines() for block in blocks]
+
+
+def simulated(line: str) -> list[str]:
+    """A line of the README as words, with the virtual rig and camera in place of real ones."""
+    words = shlex.split(line, comments=True)
+    words = ["sim" if word.startswith("/dev/") or word == "stances.csv" else word for word in words]
+    if "--image" in words:
+        at = words.index("--image")
+        words[at : at + 2] = ["--camera", "sim"]
+    return [str(EMPS) if word == EMPS.name else word for word in words]
+
+
+class SimInVirtualTime:
+    """A virtual rig whose port is a link in virtual time: no test waits for the clock."""
+
+    def __init__(self, specimen: str, seed: int = 0) -> None:
+        self.port = LockstepLink(specimen, np.random.default_rng(seed))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.port.close()
+
+
+@contextmanager
+def given_link(port: LockstepLink) -> Iterator[LockstepLink]:
+    yield port
+
+
+def run_block(lines: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scissorcal.device.sim.process.SimProcess", SimInVirtualTime)
+    monkeypatch.setattr("scissorcal.device.link.open_link", given_link)
+    monkeypatch.chdir(folder)
+    for line in lines:
+        words = simulated(line)
+        if words[:1] == ["cd"]:
+            monkeypatch.chdir(words[1])
+        else:
+            assert words[0] == "scissorcal", line
+            with pytest.raises(SystemExit) as ended:
+                run(words[1:])
+            assert ended.value.code == 0, line
+
+
+def test_the_make_targets_of_the_readme_exist():
+    targets = [shlex.split(line, comments=True)[1] for line in readme_blocks("sh")[0]]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert targets == ["demo", "test"]
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE)
+
+
+def test_the_other_blocks_of_the_readme_hold_commands_alone():
+    assert len(readme_blocks("sh")) == 4
+    blocks = [line for block in readme_blocks("sh")[1:] for line in block]
+    assert sum("capture plate" in line and "--stances" in line for line in blocks) == 1
+    assert all(shlex.split(line, comments=True)[0] in ("scissorcal", "cd") for line in blocks)
+
+
+@pytest.mark.slow
+def test_the_day_of_the_readme_ends_in_a_torque_that_cuts(tmp_path, monkeypatch):
+    (_, day, _, _), (code,) = readme_blocks("sh"), readme_blocks("python")
+    run_block(day, tmp_path, monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec("\n".join(code), names)
+    package, table = names["package"], names["table"]
+    closing = float(package.torque(0.4, -0.2, 0.02))
+    opening = float(package.torque(0.4, 0.2, 0.02))
+    assert closing == pytest.approx(0.047, abs=0.001)
+    assert opening == pytest.approx(0.019, abs=0.001)
+    friction = float(package.kernel().step(0.4, -0.2, -0.2).friction_torque)
+    assert closing > 2 * abs(friction)
+    assert names["low"] < closing < names["high"]
+    assert "opening_rad" in table.columns
+    assert [p.name for p in names["fit"].parameters][-1] == "kappa"
+
+
+@pytest.mark.slow
+def test_the_photographed_day_of_the_readme(tmp_path, monkeypatch):
+    run_block(readme_blocks("sh")[2], tmp_path, monkeypatch)
+    assert list((tmp_path / "my-photos" / "package").glob("*.zip"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS data set is not beside the project")
+def test_the_import_of_the_readme(tmp_path, monkeypatch):
+    run_block(readme_blocks("sh")[3], tmp_path, monkeypatch)
+    assert (tmp_path / "emps" / "fits" / "friction.nc").is_file()
+
+
+# ----------------------------------------------------------------------------------- notebooks
+
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+@pytest.fixture(scope="module")
+def demo_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the workspace of a demo, which the notebooks read."""
+    folder = tmp_path_factory.mktemp("notebooks")
+    command = "from scissorcal.cli import main; main()"
+    options = ["demo", "--recipe", "paper-80gsm", "--folder", str(folder / "demo-workspace")]
+    subprocess.run([sys.executable, "-c", command, *options], check=True, capture_output=True)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_notebook_runs(path: Path, demo_folder: Path):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    notebook = nbformat.read(path, as_version=4)
+    if "log_likelihood" in path.read_text(encoding="utf-8"):
+        fit = (demo_folder / "demo-workspace" / "fits" / "friction.nc").read_bytes()
+        if b"log_likelihood" not in fit:
+            pytest.skip("these fits are stored without log-likelihoods")
+    resources = {"metadata": {"path": str(demo_folder)}}
+    nbclient.NotebookClient(notebook, timeout=600, resources=resources).execute()
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_notebook_is_committed_with_small_outputs(path: Path):
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    outputs = [output for cell in cells for output in cell["outputs"]]
+    assert outputs
+    assert not any(output["output_type"] == "error" for output in outputs)
+    assert path.stat().st_size < 200_000
+    assert str(Path.home()) not in path.read_text(encoding="utf-8")

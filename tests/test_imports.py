@@ -1,36 +1,40 @@
 """Data flows one way: which room may import which, and what `scissorcal --help` may load."""
 
 import ast
+import resource
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from statistics import median
 
 import pytest
 
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "<root>"}
+LEAVES = {"errors", "verdicts", "identity", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "verdicts": set(),
+    "identity": set(),
     "kernel": set(),
     "model": set(),
     "inference": set(),
-    "recipe": set(),
+    "recipe": {"model"},
     "recording": {"recipe"},
     "device": {"kernel", "recipe", "recording"},
-    "vision": {"recipe", "model", "inference"},
+    "vision": {"recipe", "model"},
     "calibration": {"kernel", "model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},
     "report": {"model", "vision", "calibration", "package", "recipe", "recording"},
     "workday": LOWEST | MIDDLE,
     "cli": LOWEST | MIDDLE | {"workday"},
-    "<root>": {"package"},
+    "library": {"calibration", "package", "recipe", "recording", "workday"},
+    "<root>": {"library", "package"},
 }
 ROOMS = set(MAY_IMPORT) - {"<root>"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
@@ -135,10 +139,36 @@ def test_help_loads_nothing_heavy() -> None:
         "from scissorcal.cli.root import run\n"
         "try:\n    run(['--help'])\n"
         "except SystemExit as end:\n    assert end.code == 0, end.code\n"
-        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mcap', 'matplotlib', 'cffi', 'serial'}\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mcap', 'matplotlib', 'cffi', 'serial',\n"
+        "    'cv2', 'pyarrow', 'h5py', 'emcee', 'nlopt', 'yaml', 'jinja2', 'reportlab', 'PIL'}\n"
         "loaded = heavy & {name.partition('.')[0] for name in sys.modules}\n"
         "sys.exit(f'loaded: {sorted(loaded)}' if loaded else 0)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "capture" in done.stdout
+
+
+def test_no_module_imports_at_its_top_what_only_an_extra_installs() -> None:
+    extras = {"pyarrow", "arviz", "pandas", "xarray", "distributed", "dask", "jax", "numpyro"}
+    for path in MODULES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        at_top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        names = {alias.name for node in at_top for alias in node.names}
+        names |= {node.module or "" for node in at_top if isinstance(node, ast.ImportFrom)}
+        assert not extras & {name.partition(".")[0] for name in names}, path
+
+
+def test_help_takes_at_most_eight_times_the_processor_time_of_an_empty_program() -> None:
+    empty, listed = [], []
+    for _ in range(7):
+        empty.append(_processor_s("pass"))
+        listed.append(_processor_s("from scissorcal.cli import main; main()", "--help"))
+    assert median(listed) <= 8.0 * median(empty)
+
+
+def _processor_s(program: str, *words: str) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", program, *words], check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

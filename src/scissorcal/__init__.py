@@ -1,23 +1,38 @@
-"""Calibrate, identify and render a haptic scissors rig, with uncertainty that can be trusted.
+"""Calibrate, identify and render a haptic scissors rig, with intervals tested against known truth.
 
 >>> import scissorcal
->>> package = scissorcal.open_package("package/paper-80gsm.zip")  # doctest: +SKIP
->>> package.torque(opening=0.5, opening_rate=-0.2, contact=0.03)  # doctest: +SKIP
+>>> scissorcal.open_package("package/paper-80gsm.zip")
+Traceback (most recent call last):
+scissorcal.errors.MissingError: There is no file package/paper-80gsm.zip. Make it with \
+'scissorcal package build'.
 """
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.package import open_package
+    from scissorcal.library import open_fit, open_package, open_recording, open_workspace
+    from scissorcal.package import OutsideCoverageWarning
 
-__all__ = ["__version__", "open_package"]
+__all__ = [
+    "OutsideCoverageWarning",
+    "__version__",
+    "open_fit",
+    "open_package",
+    "open_recording",
+    "open_workspace",
+]
 
 __version__ = "0.1.0"
 
+_HOMES = {"OutsideCoverageWarning": "scissorcal.package"}
+
 
 def __getattr__(name: str) -> Any:
-    if name == "open_package":
-        from scissorcal.package import open_package
+    if name not in __all__:
+        raise AttributeError(f"module 'scissorcal' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES.get(name, "scissorcal.library")), name)
 
-        return open_package
-    raise AttributeError(f"module 'scissorcal' has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

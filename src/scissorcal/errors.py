@@ -1,15 +1,16 @@
-"""The errors scissorcal raises on purpose, each with the exit code its command ends with.
+"""The errors of scissorcal, each with the exit code its command ends with.
 
-Every message is a whole sentence that names the file or device, the place in it, and the mend.
+Every message is a whole sentence that names the file or device, the place in it, and the remedy.
 """
 
+import errno
 from pathlib import Path
 
 
 class ScissorcalError(Exception):
-    """Base of all errors that scissorcal raises on purpose (exit code 1).
+    """Base of all errors that scissorcal raises deliberately (exit code 1).
 
-    ``kept`` are the files that hold what was done before it.
+    ``kept`` are the files that hold what was done before the error.
     """
 
     exit_code = 1
@@ -23,7 +24,7 @@ class InputError(ScissorcalError):
 
 
 class VerdictError(ScissorcalError):
-    """A verdict failed, so what was asked for is not handed out (exit code 3)."""
+    """A verdict failed, so the result is not handed out (exit code 3)."""
 
     exit_code = 3
 
@@ -35,6 +36,43 @@ class DeviceError(ScissorcalError):
 
 
 class MissingError(ScissorcalError):
-    """Something that must come first is not there yet: nothing captured or fitted (exit code 5)."""
+    """A previous step is missing: nothing captured, fitted or built yet (exit code 5)."""
 
     exit_code = 5
+
+
+_ELSEWHERE = "choose a folder that you may write to"
+_FILE_ERRORS = {
+    errno.ENOSPC: f"The disk is full: {{}} could not be written. Free some space, or {_ELSEWHERE}.",
+    errno.EDQUOT: "Your disk quota is used up: {} could not be written. Free some space.",
+    errno.EFBIG: f"{{}} is too large for this file system: {_ELSEWHERE}.",
+    errno.EROFS: f"{{}} is on a read-only file system: {_ELSEWHERE}.",
+    errno.EACCES: "{} may not be read or written by you (permission denied): change its "
+    f"permissions, or {_ELSEWHERE}.",
+    errno.EPERM: f"{{}} may not be changed by you (operation not permitted): {_ELSEWHERE}.",
+    errno.ENOENT: "{} does not exist, or its folder cannot be made: check the path.",
+    errno.ENOTDIR: "{} cannot exist, because a part of its path is a file and not a folder: "
+    "correct the path.",
+    errno.EEXIST: "{} is a file where a folder is needed: choose another path.",
+    errno.EISDIR: "{} is a folder where a file is needed: name a file.",
+    errno.ENAMETOOLONG: "{} is too long a name for this file system: choose a shorter one.",
+    errno.ELOOP: "{} is a loop of symbolic links: name the file itself.",
+}
+"""Refusals of the operating system that the user can remedy, and how."""
+
+
+def file_error(error: OSError, path: Path, kept: str = "") -> InputError | None:
+    """Turn a refusal to read or write ``path`` into a sentence with the remedy; None for others.
+
+    ``path`` is used where the error names no file, as a full disk does not. ``kept`` is a sentence
+    on what is kept.
+
+    >>> print(file_error(OSError(errno.EISDIR, "a folder"), Path("a.mcap")))
+    a.mcap is a folder where a file is needed: name a file.
+    """
+    sentence = _FILE_ERRORS.get(error.errno or 0)
+    if sentence is None or isinstance(error, BlockingIOError):
+        return None
+    named = error.filename2 or error.filename
+    shown = named if isinstance(named, str) else path
+    return InputError(f"{sentence.format(shown)} {kept}".rstrip())

@@ -41,6 +41,7 @@ static size_t repacked(const uint8_t *payload, size_t size, uint8_t *again)
     sc_hello hello;
     sc_identity identity;
     sc_config config;
+    sc_config_echo echo;
     if (sc_unpack_state(payload, size, &state)) {
         return sc_pack_state(&state, again);
     }
@@ -53,11 +54,11 @@ static size_t repacked(const uint8_t *payload, size_t size, uint8_t *again)
     if (sc_unpack_identity(payload, size, &identity)) {
         return sc_pack_identity(&identity, again);
     }
-    if (sc_unpack_config(payload, size, SC_TYPE_CONFIG, &config)) {
-        return sc_pack_config(&config, SC_TYPE_CONFIG, again);
+    if (sc_unpack_config(payload, size, &config)) {
+        return sc_pack_config(&config, again);
     }
-    if (sc_unpack_config(payload, size, SC_TYPE_CONFIG_ECHO, &config)) {
-        return sc_pack_config(&config, SC_TYPE_CONFIG_ECHO, again);
+    if (sc_unpack_config_echo(payload, size, &echo)) {
+        return sc_pack_config_echo(&echo, again);
     }
     return 0;
 }

@@ -7,11 +7,13 @@ import pytest
 
 from scissorcal.calibration import FittedParameter
 from scissorcal.calibration.caveats import FEW_COUNTS, caveats_by_parameter, caveats_of
-from scissorcal.cli.fit import _parameter_facts, _text
-from scissorcal.report.sections.parameters import tabulate_parameters
+from scissorcal.cli.fit_law import parameter_facts, text
+from scissorcal.report.subjects.posterior import parameters_panel
+from scissorcal.workday.engine import StepState
 from scissorcal.workday.runs.fit import FitOutcome
 from tests.package.fits import cut_fit, friction_fit, recipe
 
+UNVERIFIED = StepState("fit cut", "unverified", "")
 GOOD = {"counts_per_sample": 8.0, "teeth_line": True}
 
 
@@ -37,7 +39,7 @@ def test_a_fit_of_which_nothing_poor_is_known_has_no_caveat():
             ("response_force", "response_exponent", "fracture_energy", "kappa"),
             "0.5 encoder counts per sample",
         ),
-        (fitted(teeth_line=False), ("fracture_energy", "kappa"), "No line of the teeth"),
+        (fitted(teeth_line=False), ("fracture_energy", "kappa"), "No spectral line of the teeth"),
     ],
     ids=["coarse encoder", "no line"],
 )
@@ -65,19 +67,19 @@ def test_no_line_is_no_fault_where_nothing_ripples():
 
 def test_terminal_json_and_report_carry_it_beside_the_interval():
     fit = fitted(teeth_line=False)
-    outcome = FitOutcome("cut", fit, Path("cut.nc"), cached=False)
-    said = _text(outcome)
+    outcome = FitOutcome("cut", fit, Path("cut.nc"), (), False, UNVERIFIED)
+    said = text(outcome)
     sentence = caveats_by_parameter(fit)["kappa"][0]
     assert "kappa *" in said
     assert f"* fracture_energy, kappa: {sentence}" in said
-    facts = {row["name"]: row["caveats"] for row in _parameter_facts(outcome)}
-    rows = {row.name: list(row.caveats) for row in tabulate_parameters(fit)}
-    assert facts == rows
+    facts = {row["name"]: row["caveats"] for row in parameter_facts(outcome)}
+    for row in parameters_panel(fit, "cut").rows:
+        assert row.note == " ".join(f"Known to be poor: {said}" for said in facts[row.name])
     assert facts["kappa"] == [sentence]
     assert facts["response_force"] == []
 
 
 def test_a_fit_without_its_trust_check_is_unverified():
-    outcome = FitOutcome("cut", fitted(), Path("cut.nc"), cached=False)
-    assert "unverified: 'scissorcal verify cut'" in _text(outcome)
-    assert "unverified" not in _text(replace(outcome, verified=True))
+    outcome = FitOutcome("cut", fitted(), Path("cut.nc"), (), False, UNVERIFIED)
+    assert "unverified: 'scissorcal verify cut'" in text(outcome)
+    assert "unverified" not in text(replace(outcome, state=StepState("fit cut", "done", "")))

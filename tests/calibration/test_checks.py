@@ -10,10 +10,11 @@ from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.cli.fit import _text
+from scissorcal.cli.fit_law import text
 from scissorcal.inference import Posterior, SearchStatus, infer
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.workday.engine import StepState
 from scissorcal.workday.runs.fit import FitOutcome
 from tests.calibration.test_comparison import line
 from tests.calibration.truth import Truth, friction_recording, make_recording, sweep
@@ -60,7 +61,7 @@ def fitted(bins: Bins, twin: bool = False) -> tuple[FittedCandidate, Posterior]:
 
 
 def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), error=0.05, **fit):
-    climbed, posterior = fitted(bins, **fit)
+    chosen, posterior = fitted(bins, **fit)
     diagnostics = {
         "observations": len(bins.rate),
         "independent_share": 0.9,
@@ -76,7 +77,7 @@ def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), e
     )
     met = np.full(len(bins.rate), np.nan) if contact is None else contact
     verdicts = trust_verdicts(
-        what, "draft", climbed, posterior, diagnostics, errors, nuisance, bins, met
+        what, "draft", chosen, posterior, diagnostics, errors, nuisance, bins, met
     )
     return {verdict.check: verdict for verdict in verdicts}
 
@@ -192,7 +193,8 @@ def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
     found = fit_friction((steady(Truth(), rng),), settings, effort="draft", rng=rng)
     assert "strokes" in {verdict.check for verdict in found.rejected}
-    said = _text(FitOutcome("friction", found, tmp_path / "friction.nc", cached=False))
+    state = StepState("fit friction", "failed", "")
+    said = text(FitOutcome("friction", found, tmp_path / "friction.nc", (), False, state))
     first, second = said.splitlines()[:2]
     assert first == "friction: not a calibration:"
     assert second.startswith("  ")
@@ -200,4 +202,4 @@ def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     assert "which are not to be used" in said
     good = fit_friction((friction_recording(Truth(), rng),), settings, effort="draft", rng=rng)
     assert good.rejected == ()
-    assert "not a calibration" not in _text(FitOutcome("friction", good, tmp_path, cached=False))
+    assert "not a calibration" not in text(FitOutcome("friction", good, tmp_path, (), False, state))

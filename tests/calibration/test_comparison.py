@@ -16,6 +16,7 @@ from scissorcal.calibration.fit_candidate import (
 )
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.model.transforms import IDENTITY
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint
 from tests.calibration.truth import Truth, friction_recording
@@ -29,7 +30,7 @@ def line(
     """A linear law with normal noise of known size, whose leave-out densities are exact."""
     count = columns.shape[1]
     layout = Layout(
-        tuple(Parameter(f"b{i}", "1", "identity", 0.0, 10.0, "weight") for i in range(count))
+        tuple(Parameter(f"b{i}", "1", IDENTITY, 0.0, 10.0, "weight") for i in range(count))
     )
 
     def residuals(u: np.ndarray) -> np.ndarray:

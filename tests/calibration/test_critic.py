@@ -10,7 +10,8 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.critic import FEWEST_STROKES, RECURS, criticise
 from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.model.terms import TERMS, Motion
+from scissorcal.model.friction_terms import TERMS
+from scissorcal.model.terms import Motion
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
@@ -43,10 +44,10 @@ def template():
 def critique(recording: Recording, seed: int, template):
     """Criticise Coulomb + viscous, asymmetric."""
     law = friction_experiment((recording,), SIMPLE, template)
-    climbed = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
+    chosen = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
     motion = Motion(law.bins.opening, law.bins.rate, law.bins.acceleration)
     rng = np.random.default_rng(seed)
-    return criticise("friction", climbed, motion, recording.joint, rng)
+    return criticise("friction", chosen, motion, recording.joint, rng)
 
 
 @pytest.mark.parametrize(

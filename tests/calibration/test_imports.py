@@ -11,7 +11,7 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from pathlib import Path
-from scissorcal.calibration import fit_friction, load_fit, save_fit
+from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.truth import Truth, friction_recording
 recording = friction_recording(Truth(), np.random.default_rng(1))
@@ -19,7 +19,7 @@ settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=Fal
 path = Path(sys.argv[1])
 for effort in ("draft", "standard"):
     fit = fit_friction((recording,), settings, effort=effort, rng=np.random.default_rng(2))
-    save_fit(fit, path)
+    save(fit, path)
     load_fit(path)
 print(json.dumps(sorted(sys.modules)))
 """

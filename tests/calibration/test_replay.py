@@ -1,13 +1,10 @@
 """Record-and-replay: right on what it has seen, and beaten where the motion is another."""
 
-import json
-
 import numpy as np
 import pytest
 
-from scissorcal.calibration import fit_friction, load_fit, save_fit
+from scissorcal.calibration import fit_friction
 from scissorcal.calibration.replay import compare_with_replay, replay_from_stroke
-from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.test_checks import fitted, motion
 from tests.calibration.truth import Truth, friction_recording
@@ -58,76 +55,24 @@ def test_the_replayed_stroke_is_not_among_the_unseen_ones(found):
 
 def test_two_closing_strokes_are_too_few_to_compare():
     bins = motion(strokes=2)
-    climbed, _ = fitted(bins)
+    chosen, _ = fitted(bins)
     unknown = np.full(len(bins.rate), np.nan)
-    args = (climbed, bins, np.ones(len(bins.rate)), unknown, ("a.mcap",))
+    args = (chosen, bins, np.ones(len(bins.rate)), unknown, ("a.mcap",))
     assert compare_with_replay(*args, refit=False) is None
 
 
 def test_what_is_new_about_a_stroke_is_named():
     bins = motion(speeds=(0.3, 0.3, 0.3, 0.6))
-    climbed, _ = fitted(bins)
+    chosen, _ = fitted(bins)
     measured = np.ones(len(bins.rate)) * (bins.stroke == 7) + 1e-3 * bins.opening
     contact = np.where(bins.stroke == 2, 0.05, 0.02)
-    compared = compare_with_replay(climbed, bins, measured, contact, ("a.mcap",), refit=True)
+    compared = compare_with_replay(chosen, bins, measured, contact, ("a.mcap",), refit=True)
     novelty = {row.stroke: row.novelty for row in compared.rows}
     assert novelty[3] == novelty[7] == "speed"
     assert novelty[2] == "contact"
     assert set(novelty.values()) == {"none", "speed", "contact"}
     assert all(np.isfinite(row.one_stroke_rms) for row in compared.rows)
     assert "Fitted to that one stroke alone" in compared.sentence
-
-
-def test_everything_new_survives_the_disk(found, tmp_path):
-    path = tmp_path / "friction.nc"
-    save_fit(found, path)
-    back = load_fit(path)
-    assert back.selection == found.selection
-    assert back.critic == found.critic
-    assert np.array_equal(back.prior_draws, found.prior_draws)
-    assert back.nuisance == found.nuisance
-    assert np.array_equal(back.nuisance_draws, found.nuisance_draws)
-    assert repr(back.replay.rows) == repr(found.replay.rows)
-    assert np.array_equal(back.replay.torque, found.replay.torque)
-    assert back.prior_draws.std(axis=0) == pytest.approx(found.prior_draws.std(axis=0))
-    arviz = pytest.importorskip("arviz")
-    data = arviz.from_netcdf(str(path))
-    assert set(data.prior.data_vars) == {p.name for p in found.parameters}
-    data.close()
-
-
-def rewritten(path, change) -> None:
-    """Change the facts and the format in a fit's file."""
-    import h5py
-
-    with h5py.File(path, "r+") as file:
-        attributes = file["posterior"].attrs
-        facts = json.loads(attributes["scissorcal"])
-        attributes["format"] = change(facts)
-        attributes["scissorcal"] = json.dumps(facts)
-
-
-def test_a_file_of_the_version_before_is_read_with_the_new_fields_empty(found, tmp_path):
-    path = tmp_path / "friction.nc"
-    save_fit(found, path)
-
-    def older(facts) -> str:
-        for name in ("selection", "critic", "replay", "has_prior", "nuisance"):
-            del facts[name]
-        return "scissorcal-fit/1"
-
-    rewritten(path, older)
-    back = load_fit(path)
-    assert back.parameters == found.parameters
-    assert (back.selection, back.critic, back.replay, back.prior_draws) == ("", (), None, None)
-
-
-def test_a_file_of_a_later_version_is_refused_with_what_to_do(found, tmp_path):
-    path = tmp_path / "friction.nc"
-    save_fit(found, path)
-    rewritten(path, lambda facts: "scissorcal-fit/99")
-    with pytest.raises(InputError, match="written by a later version"):
-        load_fit(path)
 
 
 def test_the_prior_is_drawn_as_the_fit_had_it(found):

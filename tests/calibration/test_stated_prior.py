@@ -5,9 +5,10 @@ import pytest
 
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.model.transforms import LOG
 
 NAMES = ("response_force", "response_exponent", "noise_scale", "kappa")
-LAYOUT = Layout(tuple(Parameter(n, "1", "log", 0.0, 2.0, "") for n in NAMES))
+LAYOUT = Layout(tuple(Parameter(n, "1", LOG, 0.0, 2.0, "") for n in NAMES))
 COVARIANCE = np.array([[0.04, 0.01], [0.01, 0.09]])
 STATED = StatedPrior(
     ("response_exponent", "response_force"), np.array([1.0, 3.0]), COVARIANCE, "power"

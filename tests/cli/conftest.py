@@ -8,7 +8,10 @@ from typing import Any
 
 import jsonschema
 import pytest
+import typer
 
+from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.output import Answer, command
 from scissorcal.cli.root import run
 from scissorcal.recipe.library import schemas_dir
 
@@ -57,3 +60,10 @@ def workspace(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     assert cli("init", folder, "--recipe", "paper-80gsm").code == 0
     monkeypatch.chdir(folder)
     return folder
+
+
+def run_instead(function: Callable[[], Answer], patch: pytest.MonkeyPatch) -> None:
+    """Make every command of the group ``scissorcal`` be ``function``."""
+    app = typer.Typer(rich_markup_mode=None)
+    app.command("plan")(command(function))
+    patch.setattr(LazyGroup, "load", lambda *_: typer.main.get_command(app))

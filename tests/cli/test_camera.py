@@ -86,7 +86,7 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     sd = np.sqrt(camera["covariance"][0][0])
     assert abs(camera["fx"] - 620.0) < 4.0 * sd < 20.0
     assert said.code == (3 if any(v["status"] == "fail" for v in said.envelope["verdicts"]) else 0)
-    assert [Path(file).suffix for file in said.envelope["files"]] == [".json"] + [".png"] * 5
+    assert [Path(file).suffix for file in said.envelope["files"]] == [".nc"] + [".png"] * 5
     assert all(Path(file).is_file() for file in said.envelope["files"])
 
     again = cli("fit", "camera")
@@ -94,11 +94,11 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     assert again.code == said.code
 
     for name, style in (("a.yml", "opencv"), ("a.yaml", "ros")):
-        assert cli("export", "fits/camera.json", name, "--style", style).code == 0
-        assert cli("export", "fits/camera.json", name, "--style", style).code == 2
-    before = (workspace / "fits" / "camera.json").read_bytes()
+        assert cli("export", "fits/camera.nc", name, "--style", style).code == 0
+        assert cli("export", "fits/camera.nc", name, "--style", style).code == 2
+    before = (workspace / "fits" / "camera.nc").read_bytes()
     assert cli("import", "a.yaml").code == 2
-    assert (workspace / "fits" / "camera.json").read_bytes() == before
+    assert (workspace / "fits" / "camera.nc").read_bytes() == before
 
     # A photograph more, and the fit is done anew; the same one again is left out.
     assert cli("capture", "camera", "-i", album / "flat-0.jpg").code == 0
@@ -120,7 +120,7 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     assert said.code == 0
     assert said.envelope["result"]["style"] == "Kalibr"
     assert said.envelope["verdicts"][0]["status"] == "not_evaluated"
-    assert "Brought in from kalibr.yaml" in cli("fit", "camera").out
+    assert "Imported from kalibr.yaml" in cli("fit", "camera").out
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     [
         (["nothing.jpg"], "nothing.jpg is too blurred", 2),
         (["mat.jpg"], "shows the blade mat, not the camera board", 2),
-        (["none.jpg"], "is not there", 2),
+        (["none.jpg"], "does not exist", 2),
     ],
 )
 def test_nothing_is_kept_where_nothing_can_be_used(
@@ -147,7 +147,7 @@ def test_nothing_is_kept_where_nothing_can_be_used(
     [
         ("board-0.jpg", "One photograph alone", 5),
         ("flat-*.jpg", "focal length is not determined", 3),
-        (None, "There is no photograph", 5),
+        (None, "Nothing to fit", 5),
     ],
 )
 def test_a_fit_that_cannot_be_is_refused_and_writes_nothing(
@@ -178,11 +178,11 @@ def test_photographs_of_other_sizes_turns_and_boards_are_left_out(
     said = cli("capture", "camera", "-i", first, small, turned, copy)
     assert said.code == 0
     assert "480 x 360" in said.err
-    assert "turned by its EXIF data" in said.err
+    assert "has the EXIF orientation 3" in said.err
     assert "given twice" in said.err
     said = cli("capture", "camera", "--board", "chessboard:9x6:25", "-i", boards(album)[2])
     assert said.code == 2
-    assert "a fit takes one board" in said.err
+    assert "one fit uses one board" in said.err
 
 
 def test_pictures_are_picked_from_a_video(

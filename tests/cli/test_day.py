@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -13,9 +12,9 @@ from scissorcal.package import open_package
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.recording import write_recording
 from scissorcal.workday.workspace import Workspace
-from tests.calibration.truth import Stroke, Truth, make_recording, sweep
-from tests.report.pages import read_page
-from tests.workday.made import quick_workspace, record_friction
+from tests.calibration.truth import Stroke, Truth, make_recording
+from tests.report.pages import panel_of, read_page, values_of
+from tests.workday.made import quick_workspace, record_cut, record_friction
 
 from .conftest import Cli
 
@@ -24,17 +23,8 @@ from .conftest import Cli
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """A workspace with both captures, made up, and few choices for the fits."""
     workspace = quick_workspace(tmp_path_factory.mktemp("day") / "paper")
-    text = workspace.recipe_path.read_text(encoding="utf-8")
     record_friction(workspace)
-    opening, advance, strokes = [], [], []
-    for place, speed in ((-0.018, 0.6), (0.016, 0.9)):
-        for start, end, kind, rate in ((0.85, 0.22, "closing", speed), (0.22, 0.85, "opening", 1)):
-            strokes.append(Stroke(len(strokes), kind, rate, 0))
-            opening.append(sweep(start, end, rate))
-            advance.append(place)
-    rng = np.random.default_rng(3)
-    made = make_recording("cut", opening, advance, strokes, Truth(), rng, True)
-    write_recording(replace(made, recipe_toml=text), workspace.new_recording("cut"))
+    record_cut(workspace)
     return workspace
 
 
@@ -79,7 +69,9 @@ def test_the_day_from_captures_to_package(
     }
 
     plan = cli("plan", "--json").envelope["result"]
-    assert [s["name"] for s in plan["steps"] if s["status"] != "done"] == ["report sign"]
+    needed = [s for s in plan["steps"] if not s["optional"]]
+    waiting = [s["name"] for s in needed if s["state"] not in ("done", "unverified")]
+    assert waiting == ["report sign"]
     assert plan["next_command"].startswith("scissorcal report sign")
 
 
@@ -104,16 +96,16 @@ def test_a_signature_travels_with_the_package_and_is_void_once_the_report_change
     assert after.review.name == "A. Reviewer"
     assert after.content_hash == before.content_hash
     assert cli("package", "build", "--json").envelope["result"]["cached"]
-    assert cli("plan", "--json").envelope["result"]["next_command"] is None
+    assert cli("plan", "--json").envelope["result"]["next_command"] == "scissorcal verify"
     assert "left as they are" in cli("report").out
     assert hashlib.sha256(recorded.report_json.read_bytes()).hexdigest() == digest
 
     whole = recorded.report_json.read_text(encoding="utf-8")
     recorded.report_json.write_text(whole.replace("accepted", "x") + " ", encoding="utf-8")
     steps = {s["name"]: s for s in cli("plan", "--json").envelope["result"]["steps"]}
-    assert steps["report sign"]["status"] == "stale"
-    assert "changed since it was signed" in steps["report sign"]["state"]
-    assert steps["package build"]["status"] == "stale"
+    assert steps["report sign"]["state"] == "stale"
+    assert "changed since it was signed" in steps["report sign"]["found"]
+    assert steps["package build"]["state"] == "stale"
     recorded.report_json.write_text(whole, encoding="utf-8")
 
 
@@ -123,7 +115,9 @@ def test_a_rejection_is_carried_and_fails_the_check(
     monkeypatch.chdir(recorded.root)
     words = ("report", "sign", "--name", "B", "--decision", "reject", "--note", "it bends")
     assert cli(*words).code == 0
-    assert any("it bends" in n for n in cli("plan", "--json").envelope["result"]["notes"])
+    steps = {s["name"]: s for s in cli("plan", "--json").envelope["result"]["steps"]}
+    assert steps["report sign"]["state"] == "failed"
+    assert "it bends" in steps["report sign"]["found"]
     assert cli("package", "build").code == 3
     assert "rejected by B" in cli("package", "check").out
     words = ("--device", "sim", "--strokes", "1", "--seconds", "0.3", "--no-record", "--yes")
@@ -139,7 +133,7 @@ def test_a_report_of_another_recipe_is_not_signed(
     said = cli("report", "sign", "--name", "C", "--decision", "accept")
     recorded.recipe_path.write_text(text, encoding="utf-8")
     assert said.code == 5
-    assert "it shows another recipe" in said.err
+    assert "other fits, trust checks or settings" in said.err
     assert cli("report", "sign", "--name", " ", "--decision", "accept").code == 2
 
 
@@ -149,11 +143,15 @@ def test_two_runs_stand_side_by_side_or_are_refused_for_what_differs(
     monkeypatch.chdir(tmp_path)
     said = cli("report", "compare", recorded.root, recorded.report_json, "--json")
     assert said.code == 0
-    assert [row["in_sd"] for fit in said.envelope["result"]["fits"] for row in fit["parameters"]]
+    panels = {panel["id"]: panel for panel in said.envelope["result"]["panels"]}
+    assert panels["cut-parameters"]["sentence"] == "No parameter has changed."
+    for row in panels["cut-parameters"]["rows"]:
+        assert [value["number"] for value in row["values"] if value["name"] == "in sd"] == [0.0]
     twin = json.loads((tmp_path / "comparison" / "comparison.json").read_text(encoding="utf-8"))
     schema = json.loads((schemas_dir() / "comparison.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(schema).validate(twin)
-    assert twin["torque"]["largest_difference"] == 0
+    torque = values_of(panel_of(twin, "torque"))
+    assert torque["largest difference"]["B − A"]["number"] == pytest.approx(0, abs=1e-9)
     assert read_page(tmp_path / "comparison" / "comparison.html").unbalanced == []
 
     facts = json.loads(recorded.report_json.read_text(encoding="utf-8"))
@@ -215,7 +213,7 @@ def test_an_interrupted_capture_is_recovered_by_the_next_command(cli: Cli, works
     said = cli("plan", "--json")
     assert "was recovered from an interrupted capture" in said.err
     (step, *_) = said.envelope["result"]["steps"]
-    assert (step["name"], step["status"]) == ("capture friction", "done")
+    assert (step["name"], step["state"]) == ("capture friction", "done")
     assert path.is_file()
     assert "recovered" not in cli("plan").err
 
@@ -238,9 +236,9 @@ def test_a_capture_that_cannot_be_read_is_named_with_the_way_on(cli: Cli, worksp
     foreign.write_bytes(b"")
     said = cli("fit", "friction")
     assert said.code == 2
-    assert f"move it out of {foreign.parent}" in said.err
+    assert f"scissorcal recording exclude {foreign.name}" in said.err
     plan = cli("plan", "--json").envelope["result"]
-    assert plan["next_command"].startswith(f"mv captures/{foreign.name} ")
+    assert plan["next_command"].startswith(f"scissorcal recording exclude {foreign.name} ")
     assert foreign.is_file()
 
 

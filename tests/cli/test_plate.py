@@ -7,19 +7,19 @@ import cv2
 import numpy as np
 import pytest
 
+from scissorcal.calibration.plate.track import read_track
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.pose import Pose as Found
 from scissorcal.vision.geometry.pose import difference
 from scissorcal.vision.sim import Pose, chained
-from scissorcal.workday.demo.sim_photographs import sim_lens
-from scissorcal.workday.demo.sim_plate import (
+from scissorcal.vision.sim.sim_camera import (
+    SIM_LENS,
     render_card_photographs,
     render_frames,
     render_plate_photographs,
     sim_plate_scene,
 )
-from scissorcal.workday.runs.track import read_track
 from tests.cli.conftest import Cli
 
 
@@ -36,7 +36,7 @@ def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     stances = render_card_photographs(recipe, folder, 0)
     rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
     (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
-    lens = sim_lens()
+    lens = SIM_LENS
     store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
     store.write("image_width", lens.width)
     store.write("image_height", lens.height)
@@ -51,7 +51,7 @@ def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def video(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten pictures at 10 Hz of a plate that slides; the fourth is empty, the eighth black."""
     path = tmp_path_factory.mktemp("video") / "plate.avi"
-    lens = sim_lens()
+    lens = SIM_LENS
     writer = cv2.VideoWriter(
         str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (lens.width, lens.height)
     )
@@ -146,7 +146,7 @@ def test_stances_are_checked_line_by_line(
     for text, words in (
         ("file,advance_mm\nrig-01.jpg,3\n", "needs a first line"),
         ("file,advance_mm,opening_deg\nrig-01.jpg,3,wide\n", "line 2"),
-        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no line among the stances"),
+        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no stance: add a line"),
     ):
         table.write_text(text)
         said = cli("capture", "plate", "-i", cards(album)[0], "--stances", table)
@@ -165,19 +165,19 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
     assert cli("capture", "plate", "-i", one, "--stances", album / "stances.csv").code == 0
     said = cli("fit", "plate", "--json")
     assert said.code == 3
-    assert "the rig stood in one place" in said.envelope["result"]["error"]
-    assert not (workspace / "fits" / "plate.json").exists()
+    assert "the rig has the same stance in all pictures" in said.envelope["result"]["error"]
+    assert not (workspace / "fits" / "plate.nc").exists()
 
 
 def test_what_must_come_first_is_said(cli: Cli, workspace: Path, album: Path) -> None:
     said = cli("fit", "plate", "--json")
     assert said.code == 5
-    assert "There is no camera yet" in said.envelope["result"]["error"]
+    assert "scissorcal capture plate" in said.envelope["result"]["error"]
     assert cli("capture", "track", "--camera", "sim").code == 5
     cli("import", album / "camera.yml")
     said = cli("fit", "plate")
     assert said.code == 5
-    assert "There is no photograph of the plate's target" in said.err
+    assert "Nothing to fit (capture plate: " in said.err
 
 
 def test_photographs_of_another_size_are_refused(
@@ -189,7 +189,7 @@ def test_photographs_of_another_size_are_refused(
     assert cli("capture", "plate", "-i", half).code == 0
     said = cli("fit", "plate")
     assert said.code == 2
-    assert "has 1000 x 750 pixels, the camera was fitted at 2000 x 1500" in said.err
+    assert "has 1000 x 750 pixels, and the camera was fitted at 2000 x 1500" in said.err
 
 
 def test_a_video_is_tracked_and_its_drop_outs_named(
@@ -254,10 +254,10 @@ def test_no_such_camera_or_video(
     assert "Camera 97 gives no picture" in said.envelope["result"]["error"]
     said = cli("capture", what, "--camera", "gone.mp4")
     assert said.code == 2
-    assert "gone.mp4 is not there" in said.err
+    assert "gone.mp4 does not exist" in said.err
     said = cli("capture", what, "--camera", album / "stances.csv")
     assert said.code == 2
-    assert "is no video that can be read" in said.err
+    assert "is not a readable video" in said.err
     assert captured(workspace) == []
 
 
@@ -266,7 +266,7 @@ def test_a_video_without_the_target_leaves_nothing(
 ) -> None:
     cli("import", album / "camera.yml")
     for size, words in (
-        ((2000, 1500), "in 3 the picture is of one shade"),
+        ((2000, 1500), "in 3 the picture is uniform"),
         ((640, 480), "The pictures are 640 x 480 pixels"),
     ):
         path = tmp_path / f"{size[0]}.avi"
@@ -285,7 +285,7 @@ def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> N
     assert cli("capture", "plate", "-i", "a.jpg", "--camera", "0").code == 2
     said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
     assert said.code == 2
-    assert "Nobody knows where the rig stood" in said.err
+    assert "The rig's stances are not known" in said.err
 
 
 def test_a_track_is_json_line_by_line(cli: Cli, workspace: Path, album: Path, video: Path) -> None:

@@ -61,7 +61,7 @@ def test_a_table_of_motion_alone_is_enough(
     bare.write_text("\n".join(cells) + "\n")
     said = cli("predict", "friction", bare, "-w", fitted.root, "--plot", tmp_path / "bare.png")
     assert said.code == 0
-    assert "nothing to compare with" in said.out
+    assert "no effort to compare with" in said.out
     by_motion = cli("predict", "friction", bare, "-w", fitted.root, "--json").envelope["result"]
     assert by_motion["share_inside"] is None
 
@@ -72,7 +72,7 @@ def test_wrong_files_and_laws_are_refused_with_the_mend(
     at = ("-w", fitted.root)
     said = cli("predict", "load", fresh, *at)
     assert said.code == 2
-    assert "knows no load" in said.err
+    assert "has no load" in said.err
     said = cli("predict", "friction", tmp_path / "none.mcap", *at)
     assert said.code == 2
     assert "does not exist" in said.err

@@ -40,7 +40,7 @@ def test_captures_on_the_virtual_rig_fill_the_plan(quick: Path, cli: Cli) -> Non
     assert said.code == 0, said.err
     assert "cells filled" in said.out
     steps = cli("plan", "--json").envelope["result"]["steps"]
-    assert [step["status"] for step in steps[:3]] == ["done", "done", "missing"]
+    assert [step["state"] for step in steps[:3]] == ["done", "done", "missing"]
 
 
 def test_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:

@@ -1,36 +1,35 @@
 """Every command has help with an example, takes --json, and ends with the code it should."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import click
 import pytest
+import typer
+from typer.core import TyperCommand
 
 import scissorcal
 from scissorcal.cli.lazy import LazyGroup
-from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.output import Answer, table
 from scissorcal.cli.root import scissorcal_command
 from scissorcal.errors import DeviceError, InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.verdicts import Verdict
 
-from .conftest import Cli
+from .conftest import Cli, run_instead
 
 
-def all_commands() -> Iterator[tuple[str, click.Command]]:
+def all_commands() -> Iterator[tuple[str, TyperCommand]]:
     """Walk through all commands, groups left out."""
-    pending: list[tuple[str, click.Command]] = [("", scissorcal_command)]
+    pending = [("", typer.main.get_command(scissorcal_command))]
     while pending:
         path, found = pending.pop()
-        if not isinstance(found, click.Group):
+        if isinstance(found, LazyGroup):
+            pending += [(f"{path} {name}".strip(), found.load(name)) for name in found.lazy]
+        else:
+            assert isinstance(found, TyperCommand)
             yield path, found
-            continue
-        context = click.Context(found)
-        for name in found.list_commands(context):
-            inner = found.get_command(context, name)
-            assert inner is not None
-            pending.append((f"{path} {name}".strip(), inner))
 
 
 COMMANDS = dict(all_commands())
@@ -45,7 +44,9 @@ def test_the_day_is_there() -> None:
         "import",
         "export",
         "recording show",
-        "fit",
+        "fit friction",
+        "fit cut",
+        "fit all",
         "verify",
         "report compare",
         "report sign",
@@ -72,12 +73,63 @@ def test_help_has_an_example_with_output_and_json(path: str, cli: Cli) -> None:
     ), "no output in the example"
 
 
-def test_a_group_lists_its_commands_as_they_call_themselves() -> None:
-    assert isinstance(scissorcal_command, LazyGroup)
-    for name in scissorcal_command.lazy:
-        found = scissorcal_command.get_command(click.Context(scissorcal_command), name)
-        assert found is not None
-        assert found.name == name
+@pytest.mark.parametrize("path", COMMANDS)
+def test_every_option_and_argument_has_help(path: str) -> None:
+    for parameter in COMMANDS[path].params:
+        assert getattr(parameter, "help", None), parameter.name
+
+
+def test_the_line_of_help_in_the_list_does_not_need_the_command(cli: Cli) -> None:
+    said = cli("capture", "--help")
+    assert "friction  Empty strokes" in said.out
+
+
+@pytest.mark.parametrize(
+    ("words", "suggested"), [(["captrue"], "capture"), (["capture", "fricton"], "friction")]
+)
+def test_a_mistyped_command_is_answered_with_a_suggestion(
+    words: list[str], suggested: str, cli: Cli
+) -> None:
+    said = cli(*words)
+    assert said.code == 2
+    assert f"Did you mean '{suggested}'?" in said.err
+
+
+@pytest.mark.parametrize("words", [["capture", "friction"], ["render"], ["device", "doctor"]])
+def test_a_missing_device_names_the_virtual_rig(words: list[str], cli: Cli) -> None:
+    said = cli(*words)
+    assert said.code == 2
+    assert "--device" in said.err
+    assert '"sim" for a virtual rig' in said.err
+
+
+@pytest.mark.parametrize(
+    ("shell", "words", "expected"),
+    [
+        ("bash", "scissorcal cap", "capture"),
+        ("zsh", "scissorcal capture fr", "friction"),
+        ("fish", "scissorcal fit bl", "blade"),
+    ],
+)
+def test_a_shell_completes_commands_and_choices(shell: str, words: str, expected: str) -> None:
+    typed = {
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+        "_TYPER_COMPLETE_ARGS": words,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "_SCISSORCAL_COMPLETE": f"complete_{shell}",
+    }
+    program = "from scissorcal.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=os.environ | typed
+    )
+    assert expected in done.stdout, done.stderr
+
+
+def test_an_option_in_front_of_a_subcommand_is_refused(cli: Cli) -> None:
+    said = cli("report", "--anew", "compare", "a", "b")
+    assert said.code == 2
+    assert "after the subcommand" in said.err
 
 
 def test_version(cli: Cli) -> None:
@@ -113,33 +165,29 @@ def test_wrong_usage_is_two_and_still_one_object(words: list[str], cli: Cli) -> 
 def test_an_error_is_a_sentence_and_a_code(
     raised: BaseException, code: int, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    @click.command("broken")
-    @command
     def broken() -> Answer:
         raise raised
 
-    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: broken)
-    said = cli("broken")
+    run_instead(broken, monkeypatch)
+    said = cli("plan")
     assert said.code == code
     assert "Traceback" not in said.err + said.out
     assert said.err.startswith("Error: ")
-    envelope = cli("broken", "--json").envelope
+    envelope = cli("plan", "--json").envelope
     assert envelope["result"]["exit_code"] == code
-    assert envelope["command"] == "broken"
+    assert envelope["command"] == "plan"
     if not isinstance(raised, KeyboardInterrupt):
-        assert "Traceback" in cli("broken", "--traceback").err
+        assert "Traceback" in cli("plan", "--traceback").err
 
 
 def test_an_unexpected_failure_says_how_to_see_more(
     cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    @click.command("broken")
-    @command
     def broken() -> Answer:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: broken)
-    said = cli("broken")
+    run_instead(broken, monkeypatch)
+    said = cli("plan")
     assert "ZeroDivisionError: division by zero" in said.err
     assert "--traceback" in said.err
 
@@ -152,17 +200,15 @@ def test_a_failed_verdict_is_three_and_prose_leaves_stdout_to_the_object(
         Verdict("fit.cut", "bounds", "not_evaluated", None, None, "No search."),
     ]
 
-    @click.command("judged")
-    @command
     def judged() -> Answer:
         return Answer({"value": float("nan")}, "What it found.", verdicts, [Path("a.json")])
 
-    monkeypatch.setattr(LazyGroup, "get_command", lambda *_: judged)
-    said = cli("judged")
+    run_instead(judged, monkeypatch)
+    said = cli("plan")
     assert said.code == 3
     assert "What it found." in said.out
     assert "FAIL  fit.cut  k-hat   0.9, at most 0.7  Far off." in said.out
-    said = cli("judged", "--json")
+    said = cli("plan", "--json")
     assert said.code == 3
     assert "What it found." in said.err
     assert said.envelope["verdicts"][0]["status"] == "fail"

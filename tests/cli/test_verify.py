@@ -25,7 +25,7 @@ def test_it_prints_tables_and_verdicts(
     fitted: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(fitted.captures_dir)
-    said = cli("verify", "friction", "--fits", "3", "--workers", "1")
+    said = cli("verify", "friction", "--fits", "3", "--workers", "1", "-v")
     assert said.code == 0, said.out
     assert "FAIL  " not in said.out
     for words in (
@@ -33,7 +33,7 @@ def test_it_prints_tables_and_verdicts(
         "noise: white ",
         "effort_rms",
         "two halves: whole strokes of a kind, alternating by speed",
-        "sensitivity to the powers of prior and likelihood",
+        "power-scaling sensitivity to prior and likelihood",
         "----  verify.friction  calibration",
         "pass  verify.friction  halves-effort",
     ):
@@ -71,11 +71,11 @@ def test_wrong_words_and_a_missing_fit_are_refused(
 ) -> None:
     said = cli("verify", "--checks", "sbc,luck")
     assert said.code == 2
-    assert "luck is no check; name some of sbc, halves, prior" in said.err
+    assert "luck is not a check; choose from sbc, halves, prior" in said.err
     assert cli("verify", "--fits", "0").code == 2
     said = cli("verify", "--workers", "2", "--cluster", "tcp://here:1")
     assert said.code == 2
-    assert "give --workers or --cluster" in said.err
+    assert "Give --workers or --cluster" in said.err
     said = cli("verify")
     assert said.code == 5
     assert "run 'scissorcal fit' first" in said.err

@@ -1,12 +1,19 @@
-"""Progress is plain lines where nobody watches, and nobody is asked where nobody is there."""
+"""Progress is drawn on a terminal and printed as lines elsewhere; questions need a terminal."""
 
+from collections import deque
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from scissorcal.cli import progress as progress_module
-from scissorcal.cli.live_view import LiveView
+from scissorcal.cli.live_view import LiveView, torque_plot
+from scissorcal.cli.output import table
 from scissorcal.cli.progress import progress
 from scissorcal.device.coverage import CoverageGrid
+from scissorcal.device.recorder import Recorder
 from scissorcal.errors import InputError, VerdictError
+from scissorcal.recording import SAMPLE_DTYPE, RecordingWriter
 
 
 def test_lines_are_printed_now_and_then(
@@ -44,20 +51,67 @@ def test_work_far_beyond_its_limit_ends_with_a_sentence(monkeypatch: pytest.Monk
             tell(0.4, "blade: searching")
 
 
-def test_a_capture_says_what_it_covers(capsys: pytest.CaptureFixture[str]) -> None:
-    grid = CoverageGrid((0.1,), ((0.2, 0.3), (0.3, 0.4)))
+def recorded(tmp_path: Path) -> Recorder:
+    """Give a recorder that took half a second of closing at 2 mN m."""
+    samples = np.zeros(500, dtype=SAMPLE_DTYPE)
+    samples["sequence"] = np.arange(500)
+    samples["device_time_us"] = 1000 * np.arange(500)
+    samples["opening"] = np.linspace(0.4, 0.2, 500)
+    samples["motor_torque"] = 0.002
+    grid = CoverageGrid((0.1, 0.4), ((0.2, 0.3), (0.3, 0.4)))
+    with RecordingWriter(tmp_path / "a.mcap", "friction") as writer:
+        recorder = Recorder(writer, grid)
+        recorder.take(samples)
+    return recorder
+
+
+def test_a_capture_shows_opening_torque_and_coverage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = recorded(tmp_path)
     with LiveView() as view:
-        view.show(0.0, "closing", grid)
-        view.show(0.1, "closing", grid)
-        view.show(1.0, "done", grid)
-        view.show(1.0, "done", grid)
+        view.show(0.0, "closing", recorder)
+        view.show(0.1, "closing", recorder)
+        view.show(1.0, "done", recorder)
+        view.show(1.0, "done", recorder)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
-    assert "0 of 4 cells filled" in lines[0]
+    assert "opening 11.5 deg, motor torque 2.0 mN m" in lines[0]
+    assert "2 of 8 cells filled" in lines[0]
     assert lines[1].startswith("100 %  done")
 
 
-def test_nobody_is_asked_where_nobody_is_there(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_terminal_shows_torque_over_opening_with_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "120")
+    with LiveView() as view:
+        view.show(0.5, "closing", recorded(tmp_path))
+    said = capsys.readouterr().err
+    assert "motor torque (mN m)" in said
+    assert "opening (deg)" in said
+    assert "(rad/s)" in said
+
+
+def test_the_newest_point_of_the_plot_is_marked() -> None:
+    plot = torque_plot(deque([(10.0, -5.0), (30.0, 5.0), (20.0, 0.0)])).splitlines()
+    assert plot[0] == "motor torque (mN m)"
+    assert plot[1].startswith("      5.0 |")
+    assert plot[1].endswith(".")
+    assert sum(line.count("o") for line in plot[1:9]) == 1
+    assert plot[-1].split() == ["10.0", "opening", "(deg)", "30.0"]
+
+
+def test_a_table_on_a_terminal_is_set_by_rich(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "24")
+    lines = table([["name", "why"], ["kappa", "a sentence that does not fit"]]).splitlines()
+    assert len(lines) > 2
+    assert "\x1b[1m" in lines[0]
+
+
+def test_questions_need_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with LiveView() as view, pytest.raises(InputError, match=r"Clear the blades\. .*--yes"):
         view.confirm("Clear the blades.")
     with LiveView(ask=False) as view:

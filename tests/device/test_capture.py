@@ -15,11 +15,11 @@ from scissorcal.device.capture import (
     open_writer,
     servo_config,
 )
-from scissorcal.device.coverage import CoverageGrid
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
+from scissorcal.device.recorder import Recorder
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError
@@ -69,8 +69,8 @@ def test_friction_is_swept_as_planned_and_recorded_whole(tmp_path: Path) -> None
     link = link_for(recipe)
     told: list[tuple[float, str, float]] = []
 
-    def progress(done: float, sentence: str, coverage: CoverageGrid) -> None:
-        told.append((done, sentence, coverage.share))
+    def progress(done: float, sentence: str, recorder: Recorder) -> None:
+        told.append((done, sentence, recorder.coverage.share))
 
     recording, report = captured(tmp_path, link, recipe, "friction", progress=progress)
     plan = friction_plan(recipe, link.identity, advance=link.rig.advance)
@@ -208,7 +208,7 @@ def test_a_hand_that_is_not_measured_is_refused(tmp_path: Path) -> None:
         captured(tmp_path, link, recipe, "cut", hand=True, confirm=lambda request: None)
 
 
-def test_a_person_who_does_nothing_is_not_waited_for_for_ever(
+def test_waiting_for_a_person_without_motion_times_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hand, "GIVE_UP_S", 0.5)
@@ -219,7 +219,7 @@ def test_a_person_who_does_nothing_is_not_waited_for_for_ever(
     assert any("left after 0 of 2 strokes" in note for note in recording.notes)
 
 
-def test_without_somebody_to_ask_a_real_rig_does_not_move(tmp_path: Path) -> None:
+def test_without_a_confirm_callback_a_real_rig_does_not_move(tmp_path: Path) -> None:
     recipe = short("paper-80gsm")
     link = like_a_real_rig(recipe)
     before = link.rig.opening
@@ -229,7 +229,7 @@ def test_without_somebody_to_ask_a_real_rig_does_not_move(tmp_path: Path) -> Non
     assert not list(tmp_path.iterdir())
 
 
-def test_a_bad_line_is_survived_and_noted(tmp_path: Path) -> None:
+def test_a_line_with_losses_is_tolerated_and_noted(tmp_path: Path) -> None:
     recipe = short("paper-80gsm")
     link = link_for(recipe, faults=Faults(drop_share=0.01, garble_share=0.01))
     recording, report = captured(tmp_path, link, recipe, "friction")
@@ -245,8 +245,8 @@ def test_a_bad_line_is_survived_and_noted(tmp_path: Path) -> None:
         assert abs(lost) < 0.3
     notes = " ".join(recording.notes)
     assert "frame missing before frame" in notes
-    assert "garbled in all" in notes
-    assert f"{report.tally.lost} frames lost in {report.tally.gaps} gaps in all." in notes
+    assert "garbled in total" in notes
+    assert f"{report.tally.lost} frames lost in {report.tally.gaps} gaps in total." in notes
 
 
 def test_unplugging_keeps_what_was_recorded(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_a_stuck_encoder_stops_the_motion(tmp_path: Path) -> None:
     assert last["torque_command"] == 0.0
 
 
-def test_a_slow_port_is_told_as_such(tmp_path: Path) -> None:
+def test_a_slow_port_fails_its_checks(tmp_path: Path) -> None:
     recipe = changed(
         "paper-80gsm",
         rig__control={"opening_kp_Nm_per_rad": 6.0, "opening_kd_Nm_s_per_rad": 0.06},
@@ -278,7 +278,7 @@ def test_a_slow_port_is_told_as_such(tmp_path: Path) -> None:
         captured(tmp_path, link, recipe, "friction")
 
 
-def test_a_fault_from_before_is_cleared_and_a_recurrence_is_noted(tmp_path: Path) -> None:
+def test_a_fault_before_the_start_is_cleared_and_a_new_one_noted(tmp_path: Path) -> None:
     recipe = short("paper-80gsm")
     link = link_for(recipe)
     with open_motion(link, servo_config(recipe, link.identity)) as motion:
@@ -308,7 +308,7 @@ def test_limits_are_the_tighter_of_recipe_and_device() -> None:
     assert config.tick_us == IDENTITY.tick_us
 
 
-def test_a_weak_limit_is_never_exceeded() -> None:
+def test_a_low_limit_is_never_exceeded() -> None:
     weak = changed("paper-80gsm", limits={"torque_Nm": 0.02})
     link = link_for(weak)
     with open_motion(link, servo_config(weak, link.identity)) as motion:
@@ -328,7 +328,7 @@ def test_the_same_seed_gives_the_same_recording(tmp_path: Path) -> None:
     assert np.array_equal(*samples)
 
 
-def test_a_rig_that_falls_silent_is_given_up() -> None:
+def test_a_rig_that_stops_sending_ends_the_capture() -> None:
     recipe = short("paper-80gsm")
     link = link_for(recipe)
     with open_motion(link, servo_config(recipe, link.identity)) as motion:
@@ -338,7 +338,7 @@ def test_a_rig_that_falls_silent_is_given_up() -> None:
                 pass
 
 
-def test_places_that_are_no_numbers_move_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_position_that_is_not_finite_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = short("paper-80gsm")
     link = link_for(recipe)
     exchange = link.exchange

@@ -48,7 +48,7 @@ def test_blocks_make_no_difference() -> None:
     assert np.allclose(whole.seconds, parts.seconds)
 
 
-def test_a_gap_is_no_motion() -> None:
+def test_a_gap_is_not_counted_as_motion() -> None:
     grid = CoverageGrid((0.1, 0.4), even_cells((0.2, 0.8)))
     rest = np.full(500, 0.7)
     grid.add(samples_of(rest))

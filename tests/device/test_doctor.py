@@ -1,4 +1,4 @@
-"""The doctor measures what is there, and names the mend of what is wrong."""
+"""The doctor measures what is there, and names the remedy for what is wrong."""
 
 from pathlib import Path
 
@@ -32,12 +32,12 @@ SOUND = Measurements(
 )
 
 
-def test_a_sound_rig_passes_everything() -> None:
+def test_a_healthy_rig_passes_every_check() -> None:
     assert {verdict.status for verdict in judge(SOUND, "/dev/ttyUSB0")} == {"pass"}
 
 
 @pytest.mark.parametrize(
-    ("wrong", "check", "mend"),
+    ("wrong", "check", "remedy"),
     [
         ({"round_trip": BAD}, "round trip", "latency timer to 1 ms"),
         ({"unanswered": 2}, "round trip", "no hub"),
@@ -50,13 +50,13 @@ def test_a_sound_rig_passes_everything() -> None:
         ({"lateness": BAD}, "wake-up lateness", "real-time priority"),
     ],
 )
-def test_each_trouble_fails_its_own_check_and_names_the_mend(
-    wrong: dict[str, object], check: str, mend: str
+def test_each_problem_fails_its_check_and_names_the_remedy(
+    wrong: dict[str, object], check: str, remedy: str
 ) -> None:
     measured = Measurements(**{**vars(SOUND), **wrong})
     (verdict,) = failed(judge(measured, "/dev/ttyUSB0"))
     assert verdict.check == check
-    assert mend in verdict.why
+    assert remedy in verdict.why
 
 
 def test_what_was_not_measured_is_not_judged() -> None:
@@ -92,7 +92,7 @@ def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
     assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) == 16.0
 
 
-def test_a_rig_with_a_bad_line_is_found_out() -> None:
+def test_a_line_with_losses_fails_its_checks() -> None:
     told: list[float] = []
     with (
         SimProcess("office-paper", seed=3, faults=("drop=0.01", "garble=0.01")) as sim,

@@ -93,10 +93,10 @@ def test_missing_port_is_named() -> None:
         open_link("/dev/ttyNOWHERE")
 
 
-def test_a_file_is_no_port(tmp_path: Path) -> None:
+def test_a_file_is_not_a_port(tmp_path: Path) -> None:
     path = tmp_path / "recipe.toml"
     path.write_text("x")
-    with pytest.raises(DeviceError, match="is no serial port"):
+    with pytest.raises(DeviceError, match="is not a serial port"):
         open_link(str(path))
 
 
@@ -117,12 +117,12 @@ def test_forbidden_port_is_refused(far_end: Make, monkeypatch: pytest.MonkeyPatc
         open_link(far_end(honest).port)
 
 
-def test_silence_is_told_from_foreign_talk(far_end: Make) -> None:
-    with pytest.raises(DeviceError, match="is silent"):
+def test_silence_and_foreign_data_give_different_errors(far_end: Make) -> None:
+    with pytest.raises(DeviceError, match="sent nothing within"):
         open_link(far_end(silent).port, timeout=0.3)
-    with pytest.raises(DeviceError, match="Something else speaks"):
+    with pytest.raises(DeviceError, match="no valid frame"):
         open_link(far_end(lambda message: [b"$GPGGA,foreign\r\n"]).port, timeout=0.3)
-    with pytest.raises(DeviceError, match="does not say who it is"):
+    with pytest.raises(DeviceError, match="does not answer the handshake"):
         open_link(far_end(lambda message: [encode(STATE)]).port, timeout=0.3)
 
 
@@ -138,19 +138,21 @@ def test_other_schema_gives_both_hashes(far_end: Make) -> None:
     assert "Update the device's firmware" in str(caught.value)
 
 
-@pytest.mark.parametrize(("version", "mend"), [(0, "the device's firmware"), (9, "scissorcal")])
-def test_other_protocol_version_says_what_to_update(far_end: Make, version: int, mend: str) -> None:
+@pytest.mark.parametrize(("version", "remedy"), [(0, "the device's firmware"), (9, "scissorcal")])
+def test_other_protocol_version_says_what_to_update(
+    far_end: Make, version: int, remedy: str
+) -> None:
     later = struct.pack("<BB30s", 0x11, version, b"")
     end = far_end(lambda message: [encode_frame(later)])
-    with pytest.raises(DeviceError, match=f"version {version}, .* update {mend}"):
+    with pytest.raises(DeviceError, match=f"version {version}, .* update {remedy}"):
         open_link(end.port)
 
 
-def test_unplugging_is_a_sentence(far_end: Make) -> None:
+def test_unplugging_is_a_device_error(far_end: Make) -> None:
     end = far_end(honest)
     with open_link(end.port) as link:
         end.unplug()
-        with pytest.raises(DeviceError, match="went away"):
+        with pytest.raises(DeviceError, match="is gone"):
             link.configure(ConfigKey.STREAM, 1.0)
 
 
@@ -165,7 +167,7 @@ def test_unplugging_is_a_sentence(far_end: Make) -> None:
         {"handle_radius": float("inf")},
     ],
 )
-def test_absurd_limits_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_limits_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(DeviceError, match=next(iter(wrong))):
         check_identity("port", IDENTITY._replace(**wrong))  # type: ignore[arg-type]
 

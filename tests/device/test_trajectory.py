@@ -46,7 +46,7 @@ def test_glides_arrive_at_rest_within_their_bounds(
     assert np.allclose(np.diff(way)[:-1] / TICK_S, middle[:-1], atol=0.05 * speed)
 
 
-def test_glide_of_nothing_takes_no_time() -> None:
+def test_a_glide_of_no_distance_takes_no_time() -> None:
     assert len(glide(0.0, 1.0, 1.0, TICK_S)[0]) == 0
 
 

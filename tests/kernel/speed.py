@@ -10,7 +10,7 @@ import numpy as np
 
 from scissorcal.kernel import Kernel, Servo, ServoConfig, encode
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.frames import State
+from scissorcal.kernel.messages import State
 from scissorcal.kernel.tables import model_struct
 from tests.kernel.reference_model import Reference
 from tests.kernel.reference_wire import unstuffed

@@ -53,7 +53,7 @@ def work(path: CrackPath, opening, advance) -> float:
     ids=["line", "both blades", "bent", "bent, eq4", "pressed"],
 )
 @pytest.mark.parametrize("sheet", [EVEN, UNEVEN], ids=["even", "uneven"])
-def test_it_is_its_plain_twin(one, sheet):
+def test_the_c_code_equals_the_python_reference(one, sheet):
     """Places to 1e-9 m, torques and forces to 1e-9 of the largest, the same jumps."""
     opening, advance = strokes(240)
     found = walk_crack(crack_law(one, TICK_S, sheet), opening, advance)
@@ -157,7 +157,7 @@ def test_extremes_stay_finite(kappa, energy, force, exponent, opening, advance, 
     assert np.all(np.diff(path.place) >= 0.0)
 
 
-def test_what_cannot_be_walked_is_refused():
+def test_an_invalid_path_is_refused():
     law = crack_law(cutting(), TICK_S)
     with pytest.raises(ValueError, match="one length"):
         walk_crack(law, np.zeros(3), np.zeros(2))
@@ -166,7 +166,7 @@ def test_what_cannot_be_walked_is_refused():
     assert len(walk_crack(law, np.ones(1), np.zeros(1)).torque) == 0
 
 
-def test_a_fresh_sheet_is_cut_from_its_edge_and_air_gives_nothing():
+def test_a_fresh_sheet_is_cut_from_its_edge_and_air_gives_no_force():
     opening, advance = strokes(3_000)
     sheets = np.repeat([-1, 0, 1], 1000)
     uneven = Unevenness(0.05, 1e-3, 0.01)
@@ -195,7 +195,7 @@ def test_an_uneven_sheet_has_the_process_that_it_is_drawn_from():
     assert correlation == pytest.approx(np.exp(-1.0), abs=0.03)
 
 
-def test_the_golden_vectors_are_the_twins():
+def test_the_golden_vectors_are_the_python_references():
     stored = json.loads(golden_crack.PATH.read_text(encoding="utf-8"))
     made = json.loads(json.dumps(golden_crack.golden()))
     assert [case["title"] for case in stored["cases"]] == [case["title"] for case in made["cases"]]

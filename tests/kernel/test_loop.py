@@ -167,7 +167,7 @@ def test_it_answers_every_state_and_records_it(device: Device, block: LoopBlock)
     assert len(block.read()) == 0
 
 
-def test_its_last_words_release_the_motors(device: Device, block: LoopBlock) -> None:
+def test_its_last_commands_release_the_motors(device: Device, block: LoopBlock) -> None:
     loop = Loop(device, block)
     block.engage(Mode.RENDER)
     for k in range(1, 101):
@@ -180,7 +180,7 @@ def test_its_last_words_release_the_motors(device: Device, block: LoopBlock) -> 
     assert device.commands[-3:] == [Command(0, 100, 0.0, 0.0)] * 3
 
 
-def test_garbled_frames_are_counted_and_survived(device: Device, block: LoopBlock) -> None:
+def test_garbled_frames_are_counted_and_skipped(device: Device, block: LoopBlock) -> None:
     loop = Loop(device, block)
     for k in range(1, 61):
         if k % 4 == 0:
@@ -200,7 +200,7 @@ def test_garbled_frames_are_counted_and_survived(device: Device, block: LoopBloc
     assert (samples["flags"] & SampleFlag.AFTER_GAP > 0).sum() == 15
 
 
-def test_states_that_pile_up_are_all_recorded_but_only_the_newest_is_answered(
+def test_queued_states_are_all_recorded_and_only_the_newest_is_answered(
     device: Device, block: LoopBlock
 ) -> None:
     for k in range(1, 21):
@@ -225,7 +225,7 @@ def test_an_unplugged_device_is_a_hangup(device: Device, block: LoopBlock) -> No
     assert "unplugged" in block.stop_reason.sentence
 
 
-def test_a_device_that_falls_silent_ends_it(device: Device) -> None:
+def test_a_device_that_stops_sending_ends_the_loop(device: Device) -> None:
     block = LoopBlock.create(CONFIG, silence_limit_ms=150)
     loop = Loop(device, block)
     device.exchange(1)
@@ -233,13 +233,13 @@ def test_a_device_that_falls_silent_ends_it(device: Device) -> None:
     block.close()
 
 
-def test_a_device_that_never_speaks_ends_it_too(device: Device) -> None:
+def test_a_device_that_never_sends_ends_the_loop(device: Device) -> None:
     block = LoopBlock.create(CONFIG, silence_limit_ms=50)
     assert Loop(device, block).ended() is StopReason.SILENCE
     block.close()
 
 
-def test_a_supervisor_without_heartbeat_means_damping_then_the_end(device: Device) -> None:
+def test_a_missing_heartbeat_means_damping_then_a_stop(device: Device) -> None:
     config = ServoConfig(
         torque_limit=0.5,
         torque_slew=100.0,
@@ -271,7 +271,7 @@ def test_a_supervisor_without_heartbeat_means_damping_then_the_end(device: Devic
     block.close()
 
 
-def test_a_full_line_does_not_hold_the_loop(device: Device, block: LoopBlock) -> None:
+def test_a_full_line_does_not_block_the_loop(device: Device, block: LoopBlock) -> None:
     """A device that sends but never reads: commands are dropped and counted, samples kept."""
     loop = Loop(device, block)
     sequence = 0
@@ -311,7 +311,7 @@ def test_it_tracks_a_reference_given_while_it_runs(device: Device, block: LoopBl
     assert strokes.tolist() == [-1] + [4] * 100 + [5] * 50 + [-1]
 
 
-def test_a_setting_goes_out_and_its_echo_comes_back(device: Device, block: LoopBlock) -> None:
+def test_a_setting_is_sent_and_its_echo_returned(device: Device, block: LoopBlock) -> None:
     loop = Loop(device, block)
     answers: list[ConfigEcho | None] = []
     asking = threading.Thread(target=lambda: answers.append(block.configure(2, 50.0, 10.0)))
@@ -354,7 +354,7 @@ def test_another_process_runs_it(device: Device, block: LoopBlock) -> None:
     assert block.line.lost_samples == 0
 
 
-def test_samples_that_nobody_read_in_time_are_counted_as_lost(
+def test_samples_that_were_not_read_in_time_are_counted_as_lost(
     device: Device, block: LoopBlock
 ) -> None:
     loop = Loop(device, block)
@@ -369,7 +369,7 @@ def test_samples_that_nobody_read_in_time_are_counted_as_lost(
     assert block.line.lost_samples == 2**16 - 4 - (32768 - 1)
 
 
-def test_memory_that_is_no_block_is_refused(block: LoopBlock) -> None:
+def test_memory_without_a_block_is_refused(block: LoopBlock) -> None:
     with tempfile.TemporaryFile() as file:
         os.ftruncate(file.fileno(), 100)
         with pytest.raises(ValueError, match="too few"):
@@ -385,7 +385,7 @@ def test_memory_that_is_no_block_is_refused(block: LoopBlock) -> None:
     other.close()
 
 
-def test_a_block_without_tables_does_not_render(device: Device) -> None:
+def test_a_block_without_tables_refuses_to_render(device: Device) -> None:
     block = LoopBlock.create(CONFIG)
     with pytest.raises(ValueError, match="RENDER needs"):
         block.engage(Mode.RENDER)
@@ -396,7 +396,7 @@ def test_a_block_without_tables_does_not_render(device: Device) -> None:
     block.close()
 
 
-def test_parameters_that_were_spoiled_do_not_run(device: Device, block: LoopBlock) -> None:
+def test_invalid_parameters_do_not_run(device: Device, block: LoopBlock) -> None:
     block.pointer.config.torque_limit = float("nan")
     assert run_loop(device.slave, block) is StopReason.BAD_BLOCK
     assert block.stop_reason is StopReason.BAD_BLOCK

@@ -95,7 +95,7 @@ def booked(out: np.ndarray) -> float:
 @pytest.mark.parametrize(("kappa", "tolerance"), [(1.0, 2e-4), (0.7, 1e-3)])
 @pytest.mark.parametrize("blades", [1, 2])
 @pytest.mark.parametrize("curvature", [-1.5, 0.0, 2.0])
-def test_work_is_stored_or_paid_for(
+def test_work_is_stored_or_dissipated(
     kappa: float, tolerance: float, blades: int, curvature: float
 ) -> None:
     """Work done = change of stored energy + fracture + arrest losses, over whole strokes.
@@ -116,7 +116,7 @@ def test_work_is_stored_or_paid_for(
 
 
 @pytest.mark.parametrize("n", [300, 3000])  # 2 rad/s and 0.2 rad/s at 1 kHz
-def test_work_is_accounted_for_at_servo_rates_too(n: int) -> None:
+def test_the_energies_balance_at_servo_rates_too(n: int) -> None:
     opening = np.linspace(0.8, 0.2, n, dtype=np.float32)
     advance = np.full(n, -0.02, dtype=np.float32)
     out = Kernel(make_tables()).step_many(opening, 0.0, advance)
@@ -124,7 +124,7 @@ def test_work_is_accounted_for_at_servo_rates_too(n: int) -> None:
     assert abs(work - booked(out)) < 1e-4 * work
 
 
-def test_kappa_one_books_exactly_jch_per_metre() -> None:
+def test_with_kappa_one_the_fracture_energy_is_jch_per_metre() -> None:
     kernel = Kernel(make_tables())
     out = kernel.step_many(np.linspace(0.8, 0.3, 2000), -0.3, -0.02)
     assert out["fracture_J"].astype(float).sum() == pytest.approx(JCH * kernel.crack, rel=1e-4)
@@ -222,7 +222,7 @@ def test_beyond_the_tip_nothing_is_felt_until_the_blades_have_opened() -> None:
     assert again["torque"].max() > 0.01
 
 
-def test_leaving_at_the_tip_books_what_was_stored() -> None:
+def test_the_stored_energy_is_counted_as_lost_beyond_the_tip() -> None:
     opening = np.linspace(0.8, 0.2, 20_000).astype(np.float32)
     advance = np.full_like(opening, -0.02)
     out = Kernel(make_tables(tip_station=0.05)).step_many(opening, -0.5, advance)
@@ -313,7 +313,7 @@ def test_rate_damping_adds_while_going_in_and_never_pulls() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("which", range(3))
-def test_an_input_that_is_not_finite_gives_zero_and_says_so(bad: float, which: int) -> None:
+def test_an_input_that_is_not_finite_gives_zero_and_a_flag(bad: float, which: int) -> None:
     kernel = Kernel(make_tables(render_friction=True))
     kernel.step(0.5, -1.0, -0.02)
     crack = kernel.crack

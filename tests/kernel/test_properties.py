@@ -120,7 +120,7 @@ def test_a_run_leaves_no_more_than_the_fracture_energy(
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(u16, u32, u32, f32, f32, f32, f32), min_size=1, max_size=40))
-def test_a_servo_never_sends_what_is_not_finite_or_beyond_its_limits(
+def test_commands_are_always_finite_and_within_limits(
     rows: list[tuple[int, int, int, float, float, float, float]],
 ) -> None:
     """Any states at all, fault flags, restarted clocks and NaN among them."""
@@ -167,7 +167,7 @@ def test_states_survive_bit_for_bit(state: State) -> None:
 
 
 @given(st.binary(max_size=250))
-def test_decoding_gives_a_message_or_a_sentence(payload: bytes) -> None:
+def test_decoding_gives_a_message_or_an_error(payload: bytes) -> None:
     try:
         message = decode(payload)
     except ValueError as error:

@@ -151,7 +151,7 @@ def test_tracking_follows_and_lost_frames_do_not_shift_it(every: int) -> None:
     assert servo.stop_reason is StopReason.NONE
 
 
-def test_strokes_are_told_while_tracking_and_minus_one_after_the_end() -> None:
+def test_samples_have_their_stroke_while_tracking_and_minus_one_after_the_end() -> None:
     servo = Servo(None, CONFIG)
     servo.set_reference([0.6] * 4, [0.0] * 4, [-0.02] * 4, [7, 7, 8, 8])
     servo.engage(Mode.TRACK)
@@ -201,7 +201,7 @@ def test_the_stop_latches() -> None:
     assert "asked" in servo.stop_reason.sentence
 
 
-def test_a_silent_supervisor_leaves_damping_then_stops() -> None:
+def test_a_missing_heartbeat_leaves_damping_then_stops() -> None:
     servo = Servo(make_tables(), replace(CONFIG, supervisor_ticks=20))
     servo.engage(Mode.RENDER)
     states = closing()
@@ -219,7 +219,7 @@ def test_a_silent_supervisor_leaves_damping_then_stops() -> None:
     assert servo.telemetry()["flags"][0] & SampleFlag.FALLBACK
 
 
-def test_fallback_stays_until_a_mode_is_ordered_anew() -> None:
+def test_fallback_stays_until_a_mode_is_requested_again() -> None:
     servo = Servo(make_tables(), replace(CONFIG, supervisor_ticks=20))
     servo.engage(Mode.RENDER)
     states = closing()
@@ -234,7 +234,7 @@ def test_fallback_stays_until_a_mode_is_ordered_anew() -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 7.0])
-def test_a_place_that_is_no_place_gets_zero_torque(bad: float) -> None:
+def test_an_opening_that_is_not_finite_gives_zero_torque(bad: float) -> None:
     servo = rendering()
     states = closing()
     for _ in range(150):
@@ -291,7 +291,7 @@ def test_the_rate_survives_gaps_repeated_times_and_a_restarted_clock() -> None:
     assert math.isfinite(servo.rates[0])
 
 
-def test_a_fault_from_before_is_cleared_and_costs_no_clearing() -> None:
+def test_a_fault_before_the_start_is_cleared_without_being_counted() -> None:
     servo = Servo(None, replace(CONFIG, fault_clearings=0))
     servo.engage(Mode.DAMP)
     command = servo.step(state(1, flags=StateFlag.FAULT_LATCHED))
@@ -302,7 +302,7 @@ def test_a_fault_from_before_is_cleared_and_costs_no_clearing() -> None:
     assert servo.stop_reason is StopReason.DEVICE_FAULT
 
 
-def test_faults_are_cleared_so_many_times_and_forces_ramp_up_again() -> None:
+def test_faults_are_cleared_a_limited_number_of_times_and_forces_ramp_up_again() -> None:
     servo = Servo(make_tables(), replace(CONFIG, fault_clearings=2))
     servo.engage(Mode.RENDER)
     states = closing()
@@ -327,7 +327,7 @@ def test_a_fault_that_cannot_be_cleared_stops() -> None:
     assert servo.stop_reason is StopReason.DEVICE_FAULT
 
 
-def test_a_backlog_from_before_any_clearing_does_not_stop() -> None:
+def test_frames_queued_before_a_clearing_do_not_stop_the_servo() -> None:
     """A host that stood still for 0.2 s finds 200 states, all older than its first clearing."""
     servo = Servo(None, CONFIG)
     servo.set_reference(np.full(1000, 0.6), np.zeros(1000), np.full(1000, -0.02), np.zeros(1000))
@@ -376,7 +376,7 @@ def test_bytes_in_bytes_out_is_the_same_step() -> None:
         by_bytes.answer(b"\2" * 28)
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_values_are_refused() -> None:
     servo = Servo(None, CONFIG)
     with pytest.raises(ValueError, match="RENDER needs"):
         servo.engage(Mode.RENDER)
@@ -406,7 +406,7 @@ def test_what_makes_no_sense_is_refused() -> None:
         {"supervisor_ticks": -1},
     ],
 )
-def test_limits_that_are_no_numbers_are_refused(change: dict[str, float]) -> None:
+def test_limits_that_are_not_numbers_are_refused(change: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(change))):
         replace(CONFIG, **change)  # type: ignore[arg-type]
 
@@ -427,7 +427,7 @@ def hand_against_rendering(servo: Servo, ticks: int = 4000) -> None:
 
 
 @pytest.mark.parametrize("kappa", [1.0, 0.7])
-def test_rendering_creates_no_energy_to_speak_of(kappa: float) -> None:
+def test_rendering_creates_negligible_energy(kappa: float) -> None:
     """The books close: the motor takes up what the model took, but for what sampling adds.
 
     A spring of stiffness K sampled at T and felt one tick late gives back more than it took, by
@@ -445,7 +445,7 @@ def test_rendering_creates_no_energy_to_speak_of(kappa: float) -> None:
     assert -0.1 * taken < ledger.created_J < 0.05 * taken
 
 
-def test_energy_books_of_a_press_close_when_the_mode_ends() -> None:
+def test_the_energies_of_a_press_balance_when_the_mode_ends() -> None:
     servo = Servo(make_tables(fracture_energy=0.0), replace(CONFIG, ramp_s=0.0))
     servo.engage(Mode.RENDER)
     servo.fresh_sheet(-0.001)

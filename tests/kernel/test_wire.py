@@ -1,10 +1,8 @@
 """Messages, what they refuse, and the schema that describes them."""
 
 import binascii
-import hashlib
 import json
 import re
-import struct
 import subprocess
 from pathlib import Path
 
@@ -15,22 +13,19 @@ from scissorcal.kernel import (
     PROTOCOL_VERSION,
     SAMPLE_DTYPE,
     SCHEMA_HASH,
-    Capability,
     Command,
-    CommandFlag,
     Config,
-    ConfigKey,
-    ConfigStatus,
     Hello,
     Identity,
     State,
-    StateFlag,
     c_sources,
     crc16,
     decode,
     encode,
     encode_frame,
+    write_wire,
 )
+from scissorcal.kernel._kernel import lib
 from scissorcal.recording import recording
 from tests.kernel.golden import FOLDER
 from tests.kernel.reference_wire import LAYOUTS, frame_of, unstuffed
@@ -41,22 +36,19 @@ SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "f32": 4, "char16": 16}
 LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f", "char16": "16s"}
 
 
-def test_schema_hash_is_that_of_the_schema() -> None:
-    canonical = json.dumps(WIRE, sort_keys=True, separators=(",", ":")).encode()
-    assert struct.unpack("<Q", hashlib.sha256(canonical).digest()[:8])[0] == SCHEMA_HASH, (
-        "wire.json changed: put its hash into sc_schema_hash, and write the golden vectors anew"
-    )
+def test_what_restates_the_layout_is_generated_from_the_schema() -> None:
+    page = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+    for name, text in write_wire.files(WIRE, page).items():
+        assert (ROOT / name).read_text(encoding="utf-8") == text, (
+            f"{name} differs from data_schemas/wire.json: run 'python "
+            "src/scissorcal/kernel/write_wire.py', and where wire.json changed, write the golden "
+            "vectors anew"
+        )
 
 
-def test_schema_agrees_with_the_code() -> None:
-    assert WIRE["protocol_version"] == PROTOCOL_VERSION
-    assert WIRE["state_flags"] == {flag.name: flag.value for flag in StateFlag}
-    assert WIRE["command_flags"] == {flag.name: flag.value for flag in CommandFlag}
-    assert WIRE["capabilities"] == {flag.name: flag.value for flag in Capability}
-    assert WIRE["config_status"] == {status.name: status.value for status in ConfigStatus}
-    assert {k: v["key"] for k, v in WIRE["config_keys"].items()} == {
-        key.name: key.value for key in ConfigKey
-    }
+def test_the_compiled_core_is_that_of_the_schema() -> None:
+    assert lib.sc_schema_hash() == write_wire.schema_hash(WIRE) == SCHEMA_HASH
+    assert lib.SC_PROTOCOL_VERSION == PROTOCOL_VERSION
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -118,7 +110,7 @@ def identity(**changes: object) -> Identity:
     ],
 )
 def test_numbers_and_texts_that_do_not_fit_are_refused(message: State) -> None:
-    with pytest.raises(ValueError, match="cannot be put on the wire"):
+    with pytest.raises(ValueError, match="does not fit its frame"):
         encode(message)
 
 

@@ -81,16 +81,15 @@ def test_both_families_agree_at_the_reference():
 
 
 def test_friction_levels_by_direction_angle_and_speed():
-    law = FrictionLaw(
-        coulomb_pos=0.01,
-        coulomb_neg=0.02,
-        viscous_pos=0.001,
-        viscous_neg=0.003,
-        stribeck=0.004,
-        stribeck_rate=0.1,
-        angle_slope=0.5,
-        angle_center=0.4,
-    )
+    values = {
+        "coulomb_pos": 0.01,
+        "coulomb_neg": 0.02,
+        "viscous_pos": 0.001,
+        "viscous_neg": 0.003,
+        "stribeck": 0.004,
+        "stribeck_rate": 0.1,
+    }
+    law = FrictionLaw({**values, "angle_slope": 0.5}, angle_center=0.4)
     assert float(friction_torque(law, 0.4, 0.0)) == 0.0
     expected = 0.01 + 0.001 * 0.2 + 0.004 * math.exp(-4.0)
     assert float(friction_torque(law, 0.4, 0.2)) == pytest.approx(expected)
@@ -100,6 +99,9 @@ def test_friction_levels_by_direction_angle_and_speed():
 
 @given(rate=st.floats(-1e3, 1e3), opening=st.floats(0.0, 1.0))
 def test_friction_never_drives(rate, opening):
-    law = FrictionLaw(0.01, 0.02, 0.001, 0.003, 0.004, 0.1, 0.2, 0.1, 0.5)
+    names = ("coulomb_pos", "coulomb_neg", "viscous_pos", "viscous_neg", "stribeck")
+    values = dict(zip(names, (0.01, 0.02, 0.001, 0.003, 0.004), strict=True))
+    place = {"stribeck_rate": 0.1, "angle_slope": 0.2, "angle_curvature": 0.1}
+    law = FrictionLaw(values | place, angle_center=0.5)
     assert float(friction_torque(law, opening, rate)) * rate >= 0.0
     assert np.isfinite(friction_torque(law, opening, rate))

@@ -1,15 +1,15 @@
 """Load, presliding and named terms: closed forms, and sense at the extremes."""
 
-from typing import get_args
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
-from scissorcal.model.terms import TERMS, Motion, evaluate
-from scissorcal.recipe.schema import FrictionTerm
+from scissorcal.model.friction import angle_factor, angle_slope, friction_level
+from scissorcal.model.friction_terms import PARAMETERS, TERMS, evaluate, law_names, terms_of
+from scissorcal.model.terms import Motion, Role
+from scissorcal.recipe.schema import FitFriction
 
 paths = st.lists(st.floats(-1, 1), min_size=2, max_size=40).map(np.array)
 
@@ -44,7 +44,7 @@ def test_a_joint_that_never_moved_has_built_up_nothing():
 
 def test_friction_grows_with_the_load_and_builds_up_after_a_turn():
     law = FrictionLaw(
-        coulomb_pos=0.01, coulomb_neg=0.01, load_share=0.2, presliding_share=0.5, load_gain=0.1
+        {"coulomb": 0.01, "load_share": 0.2, "presliding_share": 0.5, "load_gain": 0.1}
     )
     assert friction_torque(law, 0.0, 1.0, 0.05) == pytest.approx(0.01 + 0.01 + 0.005)
     assert friction_torque(law, 0.0, -1.0, 0.05) == pytest.approx(-0.02 + 0.005)
@@ -54,9 +54,9 @@ def test_friction_grows_with_the_load_and_builds_up_after_a_turn():
 
 
 def test_named_terms_are_added_and_those_of_the_rate_follow_the_place():
-    law = FrictionLaw(angle_slope=1.0, terms=("rate^2", "opening"), coefficients=(2.0, 3.0))
+    law = FrictionLaw({"angle_slope": 1.0, "rate^2": 2.0, "opening": 3.0})
     assert friction_torque(law, 0.5, 2.0) == pytest.approx(2.0 * 4.0 * 1.5 + 3.0 * 0.5)
-    still = FrictionLaw(terms=("1", "|rate|"), coefficients=(2.0, 3.0))
+    still = FrictionLaw({"1": 2.0, "|rate|": 3.0})
     assert friction_torque(still, 0.5, 0.0) == 0.0
 
 
@@ -75,7 +75,7 @@ def test_terms_of_the_rate_alone_do_not_know_the_place():
     rate, other = rng.standard_normal(20), rng.standard_normal(20)
     for term in TERMS.values():
         here, there = (term.value(Motion(place, rate, other, other)) for place in (other, rate))
-        if term.of_rate_only:
+        if term.role is Role.SLIDING:
             assert np.array_equal(here, there), term.name
 
 
@@ -87,21 +87,67 @@ def test_the_unit_of_a_coefficient_makes_an_effort(name):
     scaled = Motion(np.array([1.4]), np.array([1.4]), np.array([1.4]), np.array([1.4]))
     if not term.rotary:
         ratio = float((term.value(scaled) / term.value(motion)).item())
-        assert ratio == pytest.approx(2.0 ** (term.position + term.effort))
+        effort, position, _ = term.powers
+        assert ratio == pytest.approx(2.0 ** (1 - effort - position))
 
 
 def test_a_recipe_may_adopt_every_term_that_is_friction():
-    assert set(get_args(FrictionTerm)) == {t.name for t in TERMS.values() if t.adoptable}
+    for term in TERMS.values():
+        if term.adoptable:
+            assert FitFriction(adopt=(term.name,)).adopt == (term.name,)
+        else:
+            with pytest.raises(ValueError, match="Input should be"):
+                FitFriction(adopt=(term.name,))
+
+
+@pytest.mark.parametrize("name", law_names())
+def test_a_law_is_the_sum_of_its_rows(name):
+    """Each parameter moves friction by what its row says, and those of other laws are refused."""
+    rng = np.random.default_rng(5)
+    values = {n: rng.uniform(0.1, 0.9) for t in terms_of(name) for n in t.names(symmetric=False)}
+    law = FrictionLaw(values, angle_center=0.4)
+    assert law.terms == terms_of(name)
+    speed = np.linspace(0.0, 2.0, 21)
+    for sign in (-1.0, 1.0):
+        level, slope = friction_level(law, sign, speed)
+        moving = np.maximum(speed, 1e-12)
+        assert level == pytest.approx(sign * friction_torque(law, 0.4, sign * moving))
+        steps = (friction_level(law, sign, speed[1:] + step)[0] for step in (1e-6, -1e-6))
+        assert slope[1:] == pytest.approx((next(steps) - next(steps)) / 2e-6, abs=1e-8)
+    place, step = np.linspace(0.0, 1.0, 5), 1e-6
+    assert angle_factor(law, place).shape == place.shape
+    rise = (angle_factor(law, place + step) - angle_factor(law, place - step)) / (2 * step)
+    assert angle_slope(law, place) == pytest.approx(rise, abs=1e-8)
+
+
+def test_a_name_that_no_row_has_is_refused():
+    with pytest.raises(ValueError, match='"colomb" is no parameter'):
+        FrictionLaw({"colomb": 1.0})
+    with pytest.raises(ValueError, match='"inertia" is no parameter'):
+        FrictionLaw({"inertia": 1.0})
+    law = FrictionLaw.of_fit({"inertia": 1.0, "noise": 1.0, "coulomb": 0.1, "rate^2": 0.2}, 0.0)
+    assert set(law.values) == {"coulomb", "rate^2"}
+
+
+def test_every_row_of_a_law_has_a_prior_with_a_reason_and_a_key_of_its_own():
+    for kind in ("rotary", "linear"):
+        keys = [term.prior_key(kind) for term in PARAMETERS.values()]
+        assert len(set(keys)) == len(keys) - 1, "cogging's two parameters share one"
+        assert all(
+            term.prior is not None and term.prior.of(kind)[2] for term in PARAMETERS.values()
+        )
 
 
 def test_all_dry_friction_builds_up_after_a_reversal_and_the_viscous_part_is_there_at_once():
     """A bristle that is not bent yet bears neither Coulomb nor Stribeck friction."""
     law = FrictionLaw(
-        coulomb_pos=0.010,
-        viscous_pos=0.002,
-        stribeck=0.004,
-        stribeck_rate=0.1,
-        presliding_share=0.8,
+        {
+            "coulomb_pos": 0.010,
+            "viscous_pos": 0.002,
+            "stribeck": 0.004,
+            "stribeck_rate": 0.1,
+            "presliding_share": 0.8,
+        }
     )
     dry, viscous = 0.010 + 0.004 * np.exp(-1.0), 0.002 * 0.1
     for state in (-1.0, 0.0, 1.0):

@@ -71,7 +71,6 @@ def test_equal_inputs_give_equal_bytes(paper: PackageSummary, tmp_path: Path) ->
 def test_what_is_written_is_what_is_read(paper: PackageSummary) -> None:
     package = open_package(paper.path)
     assert package.manifest == paper.manifest
-    assert paper.path.stat().st_size == paper.size_bytes
     assert set(members(paper.path)) == {"manifest.json", *package.arrays}
 
 
@@ -197,7 +196,7 @@ def test_unknown_missing_and_doubled_members_are_refused(copy_of_paper: Path) ->
         open_package(copy_of_paper)
 
 
-def test_a_bomb_is_refused_without_unpacking_it(copy_of_paper: Path) -> None:
+def test_a_decompression_bomb_is_refused_without_unpacking(copy_of_paper: Path) -> None:
     content = members(copy_of_paper)
     content["tables/edge.npy"] = bytes(300_000_000)
     pack(copy_of_paper, content, zipfile.ZIP_DEFLATED)
@@ -205,7 +204,7 @@ def test_a_bomb_is_refused_without_unpacking_it(copy_of_paper: Path) -> None:
         open_package(copy_of_paper)
 
 
-def test_a_bomb_that_lies_about_its_size_is_refused(copy_of_paper: Path) -> None:
+def test_a_decompression_bomb_with_a_false_size_is_refused(copy_of_paper: Path) -> None:
     content = members(copy_of_paper)
     right = len(content["tables/edge.npy"])
     content["tables/edge.npy"] = bytes(50_000_000)
@@ -216,16 +215,14 @@ def test_a_bomb_that_lies_about_its_size_is_refused(copy_of_paper: Path) -> None
         open_package(copy_of_paper)
 
 
-def test_a_manifest_that_is_a_bomb_is_refused(copy_of_paper: Path) -> None:
+def test_an_oversized_manifest_is_refused(copy_of_paper: Path) -> None:
     content = members(copy_of_paper) | {"manifest.json": b" " * 50_000_000}
     pack(copy_of_paper, content, zipfile.ZIP_DEFLATED)
     with pytest.raises(InputError, match=r"manifest\.json.*unpacks to more"):
         open_package(copy_of_paper)
 
 
-def test_a_repacked_package_is_still_the_package(
-    paper: PackageSummary, copy_of_paper: Path
-) -> None:
+def test_a_recompressed_package_is_accepted(paper: PackageSummary, copy_of_paper: Path) -> None:
     pack(copy_of_paper, members(paper.path), zipfile.ZIP_DEFLATED)
     assert opens_as(copy_of_paper, open_package(paper.path))
 
@@ -264,7 +261,9 @@ def test_arrays_that_are_not_finite_are_refused(
         open_package(copy_of_paper)
 
 
-def test_tables_that_make_no_model_are_refused(paper: PackageSummary, copy_of_paper: Path) -> None:
+def test_tables_that_do_not_form_a_model_are_refused(
+    paper: PackageSummary, copy_of_paper: Path
+) -> None:
     response = np.array(open_package(paper.path).arrays["tables/response.npy"])
     falling = response.copy()
     falling[1] = falling[1][::-1]
@@ -272,7 +271,7 @@ def test_tables_that_make_no_model_are_refused(paper: PackageSummary, copy_of_pa
     backwards[0, 3] = backwards[0, 1]
     for array in (falling, backwards, response[:2], response[:, :1], np.tile(response, 20)):
         forge_array(copy_of_paper, "tables/response.npy", array)
-        with pytest.raises(InputError, match=r"make no model|response\.npy"):
+        with pytest.raises(InputError, match=r"not form a model|response\.npy"):
             open_package(copy_of_paper)
 
 
@@ -357,7 +356,7 @@ def test_deeply_nested_json_is_refused(copy_of_paper: Path) -> None:
         open_package(copy_of_paper)
 
 
-def test_no_file_a_folder_and_a_giant_have_their_own_sentences(tmp_path: Path) -> None:
+def test_a_missing_file_a_folder_and_a_large_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="does not exist"):
         open_package(tmp_path / "none.zip")
     with pytest.raises(InputError, match="not a file"):

@@ -10,6 +10,9 @@ from scissorcal.package import ModelPackage, PackageSummary, build_package, open
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe
 
+OUTSIDE = "ignore::scissorcal.package.OutsideCoverageWarning"
+"""For tests that ask at contacts below the scene, where the crack settles farther out."""
+
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "paper": ("paper-80gsm", {}),
     "rippled": ("paper-80gsm", {"kappa": 0.4}),
@@ -89,6 +92,7 @@ def test_a_curved_edge_keeps_the_bound(tmp_path: Path) -> None:
     assert summary.manifest.bound.share < 1e-3
 
 
+@pytest.mark.filterwarnings(OUTSIDE)
 def test_smooth_cut_by_a_straight_edge_has_the_closed_form(tmp_path: Path) -> None:
     """An edge through the pivot, both blades moving: tau = J_c h x_c / sin(theta)."""
     chosen = recipe(render_friction=False, contact_mm=(0.5, 60.0))
@@ -108,6 +112,7 @@ def test_smooth_cut_by_a_straight_edge_has_the_closed_form(tmp_path: Path) -> No
     assert torque == pytest.approx(energy * place / np.sin(opening), rel=2e-5)
 
 
+@pytest.mark.filterwarnings(OUTSIDE)
 @pytest.mark.parametrize("response", ["power", "exponential"])
 @pytest.mark.parametrize("kappa", [0.3, 0.8])
 def test_stepped_ripple_averages_to_the_torque_that_is_stated(
@@ -131,7 +136,7 @@ def test_stepped_ripple_averages_to_the_torque_that_is_stated(
     assert stepped == pytest.approx(stated, rel=0.02)
 
 
-def test_coarse_tables_state_a_coarse_bound(tmp_path: Path) -> None:
+def test_coarse_tables_state_a_larger_bound(tmp_path: Path) -> None:
     chosen = recipe("press-only")
     fit = cut_fit(chosen, energy=None, exponent=2.5)
     shares = [

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package import (
     REVIEW_FORMAT,
+    FailedFitsWarning,
     PackageSummary,
     Review,
     build_package,
@@ -19,8 +21,10 @@ from scissorcal.package import (
     open_package,
     package_inputs_hash,
     put_review,
+    read_manifest,
 )
 from scissorcal.package.manifest import PlateRecord
+from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.report.geometry_fits import plate_fit
@@ -111,24 +115,29 @@ def test_fits_that_are_missing_are_named(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_plate_travels_with_its_covariance_and_what_its_fit_failed(tmp_path: Path) -> None:
+def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path) -> None:
     chosen = recipe()
     wrong = Verdict("fit.plate", "ambiguity", "fail", 3.0, 20.0, "Two poses.")
     plate = replace(plate_fit(), verdicts=(wrong,))
     path = tmp_path / "p.zip"
-    build_package(chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=plate)
-    package = open_package(path)
+    fits = (chosen, friction_fit(), cut_fit(chosen))
+    with pytest.raises(VerdictError, match="'scissorcal fit plate' again"):
+        build_package(*fits, path, rng(), plate=plate)
+    build_package(*fits, path, rng(), plate=plate, allow_failed=True)
+    package = open_package(path, warn=False)
     record = package.manifest.plate
     assert record is not None
     assert plate.rig_plate is not None
     assert (record.frame, record.quaternion) == ("rig", plate.rig_plate.quaternion)
-    assert "fit.plate, ambiguity: Two poses." in package.warnings
+    assert "fit.plate, ambiguity: Two poses." in " ".join(package.warnings)
     for broken in ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, {"covariance": ((0.0,),)}):
         with pytest.raises(ValueError, match="a plate's"):
             PlateRecord(**{**dict(record), **broken})
     unsure = replace(plate, rig_plate=replace(plate.rig_plate, covariance=None))
-    with pytest.raises(InputError, match="how well its pose is known"):
-        build_package(chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=unsure)
+    with pytest.raises(InputError, match="no covariance of its pose"):
+        build_package(
+            chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=unsure, allow_failed=True
+        )
 
 
 def test_a_linear_joint_has_no_package(tmp_path: Path) -> None:
@@ -178,7 +187,7 @@ def test_friction_that_would_drive_the_motion_is_refused(tmp_path: Path) -> None
         build_package(chosen, friction, cut_fit(chosen), tmp_path / "p.zip", rng())
 
 
-def test_tables_worse_than_the_scene_bears_are_not_handed_out(tmp_path: Path) -> None:
+def test_tables_worse_than_the_scene_allows_are_refused(tmp_path: Path) -> None:
     chosen = recipe(tolerance_percent=0.01)
     with pytest.raises(VerdictError, match=r"was not written.*raise its tolerance"):
         build_package(
@@ -187,7 +196,7 @@ def test_tables_worse_than_the_scene_bears_are_not_handed_out(tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
-def test_a_best_point_outside_its_own_posterior_is_not_handed_out(tmp_path: Path) -> None:
+def test_a_best_point_outside_its_posterior_is_refused(tmp_path: Path) -> None:
     chosen = recipe(render_friction=False)
     fit = cut_fit(chosen)
     with pytest.raises(VerdictError, match="not typical of its posterior"):
@@ -205,16 +214,60 @@ def test_a_scene_that_is_mostly_beyond_the_torque_limit_is_built(tmp_path: Path)
     assert np.mean(package.torque(np.radians(13.0), -0.2, np.linspace(0.015, 0.06)) == 1.0) > 0.5
 
 
-def test_a_failed_fit_is_carried_along_and_said(tmp_path: Path) -> None:
-    chosen = recipe()
+def failed_cut(chosen: Recipe) -> FitResult:
     bad = Verdict("fit.cut", "k-hat", "fail", 1.2, 0.7, "Its intervals cannot be trusted.")
-    fit = replace(cut_fit(chosen), verdicts=(bad,))
-    summary = build_package(chosen, friction_fit(), fit, tmp_path / "p.zip", rng())
+    return replace(cut_fit(chosen), verdicts=(bad,))
+
+
+def test_a_failed_fit_is_refused_with_its_checks_and_commands(tmp_path: Path) -> None:
+    chosen = recipe()
+    worse = Verdict("fit.friction", "held-out", "fail", 0.4, 0.2, "Held-out error 40 %.")
+    friction = replace(friction_fit(), verdicts=(worse,))
+    with pytest.raises(VerdictError) as refusal:
+        build_package(chosen, friction, failed_cut(chosen), tmp_path / "p.zip", rng())
+    assert str(refusal.value) == (
+        f"{tmp_path}/p.zip was not written: its fits failed 2 checks. fit.friction, held-out: "
+        "Held-out error 40 %. fit.cut, k-hat: Its intervals cannot be trusted. Correct that and "
+        "run 'scissorcal fit friction' and 'scissorcal fit cut' again, or build it all the same "
+        "with 'scissorcal package build --allow-failed': the package then says so on every use."
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def test_friction_that_is_not_rendered_may_have_failed(tmp_path: Path) -> None:
+    chosen = recipe(render_friction=False)
+    worse = Verdict("fit.friction", "held-out", "fail", 0.4, 0.2, "Held-out error 40 %.")
+    friction = replace(friction_fit(), verdicts=(worse,))
+    summary = build_package(chosen, friction, cut_fit(chosen), tmp_path / "p.zip", rng())
+    assert summary.manifest.failed_checks == ()
+
+
+def test_a_package_from_a_failed_fit_says_so_on_every_use(tmp_path: Path) -> None:
+    chosen = recipe()
+    summary = build_package(
+        chosen, friction_fit(), failed_cut(chosen), tmp_path / "p.zip", rng(), allow_failed=True
+    )
+    sentence = (
+        "The package paper-80gsm was built from fits that failed 1 check, so its torque and its "
+        "band may be wrong. fit.cut, k-hat: Its intervals cannot be trusted."
+    )
     judged = {verdict.check: verdict for verdict in summary.verdicts}
-    assert judged["fits"].status == "fail"
-    assert "cannot be trusted" in judged["fits"].why
-    assert any("cannot be trusted" in sentence for sentence in summary.warnings)
+    assert (judged["failed fits"].status, judged["failed fits"].why) == ("fail", sentence)
+    assert sentence in summary.warnings
     assert check_package(summary.path) == summary.verdicts
+    with pytest.warns(FailedFitsWarning, match="failed 1 check") as caught:
+        package = open_package(summary.path)
+    assert caught[0].filename == __file__
+    assert sentence in package.warnings
+    assert read_manifest(summary.path).failed_checks == (
+        "fit.cut, k-hat: Its intervals cannot be trusted.",
+    )
+
+
+def test_the_manifest_is_read_without_the_arrays(paper: PackageSummary, tmp_path: Path) -> None:
+    assert read_manifest(paper.path) == open_package(paper.path).manifest
+    with pytest.raises(MissingError, match="scissorcal package build"):
+        read_manifest(tmp_path / "none.zip")
 
 
 def test_an_unsigned_package_says_so(paper: PackageSummary) -> None:
@@ -231,7 +284,7 @@ def test_a_package_carries_its_review_and_nothing_else_changes(
     for decision, fits, status, words in (
         ("accept", hashes, "pass", "accepted by A. Reviewer on 2025-01-31: bends"),
         ("reject", hashes, "fail", "should not be rendered: its report was rejected"),
-        ("accept", {"cut": "another"}, "fail", "carries a review of other fits"),
+        ("accept", {"cut": "another"}, "fail", "has a review of other fits"),
     ):
         given = Review(
             format=REVIEW_FORMAT,
@@ -279,7 +332,7 @@ def test_every_rung_of_friction_compiles(law: str, symmetric: bool, tmp_path: Pa
     assert (both[0] == pytest.approx(-both[1], rel=1e-5)) == symmetric
 
 
-def test_friction_drawn_with_the_cut_travels_with_it(tmp_path: Path) -> None:
+def test_friction_drawn_with_the_cut_is_kept_with_it(tmp_path: Path) -> None:
     """Row by row the friction that the cut was drawn with; the inertia is friction's own."""
     chosen = recipe()
     cut, friction = cut_fit(chosen), friction_fit()

@@ -56,7 +56,7 @@ def test_a_photographed_edge_of_any_family_is_carried(family: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("family", ["line", "spline"])
-def test_what_is_open_of_an_edge_widens_the_band(family: str, tmp_path: Path) -> None:
+def test_the_uncertainty_of_an_edge_widens_the_band(family: str, tmp_path: Path) -> None:
     """Draws of the law are the same in both packages; only those of the edge differ."""
     widths = []
     for sd in (1e-3, 1.0):

@@ -46,7 +46,7 @@ def test_terms_that_let_friction_drive_are_refused(tmp_path):
         built(tmp_path, adopted(**{"rate*|rate|": -0.5}))
 
 
-def test_what_load_and_presliding_cost_is_told(tmp_path):
+def test_errors_from_load_and_presliding_are_warnings(tmp_path):
     fit = friction_fit(load_share=0.2, load_gain=0.0, presliding_share=0.5, presliding_length=0.02)
     summary, package = built(tmp_path, with_structure(fit, law="stribeck+angle+load+presliding"))
     told = " ".join(summary.warnings)
@@ -56,7 +56,7 @@ def test_what_load_and_presliding_cost_is_told(tmp_path):
     assert package.warnings == summary.warnings
 
 
-def test_cogging_is_not_rendered_and_is_no_fault(tmp_path):
+def test_cogging_is_not_rendered_and_gives_no_warning(tmp_path):
     _, plain = built(tmp_path, friction_fit())
     fit = with_structure(friction_fit(), cogging_periods_per_turn=252.0)
     found = [
@@ -71,7 +71,7 @@ def test_cogging_is_not_rendered_and_is_no_fault(tmp_path):
     assert "cogging" not in " ".join(summary.warnings)
 
 
-def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
+def test_load_dependent_friction_of_a_cut_is_a_warning_without_a_failure(tmp_path):
     share = FittedParameter("load_share", "1", 0.09, 0.01, 0.075, 0.09, 0.105, 0.1)
     cut = with_structure(cut_fit(recipe()), load_share=True)
     cut = dataclasses.replace(
@@ -84,12 +84,12 @@ def test_load_dependent_friction_of_a_cut_is_told_and_fails_nothing(tmp_path):
     assert f"up to {lost:.2g} N m" in told
     assert told in summary.warnings
     assert told in package.warnings
-    assert not [v for v in summary.verdicts if v.check == "fits" and v.status == "fail"]
+    assert not [v for v in summary.verdicts if v.check == "failed fits" and v.status == "fail"]
     _, plain = built(tmp_path, friction_fit())
     assert plain.manifest.provenance.cut.left_out == ()
 
 
-def test_a_load_share_of_next_to_nothing_is_not_told(tmp_path):
+def test_a_negligible_load_share_gives_no_warning(tmp_path):
     share = FittedParameter("load_share", "1", 0.001, 0.002, 0.0, 0.001, 0.004, 0.1)
     cut = dataclasses.replace(with_structure(cut_fit(recipe()), load_share=True), nuisance=(share,))
     _, package = built(tmp_path, friction_fit(), cut)

@@ -28,7 +28,7 @@ def test_what_is_written_agrees_with_the_schema(which: str, request: pytest.Fixt
         jsonschema.Draft202012Validator(schema).validate(facts | {"surprise": 1})
 
 
-def test_units_stand_in_it_for_what_it_has(paper: PackageSummary, pad: PackageSummary) -> None:
+def test_units_are_given_for_what_a_package_has(paper: PackageSummary, pad: PackageSummary) -> None:
     assert paper.manifest.units["fracture_energy"] == "J/m"
     assert "fracture_energy" not in pad.manifest.units
     assert pad.manifest.units["torque"] == "N m"

@@ -86,7 +86,7 @@ def test_knots_gather_where_the_law_bends() -> None:
     assert np.mean(fitted.table.x < 0.1) > 0.7
 
 
-def test_too_few_knots_are_admitted() -> None:
+def test_a_table_with_too_few_knots_reports_its_error() -> None:
     fitted = fit_table(
         np.sqrt, lambda x: 0.5 / np.sqrt(x), 0.0, 1.0, tolerance=1e-6, monotone=True, largest=12
     )
@@ -118,7 +118,7 @@ def test_scale_sets_where_precision_may_end() -> None:
         (lambda x: x, 0.0, float("nan"), "low < high"),
     ],
 )
-def test_what_no_table_can_hold_is_refused(
+def test_a_law_that_no_table_can_represent_is_refused(
     law: object, low: float, high: float, words: str
 ) -> None:
     with pytest.raises(ValueError, match=words):

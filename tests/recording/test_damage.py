@@ -81,7 +81,7 @@ def check_cut(whole: Whole, size: int) -> int | None:
     assert len(found.samples) == complete
     np.testing.assert_array_equal(found.samples, whole.samples[:complete])
     if size < len(whole.data):
-        assert any("never finished" in note for note in found.notes)
+        assert any("not finished" in note for note in found.notes)
     started = sum(
         n for n, start in zip(whole.chunk_counts, whole.chunk_starts, strict=True) if start < size
     )
@@ -132,7 +132,7 @@ def test_a_damaged_chunk_is_left_out_with_its_place(whole: Whole) -> None:
     notes = " ".join(found.notes)
     assert f"bytes from {whole.chunk_starts[3]} on are damaged" in notes
     assert f"{lost} of {len(whole.samples)} samples cannot be read" in notes
-    assert f"{lost} frames are missing in 1 places" in notes
+    assert f"{lost} frames are missing in 1 gap" in notes
 
 
 def test_damage_to_the_first_chunk_costs_only_that_chunk(whole: Whole) -> None:
@@ -140,14 +140,14 @@ def test_damage_to_the_first_chunk_costs_only_that_chunk(whole: Whole) -> None:
     np.testing.assert_array_equal(found.samples, whole.samples[whole.chunk_counts[0] :])
 
 
-def test_garbage_between_chunks_is_gone_round(whole: Whole) -> None:
+def test_garbage_between_chunks_is_skipped(whole: Whole) -> None:
     start = whole.chunk_starts[2]
     found = read_recording(whole.with_bytes(start, b"\xee" * 30))
     assert len(found.samples) == len(whole.samples) - whole.chunk_counts[2]
     assert any(f"bytes from {start} to" in note for note in found.notes)
 
 
-def test_a_chunk_that_claims_gigabytes_is_not_unpacked(whole: Whole) -> None:
+def test_a_chunk_with_a_false_size_is_not_unpacked(whole: Whole) -> None:
     bomb = zstandard.compress(bytes(200_000_000))
     head = struct.pack("<QQQI", 0, 0, 200_000_000, 0) + struct.pack("<I", 4) + b"zstd"
     body = head + struct.pack("<Q", len(bomb)) + bomb
@@ -160,7 +160,7 @@ def test_a_chunk_that_claims_gigabytes_is_not_unpacked(whole: Whole) -> None:
     assert any("claims 200000000 bytes" in note for note in found.notes)
 
 
-def test_a_damaged_attachment_is_named_not_handed_out(whole: Whole) -> None:
+def test_a_damaged_attachment_is_named_and_left_out(whole: Whole) -> None:
     place = whole.data.index(bytes(range(256)) * 4)
     path = whole.with_bytes(place + 77, b"\0")
     assert read_attachments(path) == ()
@@ -192,7 +192,7 @@ def foreign_mcap(path: Path) -> None:
         ("a.mcap", b"\x89PNG\r\n\x1a\n" + bytes(200), "a PNG image"),
         ("a.mcap", b"time,opening\n0,1\n", "text .*import"),
         ("a.mcap", b"PAR1" + bytes(100), "Parquet"),
-        ("a.mcap", bytes(range(256)) * 9, "not in the MCAP format"),
+        ("a.mcap", bytes(range(256)) * 9, "an unknown format"),
         ("a.mcap", b"\x89MCAP0\r\n" + bytes(range(200, 256)) * 9, "description is missing"),
         ("a.mcap", b"\x89MCAP0\r\n", "without a recording's description"),
     ],
@@ -223,9 +223,7 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
 
 @settings(deadline=None)
 @given(data=st.binary(max_size=300))
-def test_random_bytes_never_do_more_than_refuse(
-    tmp_path_factory: pytest.TempPathFactory, data: bytes
-) -> None:
+def test_random_bytes_are_refused(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = tmp_path_factory.getbasetemp() / "random.mcap"
     for start in (b"", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n\x06"):
         path.write_bytes(start + data)

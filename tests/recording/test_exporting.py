@@ -1,6 +1,7 @@
 """Exported tables hold the same numbers, and come back by import."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ def test_every_number_reads_back_the_same(tmp_path: Path, suffix: str, kind: str
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".csv"])
-def test_an_export_is_imported_without_saying_a_unit(tmp_path: Path, suffix: str) -> None:
+def test_an_export_is_imported_without_stating_units(tmp_path: Path, suffix: str) -> None:
     recording = made_recording(2500)
     path = export_table(recording, tmp_path / f"a{suffix}")
     channels = ("advance", "motor_torque", "handle_force", "torque_command", "force_command")
@@ -66,21 +67,35 @@ def test_parquet_carries_the_description(tmp_path: Path) -> None:
     assert json.loads(metadata[b"scissorcal.notes"]) == ["Two frames were garbled."]
 
 
-def test_what_stands_is_kept_and_wrong_names_are_refused(tmp_path: Path) -> None:
+def test_existing_files_are_kept_and_wrong_names_are_refused(tmp_path: Path) -> None:
     recording = made_recording(20)
     path = tmp_path / "a.csv"
     path.write_text("precious")
-    with pytest.raises(InputError, match=r"a\.csv stands already"):
+    with pytest.raises(InputError, match=r"a\.csv exists"):
         export_table(recording, path)
     assert path.read_text() == "precious"
     export_table(recording, path, overwrite=True)
-    assert path.read_text().startswith('"sequence"')
+    assert path.read_text().startswith("sequence,")
     with pytest.raises(InputError, match=r"written as \.parquet or \.csv"):
         export_table(recording, tmp_path / "a.xlsx")
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         export_table(recording, tmp_path / "nowhere" / "a.csv")
 
 
 def test_an_empty_recording_gives_a_table_without_rows(tmp_path: Path) -> None:
     found = written_and_read(Recording("friction", made_samples(0)), tmp_path / "a.parquet")
     assert len(found["opening_rad"]) == 0
+
+
+def test_without_pyarrow_csv_works_and_parquet_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    recording = made_recording(20)
+    assert export_table(recording, tmp_path / "a.csv").is_file()
+    with pytest.raises(InputError, match=r"pip install 'scissorcal\[parquet\]', or use CSV"):
+        export_table(recording, tmp_path / "a.parquet")
+    (tmp_path / "b.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match=r"scissorcal\[parquet\]"):
+        import_table(tmp_path / "b.parquet", columns={"time": 0, "opening": 1, "motor_torque": 2})
+    assert not (tmp_path / "a.parquet").exists()

@@ -78,7 +78,7 @@ def test_matlab_files(tmp_path: Path, version: str) -> None:
     assert "has no column 5" in words(columns={**MAT_COLUMNS, "opening": "log.both[5]"})
     assert "no variable 0 for opening" in words(columns={**MAT_COLUMNS, "opening": 0})
     assert "differ in length" in words(columns={**MAT_COLUMNS, "opening": "gain"})
-    assert "(those are: gain)" in words(scale={"motor_torque": "gian"})
+    assert "(these are: gain)" in words(scale={"motor_torque": "gian"})
 
 
 def test_parquet_files(tmp_path: Path) -> None:
@@ -105,6 +105,6 @@ def test_parquet_files(tmp_path: Path) -> None:
     assert "holds string, not numbers" in refusal(
         path, columns={**COLUMNS, "opening": "state"}, units=units
     )
-    assert "row 8, column 'holes': nan is no measurement" in refusal(
+    assert "row 8, column 'holes': nan is not a measurement" in refusal(
         path, columns={**COLUMNS, "opening": "holes"}, units=units
     )

@@ -37,7 +37,7 @@ def test_delimiters_and_headings_are_found(
     assert [stroke.kind for stroke in recording.strokes] == ["closing", "opening"] * 2
     assert set(recording.samples["stroke"]) <= {-1, 0, 1, 2, 3}
     assert recording.samples["sequence"].tolist() == list(range(400))
-    assert any("0 throughout: advance, handle_force" in note for note in recording.notes)
+    assert any("set to 0: advance, handle_force" in note for note in recording.notes)
 
 
 def test_a_delimiter_may_be_named(tmp_path: Path) -> None:
@@ -45,8 +45,8 @@ def test_a_delimiter_may_be_named(tmp_path: Path) -> None:
         path = written(tmp_path / "log.csv", rows(), character)
         assert_holds(import_table(path, columns=COLUMNS, units=UNITS, delimiter=name), rows())
     for nonsense in ("comma", ";;", "1", ".", '"'):
-        assert "cannot part the columns" in refusal(path, delimiter=nonsense)
-    assert "holds no row of numbers" in refusal(path, delimiter="|")
+        assert "cannot separate the columns" in refusal(path, delimiter=nonsense)
+    assert "has no row of numbers" in refusal(path, delimiter="|")
 
 
 def test_decimal_commas_quotes_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_units_in_headings_count_and_a_contradiction_is_noted(tmp_path: Path) ->
     np.testing.assert_allclose(recording.samples["opening"], np.array(rows())[:, 1], rtol=1e-12)
     other = import_table(path, columns=columns, units={"time": "s"})
     assert other.duration_s == pytest.approx(3990.0)
-    assert "Column 't [ms]' was taken in s, as stated, although its heading says ms." in other.notes
+    assert "Column 't [ms]' was read in s, as stated, although its heading has ms." in other.notes
 
 
 def test_a_scale_keeps_the_unit_or_leads_to_si_from_counts(tmp_path: Path) -> None:
@@ -136,8 +136,8 @@ def test_a_rate_in_place_of_a_time_column(tmp_path: Path) -> None:
     units = {channel: unit for channel, unit in UNITS.items() if channel != "time"}
     recording = import_table(path, columns=columns, units=units, rate_Hz=3000.0)
     np.testing.assert_allclose(recording.device_time_s, np.arange(400) / 3000, atol=5e-7)
-    assert "or give the rate; one of them" in refusal(path, rate_Hz=100.0)
-    assert "or give the rate; one of them" in refusal(path, columns=columns, units=units)
+    assert "or give the rate, but not both" in refusal(path, rate_Hz=100.0)
+    assert "or give the rate, but not both" in refusal(path, columns=columns, units=units)
     for rate in (0.0, -1.0, math.nan, math.inf, 2e6):
         assert "not possible" in refusal(path, columns=columns, units=units, rate_Hz=rate)
 
@@ -145,11 +145,11 @@ def test_a_rate_in_place_of_a_time_column(tmp_path: Path) -> None:
 BAD_ROWS = [
     ([1.05, "abc", 0.0], "line 107, column 'angle': 'abc' is not a number"),
     ([1.05, "", 0.0], "line 107, column 'angle': it is empty"),
-    ([1.05, "nan", 0.0], r"line 107, column 'angle': nan is no measurement (1 such cells"),
-    ([1.05, 0.5, "-inf"], "line 107, column 'torque': -inf is no measurement"),
-    ([1.04, 0.5, 0.0], "line 107, column 't': 1.04 s stands there a second time"),
-    ([1.0400001, 0.5, 0.0], "line 107, column 't': 1.0400001 s stands there a second time"),
-    ([1.02, 0.5, 0.0], "line 107, column 't': time goes back from 1.04 s to 1.02 s"),
+    ([1.05, "nan", 0.0], r"line 107, column 'angle': nan is not a measurement (1 such cells"),
+    ([1.05, 0.5, "-inf"], "line 107, column 'torque': -inf is not a measurement"),
+    ([1.04, 0.5, 0.0], "line 107, column 't': the time 1.04 s is repeated"),
+    ([1.0400001, 0.5, 0.0], "line 107, column 't': the time 1.0400001 s is repeated"),
+    ([1.02, 0.5, 0.0], "line 107, column 't': time decreases from 1.04 s to 1.02 s"),
     ([1.05, 0.5], "line 107 has 2 cells where the others have 3"),
     ([1.05, 0.5, 0.0, 9], "line 107 has 4 cells where the others have 3"),
 ]
@@ -179,12 +179,12 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
     table = [row for i, row in enumerate(rows()) if i not in (50, 51, 52, 200)]
     path = written(tmp_path / "log.csv", table)
     message = refusal(path)
-    assert "line 52, column 't': 0.04 s pass since the row before" in message
+    assert "line 52, column 't': 0.04 s since the row before" in message
     assert "where 0.01 s are usual (2 such gaps in all, the longest 0.04 s)" in message
     assert "Allow gaps" in message
     recording = import_table(path, columns=COLUMNS, units=UNITS, allow_gaps=True)
     assert_holds(recording, table)
-    note = "4 frames are missing in 2 places, the longest gap (3 frames) at 0.490 s."
+    note = "4 frames are missing in 2 gaps, the longest (3 frames) at 0.490 s."
     assert note in recording.notes
     stored = read_recording(write_recording(recording, tmp_path / "log.mcap"))
     assert stored.notes == recording.notes
@@ -196,7 +196,7 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
     [
         (
             {"columns": {"time": "t", "motor_torque": "torque"}, "units": {}},
-            "no column is named for opening",
+            "no column is given for opening",
         ),
         (
             {"columns": {"time": "t", "opening": "angle"}, "units": {}},
@@ -206,15 +206,15 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
         ({"columns": {**COLUMNS, "opening": "angel"}}, "no column 'angel' for opening. Name one"),
         ({"columns": {**COLUMNS, "opening": 3}}, "numbered 0 to 2"),
         ({"columns": {**COLUMNS, "opening": "7"}}, "numbered 0 to 2"),
-        ({"columns": {**COLUMNS, "handle_force": "torque"}}, "Give the handle radius"),
+        ({"columns": {**COLUMNS, "handle_force": "torque"}}, "needs the handle radius"),
         ({"units": {**UNITS, "advance": "m"}}, "given for advance, but no column"),
-        ({"units": {"time": "s", "opening": "rad"}}, "its unit is not known. Say it"),
-        ({"units": {**UNITS, "opening": "m"}}, "Say that the joint is linear"),
+        ({"units": {"time": "s", "opening": "rad"}}, "its unit is not known. State it"),
+        ({"units": {**UNITS, "opening": "m"}}, "Set the joint to linear"),
         ({"units": {**UNITS, "opening": "N"}}, "Give a unit such as rad"),
-        ({"units": {**UNITS, "opening": "furlong"}}, "'furlong' is not a unit"),
+        ({"units": {**UNITS, "opening": "furlong"}}, "'furlong' is not a known unit"),
         ({"units": {**UNITS, "motor_torque": "V"}}, "Give a scale for motor_torque, in N m per V"),
         ({"units": {**UNITS, "motor_torque": "counts"}}, "in N m per counts"),
-        ({"scale": {"motor_torque": "gain"}}, "names 'gain', which is no number"),
+        ({"scale": {"motor_torque": "gain"}}, "names 'gain', which is neither a number"),
         ({"scale": {"motor_torque": "0"}}, "finite and not zero"),
         ({"scale": {"motor_torque": "1/0"}}, "finite and not zero"),
         ({"scale": {"motor_torque": "2**3"}}, "names ''"),
@@ -226,7 +226,7 @@ def test_requests_that_cannot_be_met(tmp_path: Path, options: dict[str, Any], wo
     assert words in message
 
 
-def test_headings_that_stand_twice(tmp_path: Path) -> None:
+def test_repeated_headings(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", rows(), head="t,angle,angle")
     assert "has 2 columns called 'angle'" in refusal(path)
 
@@ -253,14 +253,14 @@ def test_files_that_are_no_tables(tmp_path: Path, name: str, data: bytes, words:
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
-    assert "is no file" in refusal(tmp_path / "log.csv")
+    assert "is not a file" in refusal(tmp_path / "log.csv")
 
 
 def test_no_motion_is_noted(tmp_path: Path) -> None:
     table = [[row[0], 0.5 + 1e-4 * (i % 2), row[2]] for i, row in enumerate(rows())]
     recording = import_table(written(tmp_path / "log.csv", table), columns=COLUMNS, units=UNITS)
     assert recording.strokes == ()
-    assert "No stroke was found: the joint does not move enough." in recording.notes
+    assert "No stroke was found: the joint moves less than the least travel." in recording.notes
 
 
 @settings(deadline=None)

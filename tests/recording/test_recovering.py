@@ -33,7 +33,7 @@ def interrupted(folder: Path, name: str, samples: int = 2000, cut: int = 3) -> P
     return part
 
 
-def test_an_interrupted_capture_becomes_a_proper_recording(tmp_path: Path) -> None:
+def test_an_interrupted_capture_becomes_a_finished_recording(tmp_path: Path) -> None:
     part = interrupted(tmp_path, "cut-1")
     before = part.read_bytes()
     as_it_lies = read_recording(part)
@@ -49,7 +49,7 @@ def test_an_interrupted_capture_becomes_a_proper_recording(tmp_path: Path) -> No
     assert f"{result.samples} samples" in result.sentence
     assert "The hand rested." in found.notes
     assert f"The capture was interrupted after {result.samples} samples." in found.notes
-    assert not any("never finished" in note for note in found.notes)
+    assert not any("not finished" in note for note in found.notes)
     assert found.recipe_toml == "x = 1\n"
     assert read_attachments(result.recording) == read_attachments(result.kept)
 
@@ -63,12 +63,12 @@ def test_a_second_call_does_nothing(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
-def test_a_folder_that_is_not_there_holds_nothing(tmp_path: Path) -> None:
+def test_a_missing_folder_has_nothing_to_recover(tmp_path: Path) -> None:
     assert recover(tmp_path / "nowhere") == ()
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89MCAP0", b"nonsense"])
-def test_what_holds_nothing_is_put_aside_and_said(tmp_path: Path, data: bytes) -> None:
+def test_a_capture_without_samples_is_renamed_and_reported(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "a.mcap.part").write_bytes(data)
     (result,) = recover(tmp_path)
     assert (result.status, result.recording) == ("empty", None)
@@ -87,7 +87,7 @@ def test_a_capture_killed_before_its_first_sample(tmp_path: Path) -> None:
     assert "before its first sample" in result.sentence
 
 
-def test_a_name_that_is_taken_is_not_overwritten(tmp_path: Path) -> None:
+def test_an_existing_file_is_not_overwritten(tmp_path: Path) -> None:
     elsewhere = written_live(tmp_path / "elsewhere.mcap", made_samples(300))
     part = interrupted(tmp_path, "a")
     other = elsewhere.rename(tmp_path / "a.mcap")
@@ -100,7 +100,7 @@ def test_a_name_that_is_taken_is_not_overwritten(tmp_path: Path) -> None:
     assert part.with_name("a.mcap.interrupted").read_bytes() == b"an older one"
 
 
-def test_a_recovery_that_was_itself_killed_is_finished(tmp_path: Path) -> None:
+def test_an_interrupted_recovery_is_finished(tmp_path: Path) -> None:
     part = interrupted(tmp_path, "a")
     data = part.read_bytes()
     recover(tmp_path)
@@ -122,7 +122,7 @@ def test_a_finished_part_is_recovered_without_loss(tmp_path: Path) -> None:
     assert not any("interrupted" in note for note in read_recording(result.recording).notes)
 
 
-def test_a_live_capture_is_left_alone(tmp_path: Path) -> None:
+def test_a_running_capture_is_not_touched(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.mcap", "friction") as writer:
         writer.append(made_samples(400))
         (result,) = recover(tmp_path)
@@ -132,7 +132,7 @@ def test_a_live_capture_is_left_alone(tmp_path: Path) -> None:
     assert len(read_recording(tmp_path / "a.mcap").samples) == 800
 
 
-def test_a_recovery_that_takes_the_new_file_makes_the_writer_start_afresh(
+def test_a_recovery_that_renames_the_new_file_makes_the_writer_start_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     locked = fcntl.flock

@@ -2,10 +2,12 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +15,13 @@ from mcap.reader import make_reader
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import schemas_dir
-from scissorcal.recording import Stroke, read_recording, recording_schema, write_recording
+from scissorcal.recording import (
+    SAMPLE_DTYPE,
+    Stroke,
+    read_recording,
+    recording_schema,
+    write_recording,
+)
 from scissorcal.recording import schema as description
 from scissorcal.recording.schema import RecordingMetadata, from_entries, stroke_records, to_entries
 from tests.recording.made import made_recording
@@ -33,7 +41,19 @@ def test_the_stored_schema_is_the_code_s() -> None:
     jsonschema.Draft202012Validator.check_schema(stored())
 
 
-def test_what_stands_in_a_file_follows_the_schema(tmp_path: Path) -> None:
+def test_the_page_on_recordings_has_the_layout_of_a_sample() -> None:
+    page = schemas_dir().parent / "docs" / "recordings.md"
+    if not page.is_file():
+        pytest.skip("the documentation is not installed")
+    stated = re.search(
+        r"SAMPLE = (np\.dtype\(.*?\]\))", page.read_text(encoding="utf-8"), re.DOTALL
+    )
+    assert stated is not None
+    fields = re.findall(r'\("(\w+)", "(<\w\d)"\)', stated[1])
+    assert np.dtype(fields) == SAMPLE_DTYPE
+
+
+def test_the_metadata_of_a_file_follows_the_schema(tmp_path: Path) -> None:
     path = write_recording(made_recording(50), tmp_path / "a.mcap")
     with path.open("rb") as stream:
         found = [record.metadata for record in make_reader(stream).iter_metadata()]

@@ -49,7 +49,7 @@ def test_constant_speeds_are_found_with_their_rests_left_out() -> None:
     seed=st.integers(0, 1000),
     mirrored=st.booleans(),
 )
-def test_noise_and_encoder_steps_split_no_stroke(
+def test_noise_and_encoder_steps_do_not_split_strokes(
     noise: float, step: float, seed: int, mirrored: bool
 ) -> None:
     opening, time = trapezoids([0.7, 0.4, 1.1, 0.9], rest_s=0.2, step=2e-3)
@@ -87,7 +87,7 @@ def test_no_motion_and_no_samples_give_no_strokes() -> None:
     assert set(labels.stroke_of_sample) == {-1}
 
 
-def test_nonsense_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="min_travel must be positive"):
         label_strokes([0, 1], [0, 1], 0.0)
     with pytest.raises(ValueError, match="shape"):

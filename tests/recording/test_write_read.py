@@ -106,7 +106,7 @@ def on_disk(part: Path) -> int:
 
 
 @pytest.mark.parametrize("interval_ms", [1, 20, 124, 126, 249, 400])
-def test_what_waits_in_memory_is_never_older_than_a_quarter_second(
+def test_samples_wait_in_memory_for_at_most_a_quarter_second(
     tmp_path: Path, interval_ms: int
 ) -> None:
     samples = made_samples(800)
@@ -134,7 +134,7 @@ def test_a_stream_that_stops_is_written_out_by_polling(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_a_clock_that_jumps_back_still_writes_out(tmp_path: Path) -> None:
+def test_a_clock_that_decreases_still_writes_out(tmp_path: Path) -> None:
     samples = made_samples(200)
     samples["host_time_ns"][100:] -= 3_600_000_000_000
     writer = RecordingWriter(tmp_path / "a.mcap", "friction")
@@ -144,7 +144,7 @@ def test_a_clock_that_jumps_back_still_writes_out(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_a_clock_that_stands_still_is_chunked_by_size(tmp_path: Path) -> None:
+def test_a_constant_clock_is_chunked_by_size(tmp_path: Path) -> None:
     samples = made_samples(5000)
     samples["host_time_ns"] = 0
     path = write_recording(Recording("friction", samples), tmp_path / "a.mcap")
@@ -158,11 +158,11 @@ def test_a_clock_that_stands_still_is_chunked_by_size(tmp_path: Path) -> None:
 def test_existing_files_are_never_overwritten(tmp_path: Path) -> None:
     path = write_recording(made_recording(10), tmp_path / "a.mcap")
     before = path.read_bytes()
-    with pytest.raises(InputError, match=r"a\.mcap stands already"):
+    with pytest.raises(InputError, match=r"a\.mcap exists"):
         RecordingWriter(path, "friction")
     assert path.read_bytes() == before
     writer = RecordingWriter(tmp_path / "b.mcap", "friction")
-    with pytest.raises(InputError, match=r"b\.mcap\.part is in the way"):
+    with pytest.raises(InputError, match=r"b\.mcap\.part exists"):
         RecordingWriter(tmp_path / "b.mcap", "friction")
     writer.append(made_samples(5))
     (tmp_path / "b.mcap").write_text("somebody else's")
@@ -230,9 +230,9 @@ def test_a_full_disk_is_named_and_what_was_written_is_kept(
             for start in range(0, 3000, 20):
                 writer.append(samples[start : start + 20])
 
-    with pytest.raises(ScissorcalError, match=r"a\.mcap\.part could not be written: No space"):
+    with pytest.raises(ScissorcalError, match=r"disk is full: .*a\.mcap\.part"):
         capture()
-    with pytest.raises(ScissorcalError, match="was not finished"):
+    with pytest.raises(ScissorcalError, match="is not finished"):
         writer.close()
     kept = read_recording(tmp_path / "a.mcap.part").samples
     assert len(kept) > 100

@@ -12,7 +12,7 @@ from scissorcal.recording import read_recording
 from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
 
 
-def test_a_port_is_served_by_a_process_of_its_own(paper: ModelPackage, tmp_path: Path) -> None:
+def test_a_port_is_served_by_a_separate_process(paper: ModelPackage, tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)  # a busy machine is not what is tested

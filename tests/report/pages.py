@@ -37,6 +37,21 @@ class Page:
         return [found[attribute] for _, found in self.elements if attribute in found]
 
 
+def panel_of(twin: dict[str, Any], name: str) -> dict[str, Any]:
+    """The panel of a twin by its address; KeyError where it has none."""
+    found = {panel["id"]: panel for panel in twin["panels"]}
+    panel: dict[str, Any] = found[name]
+    return panel
+
+
+def values_of(panel: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Rows of a panel by name, each with its values by name."""
+    return {
+        row["name"]: {value["name"]: value for value in row.get("values", ())}
+        for row in panel.get("rows", ())
+    }
+
+
 def read_page(path: Path) -> Page:
     """Parse a page; ``unbalanced`` names tags that close out of turn or never."""
     page = Page(path.read_text(encoding="utf-8"))

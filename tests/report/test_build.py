@@ -1,5 +1,6 @@
 """Building a report: refusals, bytes, what is kept when it fails, and hostile words."""
 
+import hashlib
 import json
 from dataclasses import replace
 from datetime import datetime
@@ -11,12 +12,14 @@ import pytest
 
 from scissorcal.calibration.result import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
+from scissorcal.package import REVIEW_FORMAT, Review
 from scissorcal.recipe.library import schemas_dir
-from scissorcal.report import Fact, FactSheet, build_report
+from scissorcal.report import Fact, FactSheet, build_report, sign_page
 from scissorcal.report.twin import schema_text
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
 from tests.report.fits import cut_fit, linear_fit, linear_recording
+from tests.report.pages import panel_of, values_of
 
 HOSTILE = '<script>alert("x")</script>'
 
@@ -34,8 +37,8 @@ def test_the_twin_follows_its_schema(name: str, request: pytest.FixtureRequest) 
 def test_the_schema_refuses_what_is_no_twin(linear: Built) -> None:
     twin = linear.twin
     assert not validator().is_valid({**twin, "more": 1})
-    assert not validator().is_valid({key: twin[key] for key in twin if key != "verdicts"})
-    assert not validator().is_valid({**twin, "format": "scissorcal-report/0"})
+    assert not validator().is_valid({key: twin[key] for key in twin if key != "panels"})
+    assert not validator().is_valid({**twin, "format": "scissorcal-report/1"})
 
 
 def test_the_schema_on_disk_is_the_one_of_the_code() -> None:
@@ -43,17 +46,28 @@ def test_the_schema_on_disk_is_the_one_of_the_code() -> None:
 
 
 def test_the_twin_holds_the_facts_of_the_fits(whole: Built) -> None:
-    fit, told = cut_fit(), whole.twin["fits"][1]
-    assert [row["name"] for row in told["parameters"]] == [p.name for p in fit.parameters]
-    for row, parameter in zip(told["parameters"], fit.parameters, strict=True):
-        for key, value in parameter.as_dict().items():
-            assert row[key] == value
-    assert len(told["held_out"]["rows"]) == len(fit.held_out)
+    fit = cut_fit()
+    told = values_of(panel_of(whole.twin, "cut-parameters"))
+    assert list(told) == [p.name for p in fit.parameters]
+    for parameter in fit.parameters:
+        mean, median = told[parameter.name]["mean"], told[parameter.name]["median, 90 %"]
+        assert (mean["number"], mean["sd"], mean["unit"]) == (
+            parameter.mean,
+            parameter.sd,
+            parameter.unit,
+        )
+        assert (median["low"], median["number"], median["high"]) == (
+            parameter.q05,
+            parameter.q50,
+            parameter.q95,
+        )
+    assert len(panel_of(whole.twin, "cut-heldout")["rows"]) == len(fit.held_out)
     residual = fit.series.measured - fit.series.predicted
-    for row in told["residuals"]:
-        here = residual[fit.series.stroke == row["name"]["stroke"]]
-        assert row["rms"] == pytest.approx(float(np.sqrt(np.mean(here**2))))
-        assert row["samples"] == len(here)
+    for name, values in values_of(panel_of(whole.twin, "cut-residuals")).items():
+        stroke = int(name.removeprefix("stroke ").partition(",")[0])
+        here = residual[fit.series.stroke == stroke]
+        assert values["rms"]["number"] == pytest.approx(float(np.sqrt(np.mean(here**2))))
+        assert values["samples"]["number"] == len(here)
     assert whole.twin["created"] == "2025-01-31T15:02:00Z"
 
 
@@ -112,7 +126,7 @@ def test_words_from_outside_never_become_markup(tmp_path: Path) -> None:
         recipe, [fit], [], tmp_path, created=CREATED, recipe_text=HOSTILE, sheets=[sheet]
     )
     page = files.html.read_text(encoding="utf-8")
-    assert "<script" not in page
+    assert page.count("<script") == 1  # the page's own
     assert page.count("&lt;script&gt;") > 15
 
 
@@ -128,13 +142,53 @@ def test_a_fit_without_samples_is_still_reported(tmp_path: Path) -> None:
     fit = replace(cut_fit(), series=series, held_out=(), rungs=(), parameters=(), verdicts=())
     report = built(tmp_path, [fit], [])
     assert "holds no samples" in report.page.text
-    assert report.twin["fits"][0]["headline"]["stance"] == "care"
+    decision = values_of(panel_of(report.twin, "decision-trust"))["cut"]["decision"]
+    assert decision["text"] == "! use with care"
 
 
 def test_two_fits_of_a_kind_have_addresses_of_their_own(tmp_path: Path) -> None:
     report = built(tmp_path, [linear_fit(), linear_fit(seed=4)], [])
-    assert [fit["anchor"] for fit in report.twin["fits"]] == ["friction", "friction-2"]
+    parts = [fit["part"] for fit in report.twin["provenance"]["fits"]]
+    assert parts == ["friction", "friction-2"]
     assert len(set(report.page.ids)) == len(report.page.ids)
+
+
+def test_a_signature_shows_on_the_page_and_leaves_the_twin_as_it_was(tmp_path: Path) -> None:
+    plain = built(tmp_path, [linear_fit()], [])
+    assert "Not signed" in plain.page.text
+    before = (tmp_path / "report.json").read_bytes()
+    review = review_of(before)
+    sign_page(tmp_path / "report.html", review)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Signed by <strong>A. &lt;b&gt; Lovelace</strong> on" in page
+    assert "2025-02-01" in page
+    assert "Not signed" not in page
+    assert (tmp_path / "report.json").read_bytes() == before
+    again = built(tmp_path, [linear_fit()], [], review=review)
+    assert again.page.source == page
+    (tmp_path / "signature.json").write_text(review.model_dump_json(), encoding="utf-8")
+    assert built(tmp_path, [linear_fit()], []).page.source == page
+
+
+def test_a_signature_of_another_report_is_not_shown(tmp_path: Path) -> None:
+    other = review_of(b"another report")
+    assert "Not signed" in built(tmp_path, [linear_fit()], [], review=other).page.text
+    (tmp_path / "report.html").write_text("no page", encoding="utf-8")
+    with pytest.raises(InputError, match="cannot take the signature"):
+        sign_page(tmp_path / "report.html", other)
+
+
+def review_of(twin: bytes) -> Review:
+    """An accepted review of a twin, by someone whose name holds markup."""
+    return Review(
+        format=REVIEW_FORMAT,
+        name="A. <b> Lovelace",
+        decision="accept",
+        note="",
+        time_utc="2025-02-01T08:00:00Z",
+        report_sha256=hashlib.sha256(twin).hexdigest(),
+        fit_hashes={"friction": "1f"},
+    )
 
 
 def _hostile(parameter: FittedParameter) -> FittedParameter:

@@ -20,10 +20,11 @@ from scissorcal.calibration.verify.result import (
     VerifyResult,
 )
 from scissorcal.report import build_report
-from scissorcal.report.sections.pairs import compare_prior, correlate
+from scissorcal.report.subjects.posterior import correlate, prior_panel
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
 from tests.report.fits import FRICTION_SOURCE, friction_fit, friction_recording
+from tests.report.pages import panel_of, values_of
 
 COMMANDS = ("scissorcal fit friction --force", "scissorcal verify friction")
 
@@ -124,26 +125,29 @@ def test_what_is_missing_names_the_command(whole: Built) -> None:
 
 
 def test_a_proposal_shows_how_often_and_how_much(report: Built) -> None:
-    for words in ("|load| sgn(rate)", "0.120 ± 0.020", "93 %", "18 %", 'terms = ["load"]'):
+    for words in ("|load| sgn(rate)", "0.120 ± 0.020", 'terms = ["load"]'):
         assert words in report.page.text
+    row = values_of(panel_of(report.twin, "friction-critic"))["|load| sgn(rate)"]
+    found, falls = row["found in resamples"], row["hold-out error falls by"]
+    assert (found["number"], found["unit"], falls["number"]) == (pytest.approx(93), "%", 18)
 
 
 def test_a_replay_is_tied_to_its_strokes(report: Built) -> None:
-    (section,) = report.twin["fits"]
-    assert [row["anchor"] for row in section["replay"]["rows"]] == [
-        "friction-r0-s4",
-        "friction-r0-s8",
-    ]
-    assert section["replay"]["rows"][0]["one_stroke_rms"] is None
+    panel = panel_of(report.twin, "friction-replay")
+    assert [row["link"] for row in panel["rows"]] == ["friction-r0-s4", "friction-r0-s8"]
+    first, second = values_of(panel).values()
+    assert first["model of that one stroke"].get("number") is None
+    assert [row.get("marked", False) for row in panel["rows"]] == [False, True]
+    assert second["replay"]["number"] == 0.001
     assert "The law is better on 1 of 2." in report.page.text
 
 
 def test_ranks_outside_the_band_are_named(report: Built) -> None:
     text = report.page.text
-    assert "Intervals do not hold what they promise for coulomb" in text
-    assert "Outside, bold and named: coulomb" in text
+    assert "Intervals do not hold the truth as often as they claim for coulomb" in text
+    assert "Outside: coulomb" in text
     assert "The prior matters for coulomb" in text
-    assert "differs by 30 %" in text
+    assert "differs by 30 % rms" in text
 
 
 def test_even_ranks_stay_inside(tmp_path: Path) -> None:
@@ -153,15 +157,23 @@ def test_even_ranks_stay_inside(tmp_path: Path) -> None:
         paper(), [fit], [friction_recording()], tmp_path, created=CREATED, checks={"friction": even}
     )
     page = files.html.read_text(encoding="utf-8")
-    assert "Intervals hold the truth as often as they promise" in page
+    assert "Intervals hold the truth as often as they claim" in page
     assert "None leaves it." in page
 
 
 def test_a_failed_trust_check_rejects_the_fit(report: Built) -> None:
-    headline = report.twin["fits"][0]["headline"]
-    assert headline["stance"] == "reject"
-    assert "halves failed" in headline["sentence"]
-    assert report.twin["verdicts"]["failed"] == 1
+    trust = panel_of(report.twin, "decision-trust")
+    assert trust["title"] == "Do not use"
+    row = values_of(trust)["friction"]
+    assert (row["decision"]["text"], row["why"]["text"]) == ("✗ do not use", "halves failed")
+    assert panel_of(report.twin, "verdicts-all")["sentence"].startswith("1 failed")
+
+
+def test_the_decision_page_has_the_coverage_that_the_trust_check_found(report: Built) -> None:
+    said = values_of(panel_of(report.twin, "decision-checked"))["friction"]["trust check"]["text"]
+    assert said.startswith("failed: halves; 90 % intervals held the truth in 0")
+    (row,) = report.twin["provenance"]["trust_checks"]
+    assert (row["fit"], row["fit_hash"]) == ("friction", friction_fit().inputs_hash)
 
 
 def test_a_trust_check_of_another_fit_is_not_shown(tmp_path: Path) -> None:
@@ -187,12 +199,14 @@ def test_correlations_and_priors_are_those_of_the_draws() -> None:
     draws[:, 3] = 2.0 * draws[:, 2] + 1e-9 * rng.normal(size=len(draws))
     top, *_ = correlate(replace(fit, draws=draws))
     assert {top.first, top.second} == {"coulomb", "viscous"}
-    assert top.correlation == pytest.approx(1.0, abs=1e-3)
-    rows = compare_prior(fit)
+    assert top.value == pytest.approx(1.0, abs=1e-3)
+    rows = prior_panel(fit, "friction").rows
     assert [row.name for row in rows] == [parameter.name for parameter in fit.parameters]
+    median = rows[2].value("prior median")
+    assert median is not None
     assert fit.prior_draws is not None
-    assert rows[2].prior[2] == pytest.approx(float(np.median(fit.prior_draws[:, 2])), rel=1e-4)
-    assert compare_prior(replace(fit, prior_draws=None)) == ()
+    assert median.number == pytest.approx(float(np.median(fit.prior_draws[:, 2])), rel=1e-4)
+    assert prior_panel(replace(fit, prior_draws=None), "friction").rows == ()
 
 
 def test_a_report_that_says_the_same_keeps_its_time(tmp_path: Path) -> None:

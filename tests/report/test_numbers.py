@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.report import inputs, numbers, strokes
+from scissorcal.report import inputs, numbers, panel, strokes, text
 from scissorcal.report.numbers import (
     decimals_for,
     display,
@@ -20,7 +20,6 @@ from scissorcal.report.numbers import (
     unit_text,
     with_decimals,
 )
-from scissorcal.report.sections import parameters
 
 VALUES = st.floats(min_value=-1e300, max_value=1e300) | st.sampled_from(
     [math.nan, math.inf, -math.inf, 5e-324, -5e-324]
@@ -34,7 +33,7 @@ def value_of(text: str) -> float:
     return float(f"{mantissa}e{power}" if times else mantissa)
 
 
-@pytest.mark.parametrize("module", [numbers, inputs, strokes, parameters])
+@pytest.mark.parametrize("module", [numbers, inputs, strokes, panel, text])
 def test_examples_in_docstrings_hold(module: object) -> None:
     outcome = doctest.testmod(module)  # type: ignore[arg-type]
     assert outcome.attempted > 0

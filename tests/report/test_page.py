@@ -6,6 +6,7 @@ import pytest
 
 from tests.report.conftest import Built
 from tests.report.fits import cut_fit, friction_fit
+from tests.report.pages import panel_of, values_of
 
 FETCHING = ("src", "srcset", "poster", "data", "action", "background", "xlink:href")
 
@@ -19,7 +20,8 @@ def any_report(request: pytest.FixtureRequest) -> Built:
 
 def test_nothing_is_fetched_from_outside(any_report: Built) -> None:
     page = any_report.page
-    assert not page.all("script")
+    assert len(page.all("script")) == 1
+    assert page.all("script") == [{}]
     assert not page.all("link")
     for attribute in FETCHING:
         assert not page.values(attribute)
@@ -31,6 +33,7 @@ def test_nothing_is_fetched_from_outside(any_report: Built) -> None:
     assert not re.search(r"https?://", page.source)
     (policy,) = page.all("meta", **{"http-equiv": "Content-Security-Policy"})
     assert policy["content"].startswith("default-src 'none'")
+    assert "script-src 'sha256-" in policy["content"]
 
 
 def test_the_page_is_well_formed_and_small(any_report: Built) -> None:
@@ -63,6 +66,7 @@ def test_figures_take_the_colours_of_the_page(whole: Built) -> None:
     drawn = whole.page.source.partition("</style>")[2]
     assert not re.search(r"#[0-9a-f]{6}\b", drawn)
     used = set(re.findall(r"var\(--([a-z]+)\)", whole.page.source))
+    assert {"ink", "blue", "vermillion"} <= used
     style = whole.page.source.partition("</style>")[0]
     root, dark = style.split("@media (prefers-color-scheme: dark)")
     for name in used:
@@ -85,36 +89,88 @@ def test_the_palette_is_legible_by_day_and_by_night(whole: Built) -> None:
 
 def test_verdicts_stand_on_top_and_failures_first(whole: Built) -> None:
     ids = whole.page.ids
-    assert ids.index("summary") < ids.index("verdicts") < ids.index("friction") < ids.index("cut")
+    assert ids.index("decision") < ids.index("verdicts") < ids.index("friction") < ids.index("cut")
     badges = [
         attributes["class"].removeprefix("badge ")
         for attributes in whole.page.all("span")
         if attributes.get("class", "").startswith("badge ")
     ]
-    listed = badges[badges.index("pass", 2) + 1 :][:8]
+    decided, listed = badges[:2], badges[2:10]
+    assert decided == ["not_evaluated", "fail"]  # friction asks for care, the cut is rejected
     assert listed == ["fail", "not_evaluated"] + ["pass"] * 6
     for verdict in (*friction_fit().verdicts, *cut_fit().verdicts):
         assert verdict.why in whole.page.text
 
 
 def test_residuals_lead_to_their_strokes_from_the_worst(whole: Built) -> None:
-    rows = whole.twin["fits"][0]["residuals"]
-    sizes = [row["rms"] for row in rows]
+    panel = panel_of(whole.twin, "friction-residuals")
+    sizes = [row["rms"]["number"] for row in values_of(panel).values()]
     assert sizes == sorted(sizes, reverse=True)
     links = whole.page.values("href")
-    for place, row in enumerate(rows[:20]):
-        address = f"#{row['name']['anchor']}"
-        found = links.count(
-            address
-        )  # from its bar, the bar's label, and the table above its figure
-        assert found >= (3 if place < 12 else 2)
+    for place, row in enumerate(panel["rows"][:20]):
+        address = row.get("link") or row["anchor"]
+        found = links.count(f"#{address}")  # from its bar, and from the table to its chart
+        assert found >= (2 if place < 12 else 1)
     bars = [link for link in links if link.startswith("#friction-r")]
-    assert bars[0] == f"#{rows[0]['name']['anchor']}"
+    assert bars[0] == f"#{panel['rows'][0]['link']}"
+
+
+def test_it_is_read_without_a_script_and_detail_opens_on_demand(whole: Built) -> None:
+    page = whole.page
+    parts = page.all("details", **{"class": "part"})
+    assert len(parts) >= 7
+    assert not any("open" in part for part in parts)
+    assert len(page.all("summary")) == len(page.all("details"))
+    (tools,) = page.all("p", **{"class": "tools"})
+    assert "hidden" in tools  # the script shows the search
+    assert not page.all("button", **{"class": "key"})
+
+
+def test_strokes_can_be_switched_and_values_read(whole: Built) -> None:
+    source = whole.page.source
+    entries = whole.page.all("li")
+    switched = {entry["data-group"] for entry in entries if "data-group" in entry}
+    assert {"friction-r0-s0", "cut-r0-s11"} <= switched
+    groups = {g["data-group"] for g in whole.page.all("g") if "data-group" in g}
+    assert switched <= groups
+    for figure in whole.page.all("svg"):
+        for name in ("data-x", "data-y"):
+            low, high, start, end, kind = figure[name].split(" ")
+            assert float(low) < float(high)
+            assert float(start) != float(end)
+            assert kind in {"lin", "log"}
+    assert 'addEventListener("pointermove"' in source
+    assert 'addEventListener("keydown"' in source
+
+
+def test_the_decision_page_answers_in_order(whole: Built) -> None:
+    ids = [name for name in whole.page.ids if name.startswith("decision")]
+    assert ids == [
+        "decision",
+        "decision-origin",
+        "decision-trust",
+        "decision-data",
+        "decision-checked",
+        "decision-felt",
+        "decision-weaknesses",
+        "decision-signature",
+    ]
+    for words in ("Do not use", "Not signed", "Felt error", "Known weaknesses of this fit"):
+        assert words in whole.page.text
+
+
+def test_limits_state_their_direction(whole: Built) -> None:
+    assert "at most 0.7" in whole.page.text
+    assert "at least 0.01" in whole.page.text
 
 
 def test_scrolling_parts_can_be_reached_by_keyboard(whole: Built) -> None:
-    regions = whole.page.all("div", **{"class": "scroll"})
-    assert len(regions) == 4
+    regions = [
+        attributes
+        for attributes in whole.page.all("div")
+        if attributes.get("class", "").startswith("scroll")
+    ]
+    assert len(regions) > 10
     for region in (*regions, *whole.page.all("pre")):
         assert region["tabindex"] == "0"
         assert region["aria-label"]
@@ -124,8 +180,9 @@ def test_scrolling_parts_can_be_reached_by_keyboard(whole: Built) -> None:
 
 def test_numbers_carry_the_digits_that_they_are_worth(whole: Built) -> None:
     text = whole.page.text
-    assert "3.412 × 10⁻⁴ 4.1 × 10⁻⁶" in text  # inertia: mean, sd
-    assert "0.02103 0.00019 0.02072 0.02103 0.02134" in text  # coulomb: mean, sd, quantiles
+    assert "3.412 × 10⁻⁴ ± 4.1 × 10⁻⁶" in text  # inertia: mean, sd
+    assert "0.02103 ± 0.00019" in text  # coulomb: mean, sd
+    assert "0.02103 (0.02072 to 0.02134)" in text  # coulomb: median and 90 % interval
     assert "kg m²" in text
     assert "kg m^2" not in text
 
@@ -145,8 +202,11 @@ def test_a_sliding_joint_has_newtons_metres_and_kilograms(linear: Built) -> None
 def test_what_is_not_finite_is_said_to_be_not_available(lost: Built) -> None:
     assert "not available" in lost.page.text
     assert not re.search(r"\b(nan|NaN|inf|Infinity|None)\b", lost.page.text)
-    assert lost.twin["fits"][0]["parameters"][0]["mean"] is None
-    assert lost.twin["fits"][0]["rungs"][0]["bic"] is None
+    assert values_of(panel_of(lost.twin, "friction-parameters"))["inertia"]["mean"].keys() == {
+        "name",
+        "unit",
+        "digits",
+    }
 
 
 def test_the_recipe_and_the_hashes_are_there(whole: Built, linear: Built) -> None:

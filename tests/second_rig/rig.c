@@ -31,6 +31,8 @@ static double after_path(double share, double way, double length, double shape)
     return far > 40.0 ? toward : toward * (1.0 - left * exp(-far));
 }
 
+/* Friction of the opening axis. The part that grows with the load has no factor of the angle, and
+ * a pivot without friction (load_share = 0) has none of it. */
 static double dry_friction(const rig_parameters *p, double th, double w, double u, double load)
 {
     const double away = th - p->angle_center;

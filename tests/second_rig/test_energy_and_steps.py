@@ -49,7 +49,7 @@ def bent(blades: Blades) -> Blades:
     ],
     ids=["fine", "coarse-cotton", "smooth", "pad", "two-slopes-bent-upper", "fine-teeth", "hand"],
 )
-def test_no_energy_is_made_or_lost(rig: Rig, hand: bool) -> None:
+def test_energy_is_conserved(rig: Rig, hand: bool) -> None:
     recipe = recipe_for(rig, sheets=1)
     _, books = capture_cut(rig, recipe, np.random.default_rng(5), hand=hand)
     rows = books.rows
@@ -86,7 +86,7 @@ def part_of_a_cut(rig: Rig, ticks: int) -> Timeline:
     return Timeline(**kept)
 
 
-def test_the_step_decides_nothing() -> None:
+def test_the_result_does_not_depend_on_the_step() -> None:
     rig = fine(paper(variation=0.0))
     rig = replace(rig, sensors=replace(rig.sensors, counts_per_turn=10**12, sledge_step_m=0.0))
     timeline = part_of_a_cut(rig, 3500)

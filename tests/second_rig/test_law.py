@@ -43,7 +43,7 @@ def steadily_running(crack: Array) -> NDArray[np.bool_]:
 
 
 @pytest.mark.parametrize("moving", ["both", "upper"])
-def test_smooth_torque_is_toughness_times_what_the_contact_moves(
+def test_smooth_torque_is_toughness_times_the_contacts_motion(
     moving: Literal["both", "upper"],
 ) -> None:
     rig = fine(paper(kappa=1.0, variation=0.0))
@@ -137,7 +137,7 @@ def test_teeth_have_the_period_and_the_mean_of_the_law() -> None:
 
 
 @pytest.mark.parametrize("kind", ["ou", "gaussian"])
-def test_toughness_varies_as_it_says(kind: str) -> None:
+def test_toughness_varies_as_stated(kind: str) -> None:
     sheet = paper(variation=0.05, correlation=kind, correlation_m=1e-3, sheet_sd=0.03)
     drawn = toughness_of(sheet, 400, np.random.default_rng(1)) / 0.52
     own = drawn.mean(axis=1, keepdims=True)

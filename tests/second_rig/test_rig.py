@@ -58,7 +58,7 @@ def there_and_back(rig: Rig, way: float = 0.2, seconds: float = 1.0) -> Timeline
     )
 
 
-def test_it_shares_no_code_with_what_it_judges() -> None:
+def test_it_shares_no_code_with_the_fitted_model() -> None:
     found = set()
     for path in HERE.glob("*.py"):
         if path.name.startswith("test_"):
@@ -74,7 +74,7 @@ def test_it_shares_no_code_with_what_it_judges() -> None:
 
 
 @pytest.mark.parametrize(("presliding_rad", "shape"), [(4e-6, 1.0), (2e-3, 1.0), (2e-3, 1.5)])
-def test_friction_needs_its_way_to_build_up_after_a_reversal(
+def test_friction_builds_up_over_its_length_after_a_reversal(
     presliding_rad: float, shape: float
 ) -> None:
     rig = fine()
@@ -168,7 +168,7 @@ def test_a_held_torque_is_as_late_as_stated(delay_ticks: float, lag_ticks: float
     assert true_parameters(rig)["delay"] == pytest.approx(late, abs=3e-5)
 
 
-def test_a_seed_gives_the_same_day_and_another_seed_another() -> None:
+def test_results_follow_from_the_seed() -> None:
     rig = coarse()
     recipe = recipe_for(rig, sheets=1, strokes_per_sheet=1)
     days = [capture_cut(rig, recipe, np.random.default_rng(seed))[0] for seed in (3, 3, 4)]
@@ -205,7 +205,7 @@ def test_other_sample_rates_cut_as_well(rate_Hz: float) -> None:
 
 
 @pytest.mark.parametrize("brake", [False, True])
-def test_an_interrupted_stroke_goes_on_under_its_label(brake: bool) -> None:
+def test_an_interrupted_stroke_continues_with_its_index(brake: bool) -> None:
     rig = fine()
     recipe = recipe_for(rig, sheets=1)
     stops = (Interruption(0, 0.4, 0.2, brake), Interruption(4, 0.6, 0.1, brake))
@@ -271,7 +271,7 @@ def test_truth_is_drawn_and_expanded() -> None:
     assert two["response_exponent"] == pytest.approx(2.0 * 4e-4 / (4e-4 + 2e-4))
 
 
-def test_a_day_is_cheap_and_empty_sweeps_are_empty() -> None:
+def test_empty_sweeps_have_no_cutting_torque() -> None:
     rig = fine()
     recording, books = capture_friction(rig, recipe_for(rig), np.random.default_rng(1))
     assert recording.kind == "friction"

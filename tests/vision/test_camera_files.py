@@ -81,7 +81,7 @@ def read(tmp_path: Path, text: str, name: str = "camera.yaml") -> Camera:
     return read_camera_file(tmp_path / name).camera
 
 
-def test_files_of_others_are_read(tmp_path: Path) -> None:
+def test_camera_files_of_other_tools_are_read(tmp_path: Path) -> None:
     assert read(tmp_path, KALIBR) == Camera(
         461.6, 460.3, 362.7, 248.1, (-0.27, 0.06, 0.0009, 0.00003, 0.0), 752, 480
     )
@@ -93,24 +93,24 @@ def test_files_of_others_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is no camera file"),
+        ("", "is not a camera file"),
         ("a: 1\n", "neither camera_matrix nor cam0"),
         ("{{", "damaged"),
-        ("%YAML:1.0\n---\ncamera_matrix: 5\n", "no matrices"),
-        ("a: [1", "no YAML"),
-        ("\x00\x01", "no YAML"),
+        ("%YAML:1.0\n---\ncamera_matrix: 5\n", "no 3 x 3 matrix"),
+        ("a: [1", "not readable YAML"),
+        ("\x00\x01", "not readable YAML"),
         (OPENCV_1[:180], "damaged"),
         (OPENCV_1.replace("image_width", "breadth"), "image_width and image_height"),
         (OPENCV_1.replace("cameraMatrix", "matrix"), "has no 3 x 3 matrix"),
         (OPENCV_1.replace("501.5", "-501.5"), "negative focal length"),
         (OPENCV_1.replace("0.1, -0.2", ".nan, -0.2"), "not finite"),
         (KALIBR.replace("radtan", "equidistant"), "pinhole-equidistant"),
-        (KALIBR.replace("[461.6, 460.3, 362.7, 248.1]", "[461.6]"), "not complete"),
+        (KALIBR.replace("[461.6, 460.3, 362.7, 248.1]", "[461.6]"), "incomplete"),
         (KALIBR + KALIBR.replace("cam0", "cam1"), "2 cameras (cam0, cam1)"),
         (ROS_MESSAGE.replace("plumb_bob", "equidistant"), "model equidistant"),
     ],
 )
-def test_what_is_not_such_a_camera_is_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_unsupported_camera_files_are_refused(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(InputError) as caught:
         read(tmp_path, text)
     assert words in str(caught.value)

@@ -55,18 +55,18 @@ def with_orientation(path: Path, image: np.ndarray, orientation: int, kind: str)
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_a_photograph_stands_upright(tmp_path: Path, orientation: int) -> None:
+def test_exif_orientation_is_applied(tmp_path: Path, orientation: int) -> None:
     image = spotted()
     read = read_photo(with_orientation(tmp_path, image, orientation, "png"))
     expected = UPRIGHT[orientation](image)
     assert np.array_equal(read.image, expected)
     assert (read.height, read.width) == expected.shape
-    assert read.exif_orientation_applied == (orientation != 1)
+    assert read.orientation == orientation
 
 
 @pytest.mark.parametrize("kind", ["jpg", "png"])
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_a_reduced_photograph_knows_where_its_pixels_were(
+def test_a_reduced_photograph_maps_to_original_pixels(
     tmp_path: Path, orientation: int, kind: str
 ) -> None:
     image = spotted()
@@ -114,7 +114,7 @@ def modes() -> dict[str, Image.Image]:
 @pytest.mark.parametrize("name", sorted(modes()))
 @pytest.mark.parametrize("colour", [True, False])
 @pytest.mark.parametrize("reduced", [False, True])
-def test_every_kind_of_picture_shows_the_same(
+def test_all_image_formats_give_the_same_picture(
     tmp_path: Path, name: str, colour: bool, reduced: bool
 ) -> None:
     options = {"quality": 97} if name.endswith((".jpg", ".webp")) else {}
@@ -131,7 +131,7 @@ def test_every_kind_of_picture_shows_the_same(
     )
 
 
-def test_what_is_transparent_lies_on_white(tmp_path: Path) -> None:
+def test_transparency_is_composited_on_white(tmp_path: Path) -> None:
     path = saved(tmp_path / "clear.png", Image.new("RGBA", (20, 20), (0, 0, 0, 0)))
     assert read_photo(path).image.min() == 255
 
@@ -160,21 +160,21 @@ def test_a_truncated_file_is_refused(tmp_path: Path, kind: str, share: float) ->
     assert "copy it from the camera again" in refused(path) or "give a JPEG" in refused(path)
 
 
-def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_image_is_refused(tmp_path: Path) -> None:
     for name, content, words in (
-        ("notes.txt", b"a list of things", "not a photograph"),
+        ("notes.txt", b"a list of things", "not a readable photograph"),
         ("empty.jpg", b"", "is empty"),
         ("phone.heic", b"\0\0\0\x18ftypheic" + bytes(40), "HEIF"),
     ):
         (tmp_path / name).write_bytes(content)
         assert words in refused(tmp_path / name)
-    assert "is not there" in refused(tmp_path / "none.jpg")
+    assert "does not exist" in refused(tmp_path / "none.jpg")
     assert "cannot be read" in refused(tmp_path)
     image = Image.fromarray(np.linspace(0, 1, 400, dtype=np.float32).reshape(20, 20))
     assert "floating-point" in refused(saved(tmp_path / "float.tif", image))
 
 
-def test_a_picture_that_claims_to_be_huge_is_refused(tmp_path: Path) -> None:
+def test_a_picture_with_a_huge_header_size_is_refused(tmp_path: Path) -> None:
     path = saved(tmp_path / "bomb.png", Image.new("1", (12_000, 9_000)))
     assert "million pixels" in refused(path)
 

@@ -58,7 +58,7 @@ def test_coverage_beyond_the_picture_and_holes():
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.03, 0.4, 0.785, 1.3])
-def test_a_straight_edge_stands_in_its_place(angle):
+def test_a_rendered_straight_edge_is_accurate(angle):
     along = np.array([math.cos(angle), math.sin(angle)])
     across = np.array([-along[1], along[0]])
     corner = np.array([0.0031, -0.0017])
@@ -111,7 +111,7 @@ def test_charuco_corners_have_no_bias():
     assert np.sqrt(np.mean(gaps**2)) < 0.12
 
 
-def test_the_lens_is_that_of_the_camera_that_is_fitted():
+def test_the_rendered_lens_equals_the_fitted_camera_model():
     """Two implementations of one formula, which share no code."""
     camera = Camera(1500.0, 1500.0, 639.5, 479.5, LENS.distortion, 1280, 960)
     pose = Pose.looking_at((0.1, 0.05), 0.3, tilt=0.4, azimuth=1.0, turn=0.3)
@@ -120,7 +120,7 @@ def test_the_lens_is_that_of_the_camera_that_is_fitted():
     np.testing.assert_allclose(LENS.sees(points, pose), camera.project(solid), atol=1e-6)
 
 
-def test_every_marker_of_the_mat_is_read_in_a_careless_photograph():
+def test_every_marker_of_the_mat_is_read_in_a_poor_photograph():
     rng = np.random.default_rng(5)
     pose = Pose.looking_at((0.126, 0.09), 0.36, tilt=0.25, azimuth=1.0)
     layers = target_layers(BLADE_MAT, pose)
@@ -132,7 +132,7 @@ def test_every_marker_of_the_mat_is_read_in_a_careless_photograph():
     assert sorted(ids.ravel().tolist()) == list(BLADE_MAT.ids)
 
 
-def test_a_blade_hides_what_is_under_it_and_its_hole_does_not():
+def test_a_blade_covers_the_sheet_except_in_its_hole():
     pose = Pose.looking_at((0.1, 0.05), 0.3)
     sheet = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     shape = BladeShape()
@@ -148,7 +148,7 @@ def test_a_blade_hides_what_is_under_it_and_its_hole_does_not():
     assert bright[below[1], below[0]] == pytest.approx(0.85 * 0.9, rel=0.02)
 
 
-def test_the_centreline_of_a_symmetric_blade_is_its_own():
+def test_the_centreline_of_a_symmetric_blade_is_its_x_axis():
     assert BladeShape(back_m=0.008, back_slope=-math.tan(0.035)).centreline_turn() == pytest.approx(
         0.0, abs=1e-9
     )

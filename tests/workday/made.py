@@ -78,3 +78,19 @@ def record_friction(
     path = workspace.new_recording("friction")
     write_recording(replace(made, recipe_toml=text), path)
     return path
+
+
+def record_cut(workspace: Workspace, seed: int = 3) -> Path:
+    """Add a recording of two strokes through a sheet."""
+    opening, advance, strokes = [], [], []
+    for place, speed in ((-0.018, 0.6), (0.016, 0.9)):
+        for start, end, kind, rate in ((0.85, 0.22, "closing", speed), (0.22, 0.85, "opening", 1)):
+            strokes.append(Stroke(len(strokes), kind, rate, 0))
+            opening.append(sweep(start, end, rate))
+            advance.append(place)
+    rng = np.random.default_rng(seed)
+    made = make_recording("cut", opening, advance, strokes, Truth(), rng, True)
+    path = workspace.new_recording("cut")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    write_recording(replace(made, recipe_toml=text), path)
+    return path

@@ -13,11 +13,14 @@ def test_a_new_workspace_lacks_everything(tmp_path: Path) -> None:
         "capture cut",
         "fit friction",
         "fit cut",
+        "verify friction",
+        "verify cut",
         "report",
         "report sign",
         "package build",
+        "render",
     ]
-    assert {step.status for step in plan.steps} == {"missing"}
+    assert {step.state for step in plan.steps} == {"missing"}
     assert plan.next_command == "scissorcal capture friction --device PORT"
 
 

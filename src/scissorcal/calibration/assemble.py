@@ -10,6 +10,7 @@ from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.comparison import candidate_rows, comparison_text
 from scissorcal.calibration.critic import Critique, criticise
 from scissorcal.calibration.fit_candidate import FittedCandidate
+from scissorcal.calibration.predictive import predictive_of
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.signals.filtering import Bins
@@ -64,7 +65,9 @@ def assemble(
     others = [i for i, name in enumerate(layout.names) if name in nuisance]
     natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
-    series = _series(chosen, posterior, bins, strokes, measured, contact)
+    thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
+    predictions = _predictions(chosen, posterior, measured, thin)
+    series = _series(chosen, predictions, bins, strokes, measured, contact, thin)
     rows = candidate_rows(compared, chosen)
     diagnostics = _diagnostics(compared, chosen, posterior, bins, measured)
     diagnostics |= dict(extra_diagnostics or {})
@@ -106,6 +109,7 @@ def assemble(
         prior_draws=_prior_draws(chosen, rng)[:, wanted],
         nuisance=tuple(fitted[i] for i in others),
         nuisance_draws=natural[:, others],
+        predictive=predictive_of(compared, chosen, predictions, thin, effort, rng.spawn(1)[0]),
     )
 
 
@@ -202,18 +206,25 @@ def _stroke_errors(
     return tuple(errors)
 
 
+def _predictions(
+    chosen: FittedCandidate, posterior: Posterior, measured: Array, thin: slice
+) -> Array:
+    """Means (draws, k) by draws of the posterior, at the points that ``thin`` selects."""
+    residuals = chosen.candidate.likelihood.residuals
+    every = max(1, len(posterior.draws) // BAND_DRAWS)
+    return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
+
+
 def _series(
     chosen: FittedCandidate,
-    posterior: Posterior,
+    predictions: Array,
     bins: Bins,
     strokes: Integers,
     measured: Array,
     contact: Array,
+    thin: slice,
 ) -> FitSeries:
     residuals = chosen.candidate.likelihood.residuals
-    thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
-    every = max(1, len(posterior.draws) // BAND_DRAWS)
-    predictions = np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
     low, high = np.quantile(predictions, [0.05, 0.95], axis=0)
     return FitSeries(
         time_s=bins.time_s[thin],

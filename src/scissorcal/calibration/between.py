@@ -16,6 +16,7 @@ from scissorcal.calibration.friction.search import search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups
+from scissorcal.model.transforms import LOG
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Status, Verdict
 
@@ -312,7 +313,7 @@ def _without_prior(own: Posterior, likelihood: Array, prior: Array, prior_mean: 
 
 
 def _scales(layout: Layout) -> Array:
-    return np.array([SCALE * (1.0 if p.transform == "log" else p.sd) for p in layout.parameters])
+    return np.array([SCALE * (1.0 if p.transform == LOG else p.sd) for p in layout.parameters])
 
 
 def _largest_z(points: Array, covariances: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Parameters whose calibration is known to be poor for a kind of data: one table, row by row.
+"""Parameters whose intervals are known to be poorly calibrated for a kind of data: one table.
 
-A row stands for something that was measured on rigs with known truth (docs/uncertainty.md) or that
-no data of the kind could tell. A measured improvement removes its row.
+A row stands for a coverage that was measured on rigs with known truth (docs/uncertainty.md), or for
+a parameter that data of the kind cannot identify. A measured improvement removes its row.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,14 +14,14 @@ FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
 
 LONG_WINDOWS = 2.0
-"""Lengthening of friction's windows from which its intervals are known to be poor."""
+"""Lengthening of friction's windows from which its intervals are poorly calibrated."""
 
 RESPONSE = ("response_force", "response_exponent")
 
 
 @dataclass(frozen=True)
 class Caveat:
-    """Why the intervals of ``parameters`` are known to be poor, and what would improve them."""
+    """Why the intervals of ``parameters`` are poorly calibrated, and the remedy."""
 
     parameters: tuple[str, ...]
     sentence: str
@@ -29,7 +29,7 @@ class Caveat:
 
 @dataclass(frozen=True)
 class _Row:
-    """One kind of data: when it is there, which parameters it concerns, what to say."""
+    """One kind of data: when a fit is of it, which parameters it concerns, the sentence."""
 
     holds: Callable[[FitResult], bool]
     parameters: tuple[str, ...]
@@ -37,7 +37,7 @@ class _Row:
 
 
 def caveats_of(fit: FitResult) -> tuple[Caveat, ...]:
-    """The rows of the table that hold for a fit, with those of its parameters they concern."""
+    """The rows of the table that hold for a fit, with the parameters that they concern."""
     names = [parameter.name for parameter in (*fit.parameters, *fit.derived)]
     found = []
     for row in _ROWS:
@@ -48,7 +48,7 @@ def caveats_of(fit: FitResult) -> tuple[Caveat, ...]:
 
 
 def caveats_by_parameter(fit: FitResult) -> Mapping[str, tuple[str, ...]]:
-    """The sentences on each parameter that has one, by its name."""
+    """The sentences by parameter, for those that have one."""
     found: dict[str, tuple[str, ...]] = {}
     for caveat in caveats_of(fit):
         for name in caveat.parameters:
@@ -75,9 +75,9 @@ def _coarse(fit: FitResult) -> bool:
 def _coarse_words(fit: FitResult) -> str:
     counts = fit.diagnostics["counts_per_sample"]
     return (
-        f"{counts:.2g} encoder counts per sample: on 31 virtual days with so few, 90 % intervals "
-        "held force and exponent in 27 each, fracture energy and kappa in 28 and 29. Use a finer "
-        "encoder."
+        f"{counts:.2g} encoder counts per sample are few: on 31 simulated days with fewer than 1, "
+        "the 90 % intervals contained force and exponent 27 times each, fracture energy 28 and "
+        "kappa 29 times. Use a finer encoder."
     )
 
 
@@ -88,9 +88,9 @@ def _long_windows(fit: FitResult) -> bool:
 def _long_windows_words(fit: FitResult) -> str:
     times = float(fit.diagnostics["window_lengthening"])
     return (
-        f"{times:.2g} times longer windows were needed, because the encoder is coarse: on 20 "
-        "virtual days with such windows 90 % intervals held the inertia in 17, the Stribeck level "
-        "in 10 and its speed in 13. Use a finer encoder."
+        f"The windows are {times:.2g} times longer because the encoder is coarse: on 20 simulated "
+        "days with such windows, the 90 % intervals contained the inertia 17 times, the Stribeck "
+        "level 10 and its speed 13 times. Use a finer encoder."
     )
 
 
@@ -100,16 +100,16 @@ def _no_line(fit: FitResult) -> bool:
 
 def _no_line_words(_: FitResult) -> str:
     return (
-        "No line of the teeth is believed, so kappa is near its prior and fracture energy trades "
-        "against it. Capture slower strokes, at two speeds at least."
+        "No spectral line of the teeth was accepted, so kappa stays near its prior and is "
+        "correlated with the fracture energy. Capture slower strokes, at two or more speeds."
     )
 
 
 def _spline_words(fit: FitResult) -> str:
     deepest = 1e3 * float(max(fit.structure["response_knots_m"]))
     return (
-        f"{deepest:.2g} mm is the deepest indentation in the data: beyond it a spline's band is "
-        "its continuation's, and too narrow. Press as deep as the scene does."
+        f"{deepest:.2g} mm is the deepest indentation in the data: beyond it the spline "
+        "extrapolates, and its band is too narrow. Press as deep as the scene does."
     )
 
 

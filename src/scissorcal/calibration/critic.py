@@ -12,7 +12,8 @@ from scissorcal.calibration.candidates import is_positive
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.result import Proposal
 from scissorcal.inference import gradient, ljung_box
-from scissorcal.model.terms import TERMS, Motion, Term, evaluate
+from scissorcal.model.friction_terms import TERMS, evaluate
+from scissorcal.model.terms import Motion, Term
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]

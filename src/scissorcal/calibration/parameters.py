@@ -1,47 +1,31 @@
-"""Parameters between people and the sampler: names, units, transforms, priors."""
+"""Parameters of a fit: names, units, transforms, priors, and summaries of their draws."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.result import FittedParameter
+from scissorcal.model.transforms import Transform
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter with its prior: normal in u, where u = x, log(x) or log(x / (1 - x)).
+    """One parameter with its prior: normal in u, where its value is ``transform.natural(u)``.
 
-    ``mean`` and ``sd`` are the prior's in u. ``believed`` marks what other measurements have told
-    already: these data need not narrow it.
+    ``mean`` and ``sd`` are the prior's in u. ``believed`` marks a prior from other measurements:
+    these data need not narrow it.
     """
 
     name: str
     unit: str
-    transform: Literal["identity", "log", "logit"]
+    transform: Transform
     mean: float
     sd: float
     meaning: str
     believed: bool = False
-
-    def natural(self, u: Array) -> Array:
-        """Values in the parameter's own unit from unconstrained ones, any shape."""
-        if self.transform == "log":
-            return np.exp(u)
-        if self.transform == "logit":
-            return np.asarray(1.0 / (1.0 + np.exp(-u)))
-        return np.asarray(u)
-
-    def unconstrained(self, x: Array) -> Array:
-        """Unconstrained values from those in the parameter's unit, any shape."""
-        if self.transform == "log":
-            return np.log(x)
-        if self.transform == "logit":
-            return np.asarray(np.log(x) - np.log1p(-x))
-        return np.asarray(x)
 
 
 @dataclass(frozen=True)
@@ -65,7 +49,7 @@ class Layout:
     def natural(self, u: Array) -> dict[str, Array]:
         """Values by name from unconstrained points of shape (..., p)."""
         return {
-            parameter.name: parameter.natural(np.asarray(u[..., index]))
+            parameter.name: parameter.transform.natural(np.asarray(u[..., index]))
             for index, parameter in enumerate(self.parameters)
         }
 
@@ -76,7 +60,7 @@ class Layout:
     def unconstrained(self, values: dict[str, float]) -> Array:
         """An unconstrained point (p,) from values by name."""
         return np.array(
-            [float(p.unconstrained(np.asarray(values[p.name]))) for p in self.parameters]
+            [float(p.transform.unconstrained(np.asarray(values[p.name]))) for p in self.parameters]
         )
 
     def fitted(self, u_draws: Array) -> tuple[FittedParameter, ...]:

@@ -1,7 +1,7 @@
 """Log density of each stroke by a posterior that has not seen it, by importance sampling."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,9 @@ al. 2024, JMLR 25:72, section 3.2.4)."""
 class LeftOut:
     """Log density (strokes,) of each stroke without it, and the tail index k-hat of its weights.
 
-    ``evaluations`` counts those of the likelihood.
+    ``evaluations`` counts those of the likelihood. ``densities`` (draws, strokes) are
+    log-likelihoods at draws whose posterior weights have the logarithms ``log_weights`` (draws,);
+    both are empty where no draw could be used.
 
     Densities count all bins in full; who compares them multiplies by the share of bins that are
     independent.
@@ -34,6 +36,8 @@ class LeftOut:
     scores: Array
     k_hats: Array
     evaluations: int = 0
+    densities: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    log_weights: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def reliable(self) -> NDArray[np.bool_]:
@@ -91,7 +95,8 @@ def leave_strokes_out(
     _, every, tempered = min(tried, key=lambda one: one[0])
     weights, k_hats = _smoothed((every[:, None] - tempered).T)
     scores = np.asarray(logsumexp(weights + tempered.T, axis=1)) / share
-    return LeftOut(scores, k_hats, counter.calls)
+    whole, _ = _smoothed(every[None, :])
+    return LeftOut(scores, k_hats, counter.calls, tempered / share, whole[0])
 
 
 def _inverse(precision: Array) -> Array:

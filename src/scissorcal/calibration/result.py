@@ -1,24 +1,80 @@
-"""What a fit ends in: posterior draws, parameters as people read them, diagnostics, verdicts."""
+"""What a fit results in: posterior draws, parameters, diagnostics, verdicts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.verdicts import Verdict, failed
 
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Effort = Literal["draft", "standard", "thorough"]
 
 
 @dataclass(frozen=True)
-class FittedParameter:
-    """One parameter with its marginal posterior, in the unit that stands beside it.
+class Stored:
+    """Where :mod:`scissorcal.calibration.store` writes an array: the annotation of a field.
 
-    ``believed`` marks what another measurement told before, as photographs tell the edge.
+    ``dims`` names the dimensions; a leading "chain" of length one is added to the array. ``group``
+    is the netCDF group, below the object's own unless it begins with "/"; ``name`` is the
+    variable's, by default the field's. ``columns`` is an attribute of the same object that names
+    the columns of the array's last axis: each column becomes a variable over ``dims``.
+    """
+
+    dims: tuple[str, ...]
+    group: str = ""
+    name: str = ""
+    columns: str = ""
+
+
+def by_name(group: str, columns: str) -> Stored:
+    """Draws (n, k) as ArviZ reads them: a variable (chain, draw) for each named column."""
+    return Stored(("chain", "draw"), group, columns=columns)
+
+
+class Result:
+    """What every stored result has, and a short ``repr``.
+
+    ``title`` names the kind of result in messages, ``command`` computes it again. ``what`` names
+    the quantity, ``inputs_hash`` identifies all that the result depends on. Where a result has
+    them, ``effort``, ``rung`` (the chosen candidate model), ``rungs``, ``verdicts``, ``sources``
+    and ``notes`` are fields. Subclasses are frozen dataclasses with ``repr=False``; the store
+    writes their fields as they are annotated.
+    """
+
+    title: ClassVar[str] = "fit"
+    command: ClassVar[str] = "scissorcal fit"
+    what: str
+    inputs_hash: str
+
+    @property
+    def model(self) -> str:
+        """The chosen candidate model in words; empty where there is only one model."""
+        return str(getattr(self, "rung", ""))
+
+    @property
+    def rejected(self) -> tuple[Verdict, ...]:
+        """The verdicts that forbid to use this result: all that failed."""
+        verdicts: tuple[Verdict, ...] = getattr(self, "verdicts", ())
+        return failed(verdicts)
+
+    def __repr__(self) -> str:
+        words = [self.what, self.model, str(getattr(self, "effort", ""))]
+        bad = ", ".join(verdict.check for verdict in self.rejected)
+        words.append(f"failed: {bad}" if bad else "no check failed")
+        return f"<{type(self).__name__} {'; '.join(word for word in words if word)}>"
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter with its marginal posterior, in ``unit``.
+
+    ``believed`` marks a prior from another measurement, such as photographs of the edge.
     ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
-    speak, near 1 the prior does.
+    determine the parameter, near 1 the prior does.
     """
 
     name: str
@@ -48,9 +104,9 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class StrokeError:
-    """Error on one stroke by a fit that had not seen it.
+    """Hold-out error: one stroke as predicted by a fit without it.
 
-    ``rms`` and ``relative_rms`` (``rms`` over the rms of what all strokes measured) are taken on
+    ``rms`` and ``relative_rms`` (``rms`` over that of the measured effort of all strokes) are of
     the band-limited samples that the likelihood uses.
     """
 
@@ -62,37 +118,41 @@ class StrokeError:
     relative_rms: float
 
 
+_CONSTANT = Stored(("point",), "/constant_data")
+_PREDICTED = Stored(("point",), "/posterior_predictive")
+
+
 @dataclass(frozen=True)
 class FitSeries:
-    """Band-limited data against the fitted model, for plots: all arrays have shape (n,).
+    """Band-limited data and the fitted model, for plots: all arrays have shape (n,).
 
-    ``time_s`` restarts at every recording; ``recording`` and ``stroke`` index what a point came
-    from. ``measured``, ``predicted``, ``band_low`` and ``band_high`` (5 % and 95 % of the
-    posterior of the mean) are torque in N m (force in N for a linear joint), signed as the
-    quantity that was fitted.
+    ``time_s`` restarts at every recording; ``recording`` and ``stroke`` are the indices of a
+    point's recording and stroke. ``measured``, ``predicted``, ``band_low`` and ``band_high`` (5 %
+    and 95 % of the posterior of the mean) are torque in N m (force in N for a linear joint), with
+    the sign of the quantity that was fitted.
     """
 
-    time_s: NDArray[np.float64]
-    recording: NDArray[np.int64]
-    stroke: NDArray[np.int64]
-    opening: NDArray[np.float64]
-    opening_rate: NDArray[np.float64]
-    contact: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    band_low: NDArray[np.float64]
-    band_high: NDArray[np.float64]
+    time_s: Annotated[Array, _CONSTANT]
+    recording: Annotated[Integers, _CONSTANT]
+    stroke: Annotated[Integers, _CONSTANT]
+    opening: Annotated[Array, _CONSTANT]
+    opening_rate: Annotated[Array, _CONSTANT]
+    contact: Annotated[Array, _CONSTANT]
+    measured: Annotated[Array, Stored(("point",), "/observed_data", "torque")]
+    predicted: Annotated[Array, _PREDICTED]
+    band_low: Annotated[Array, _PREDICTED]
+    band_high: Annotated[Array, _PREDICTED]
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A term that the critic found in what a law leaves unexplained. It proposes; people decide.
+    """A term that the critic found in the residuals, as a proposal for the model.
 
-    The law would gain ``coefficient`` (``unit``, standard deviation ``coefficient_sd``) times the
-    term ``name``, whose ``formula`` is in words. ``inclusion`` is the share of resamples of whole
-    strokes in which the search found it; ``held_out_gain`` the share by which it lowers the rms
-    error on unseen strokes, ``held_out_nats`` what that is in log density, independent bins only.
-    ``adopted_by`` is the recipe's line that takes it into the law; empty where there is none.
+    The term ``name`` (``formula`` in words) has a ``coefficient`` in ``unit`` with the standard
+    deviation ``coefficient_sd``. ``inclusion`` is the share of resamples of whole strokes in which
+    the search found it, ``held_out_gain`` the share by which it lowers the rms hold-out error,
+    ``held_out_nats`` its gain in log density, independent points only. ``adopted_by`` is the line
+    of the recipe that adds it to the model; empty where there is none.
     """
 
     name: str
@@ -109,14 +169,14 @@ class Proposal:
 
 @dataclass(frozen=True)
 class ReplayRow:
-    """One stroke that neither side had seen: what a replay and what the model make of it.
+    """One stroke that neither the replay nor the fit has used, as predicted by both.
 
-    ``novelty`` says in what the stroke differs from the replayed one: "speed", "contact" (where
-    along the blades the material is met), "place" (where in the material), joined by " + ", or
-    "none". Errors are rms in the unit of the measured effort, over the share ``covered`` of the
-    stroke that lies within the replay's range of opening. ``model_rms`` is of a fit that had not
-    seen the stroke; ``one_stroke_rms`` of the same law fitted to the replayed stroke alone, NaN
-    where that was not done.
+    ``novelty`` names the differences from the replayed stroke: "speed", "contact" (position of the
+    material along the blades), "place" (position in the material), joined by " + ", or "none".
+    Errors are rms in the unit of the measured effort, over the share ``covered`` of the stroke
+    within the replay's range of opening. ``model_rms`` is of a fit without the stroke,
+    ``one_stroke_rms`` of the same model fitted to the replayed stroke alone, NaN where that was
+    not done.
     """
 
     stroke: int
@@ -132,39 +192,70 @@ class ReplayRow:
 
 @dataclass(frozen=True)
 class ReplayComparison:
-    """The model against record-and-replay of the stroke ``stroke`` of ``recording``.
+    """The model compared with record-and-replay of the stroke ``stroke`` of ``recording``.
 
-    ``opening`` and ``torque`` (k,) are the replay's table; ``sentence`` sums it up.
+    ``opening`` and ``torque`` (k,) are the replay's table; ``sentence`` is the summary.
     """
 
     stroke: int
     recording: str
     kind: str
     speed: float
-    opening: NDArray[np.float64]
-    torque: NDArray[np.float64]
+    opening: Annotated[Array, Stored(("opening",))]
+    torque: Annotated[Array, Stored(("opening",))]
     rows: tuple[ReplayRow, ...]
     sentence: str
 
 
 @dataclass(frozen=True)
-class FitResult:
+class Predictive:
+    """Replicated data and log-likelihoods, which ``arviz.plot_ppc`` and ``arviz.loo`` read.
+
+    ``torque`` (replicates, n) is what the model would measure at the points of
+    :class:`FitSeries`: the mean by a draw of the posterior, and a draw of the noise. ``stroke``
+    (strokes,) labels the log-likelihoods: whole strokes are the independent units.
+    ``log_likelihood`` (draws, strokes) is the chosen candidate's, ``candidate_log_likelihoods``
+    (draws, strokes, candidates) those of all that were compared; None at draft effort. They are
+    multiplied by ``independent_share``, the share of points that are independent, the same for all
+    candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
+    largest value, since their level depends on the unit of torque. Their draws are those of a
+    posterior whose likelihood is taken to such a power
+    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`), not the rows of ``posterior``.
+    """
+
+    torque: Annotated[
+        NDArray[np.float32], Stored(("chain", "draw", "point"), "/posterior_predictive")
+    ]
+    stroke: Annotated[Integers, Stored(("stroke",), "/log_likelihood")]
+    log_likelihood: Annotated[
+        Array | None, Stored(("chain", "draw", "stroke"), "/log_likelihood", "torque")
+    ]
+    log_likelihood_reference: Annotated[Array, Stored(("stroke",), "/reference", "log_likelihood")]
+    independent_share: float
+    candidates: tuple[str, ...] = ()
+    candidate_log_likelihoods: Annotated[
+        Array | None, Stored(("chain", "draw", "stroke"), "/candidates", columns="candidates")
+    ] = None
+
+
+@dataclass(frozen=True, repr=False)
+class FitResult(Result):
     """The result of one fit: the same type for friction and for a cut.
 
-    ``what`` is "friction" or "cut". ``rung`` names the chosen law in words ("coulomb + viscous,
-    asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the law (read
-    back by the package compiler). ``draws`` has shape (draws, parameters) in SI, columns in the
-    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the rungs that
-    were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
+    ``what`` is "friction" or "cut". ``rung`` names the chosen candidate model in words ("coulomb +
+    viscous, asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the
+    model (the package compiler reads them). ``draws`` (draws, parameters) are in SI, columns in the
+    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the candidates
+    that were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
     ``held_out_score``, ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and
-    ``equivalent`` (it cannot be told from the best); ``selection`` says so in words.
-    ``critic`` holds what the critic proposes, ``replay`` the comparison with record-and-replay.
-    ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and ``nuisance_draws``
-    (draws, nuisance) are the parameters that nobody asked for, row by row with ``draws``.
-    ``derived`` follow from parameters and what the recipe states, with ``derived_draws`` (draws,
-    derived) row by row; no law needs them.
-    ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
-    ``inputs_hash`` identifies recordings, recipe and settings: equal hashes need no second fit.
+    ``equivalent`` (not distinguishable from the best); ``selection`` says so in words.
+    ``critic`` holds the terms that the critic proposes, ``replay`` the comparison with
+    record-and-replay. ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and
+    ``nuisance_draws`` (draws, nuisance) are parameters that are inferred and not reported, row by
+    row with ``draws``. ``derived`` follow from parameters and the recipe, with ``derived_draws``
+    (draws, derived) row by row; no model needs them. ``diagnostics`` are plain numbers and strings
+    (k_hat, ess, evaluations, whiteness_p, ...). ``inputs_hash`` identifies recordings, recipe and
+    settings: equal hashes need no second fit.
     """
 
     what: Literal["friction", "cut"]
@@ -172,8 +263,8 @@ class FitResult:
     rung: str
     structure: Mapping[str, Any]
     parameters: tuple[FittedParameter, ...]
-    draws: NDArray[np.float64]
-    map_point: NDArray[np.float64]
+    draws: Annotated[Array, by_name("/posterior", "parameters")]
+    map_point: Annotated[Array, Stored((), "/optimum", columns="parameters")]
     series: FitSeries
     held_out: tuple[StrokeError, ...]
     rungs: tuple[Mapping[str, Any], ...]
@@ -187,16 +278,12 @@ class FitResult:
     selection: str = ""
     critic: tuple[Proposal, ...] = ()
     replay: ReplayComparison | None = None
-    prior_draws: NDArray[np.float64] | None = None
+    prior_draws: Annotated[Array | None, by_name("/prior", "parameters")] = None
     nuisance: tuple[FittedParameter, ...] = ()
-    nuisance_draws: NDArray[np.float64] | None = None
+    nuisance_draws: Annotated[Array | None, by_name("/nuisance_posterior", "nuisance")] = None
     derived: tuple[FittedParameter, ...] = ()
-    derived_draws: NDArray[np.float64] | None = None
-
-    @property
-    def rejected(self) -> tuple[Verdict, ...]:
-        """The verdicts that forbid to use this fit as a calibration: all that failed."""
-        return failed(self.verdicts)
+    derived_draws: Annotated[Array | None, by_name("/derived_posterior", "derived")] = None
+    predictive: Predictive | None = None
 
     def parameter(self, name: str) -> FittedParameter:
         """Return the parameter called ``name``; KeyError if this fit has none."""

@@ -1,258 +1,356 @@
-"""Fits on disk: netCDF in the ArviZ schema, readable without this project."""
+"""One store for every result of a fit: a netCDF file that ArviZ, xarray and h5py read.
 
+A file is derived from the result's dataclass. Arrays become variables with named dimensions
+(:class:`~scissorcal.calibration.result.Stored` says where); all else is JSON in the root attribute
+``scissorcal``, in which ``{"variable": path}`` stands for an array. The file ends with its SHA-256,
+after the netCDF data, so that damage is found before anything is read. Equal results give equal
+bytes. A result without arrays may be kept as plain JSON, in a file that ends in ``.json``.
+"""
+
+import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import cache
+from io import BytesIO
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import NoneType, UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import (
-    FitResult,
-    FitSeries,
-    FittedParameter,
-    Proposal,
-    ReplayComparison,
-    ReplayRow,
-    StrokeError,
-)
+from scissorcal.calibration.result import FitResult, Result, Stored
 from scissorcal.errors import InputError
-from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
     import h5netcdf
     import h5py
 
-Array = NDArray[np.float64]
-Row = TypeVar("Row")
+R = TypeVar("R", bound=Result)
 
-FORMAT = "scissorcal-fit/2"
-READABLE = ("scissorcal-fit/1", FORMAT)
-"""Files of before lack what came later, which is then empty."""
+FORMAT = "scissorcal-result/1"
+EARLIER = ("scissorcal-fit/1", "scissorcal-fit/2")
+"""Formats of earlier versions, which are refused: the fit is made again."""
+COMPRESSED_BYTES = 4096
+"""Size from which an array is compressed."""
+_SEAL = b"\nscissorcal sha256 "
+_SEAL_SIZE = len(_SEAL) + 64 + 1
 
 
-def save_fit(result: FitResult, path: Path) -> None:
-    """Write a fit to ``path``, complete or not at all.
+@dataclass(frozen=True)
+class Header:
+    """What a stored result is of: enough for its state, without its arrays.
 
-    Group ``posterior`` has every parameter over (chain, draw) as ArviZ expects it;
-    ``prior`` draws of the prior where there are any, ``nuisance_posterior`` the draws of nuisance
-    parameters, ``derived_posterior`` those of what follows from parameters, ``observed_data`` the
-    band-limited data, ``constant_data`` what belongs to each point, ``posterior_predictive`` the
-    mean's 5 % and 95 %. All else stands as JSON in the attribute ``scissorcal`` of ``posterior``.
+    ``model`` is the chosen candidate model in words, ``failed`` names the checks that failed,
+    ``origin`` is "fitted" or "imported"; ``effort`` is empty where a result has none.
     """
+
+    what: str
+    effort: str
+    model: str
+    inputs_hash: str
+    failed: tuple[str, ...]
+    origin: str = "fitted"
+
+
+def save(result: Result, path: Path) -> None:
+    """Write a result to ``path``, complete or not at all."""
+    writer = _Writer()
+    tree = writer.tree(result, "", None)
+    if path.suffix == ".json":
+        text = json.dumps(tree, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+        content = text.encode() + b"\n"
+    else:
+        data = _netcdf(result, tree, writer.variables)
+        content = data + _seal(data)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    with part.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+
+
+def load(path: Path, kind: type[R]) -> R:
+    """Read a result of type ``kind`` that :func:`save` wrote.
+
+    Raises InputError where the file is missing, damaged, of another kind or another version.
+    """
+    with _reported(path, kind):
+        if path.suffix == ".json":
+            return cast(R, _built(kind, json.loads(path.read_bytes()), None))
+        with _opened(path, kind) as file:
+            if file.attrs["kind"] != kind.__name__:
+                raise ValueError(f"it holds a {file.attrs['kind']}")
+            return cast(R, _built(kind, json.loads(file.attrs["scissorcal"]), file))
+
+
+def load_fit(path: Path) -> FitResult:
+    """Read a fit of friction or of a cut; see :func:`load`."""
+    return load(path, FitResult)
+
+
+def read_header(path: Path) -> Header:
+    """Read what a stored result is of; raises InputError as :func:`load` does."""
+    with _reported(path, Result), _opened(path, Result) as file:
+        return cast(Header, _built(Header, json.loads(file.attrs["header"]), None))
+
+
+@contextmanager
+def _reported(path: Path, kind: type[Result]) -> Iterator[None]:
+    """Turn what goes wrong within into an InputError that names the file and the remedy."""
+    try:
+        yield
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(
+            f"{path} is not a {kind.title} of scissorcal, or it is damaged ({why}): remove it and "
+            f"run '{kind.command}' again."
+        ) from error
+
+
+@contextmanager
+def _opened(path: Path, kind: type[Result]) -> "Iterator[h5py.File]":
+    """The netCDF data of a file whose hash and version are right."""
+    import h5py
+
+    content = path.read_bytes()
+    data, seal = content[:-_SEAL_SIZE], content[-_SEAL_SIZE:]
+    if seal != _seal(data):
+        for version in EARLIER:
+            if version.encode() in content:
+                raise InputError(
+                    f"{path} was written by an earlier version of scissorcal ({version}), which "
+                    f"this version does not read: remove it and run '{kind.command}' again."
+                )
+        raise ValueError("its SHA-256 does not match its content")
+    with h5py.File(BytesIO(data), "r") as file:
+        if file.attrs["format"] != FORMAT:
+            raise ValueError(f"its format is {file.attrs['format']}, and this reads {FORMAT}")
+        yield file
+
+
+def _seal(data: bytes) -> bytes:
+    return _SEAL + hashlib.sha256(data).hexdigest().encode() + b"\n"
+
+
+def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> bytes:
     import h5netcdf
 
-    part = path.with_name(path.name + ".part")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with h5netcdf.File(part, "w") as file:
-        for name, group in _groups(result).items():
-            _write_group(file.create_group(name), group)
-        file["posterior"].attrs.update(
+    header = Header(
+        what=result.what,
+        effort=str(getattr(result, "effort", "")),
+        model=result.model,
+        inputs_hash=result.inputs_hash,
+        failed=tuple(verdict.check for verdict in result.rejected),
+        origin=str(getattr(result, "origin", "fitted")),
+    )
+    stream = BytesIO()
+    with h5netcdf.File(stream, "w") as file:
+        for at, variable in variables.items():
+            _write(file, at, variable)
+        file.attrs.update(
             format=FORMAT,
+            kind=type(result).__name__,
+            header=json.dumps(asdict(header)),
+            scissorcal=json.dumps(tree),
             inference_library="scissorcal",
-            scissorcal=json.dumps(_facts(result), allow_nan=True),
         )
-    part.replace(path)
+    return stream.getvalue()
 
 
 @dataclass(frozen=True)
 class _Variable:
-    """An array with the names of its dimensions; a coordinate is named as its dimension."""
-
-    dimensions: tuple[str, ...]
+    dims: tuple[str, ...]
     values: NDArray[Any]
-    attributes: Mapping[str, str] = field(default_factory=dict)
+    attributes: Mapping[str, str]
 
 
-def _write_group(group: "h5netcdf.Group", variables: Mapping[str, _Variable]) -> None:
-    for variable in variables.values():
-        for dimension, size in zip(variable.dimensions, variable.values.shape, strict=True):
-            if dimension not in group.dimensions:
-                group.dimensions[dimension] = size
-    for name, variable in variables.items():
-        written = group.create_variable(name, variable.dimensions, data=variable.values)
-        written.attrs.update(variable.attributes)
+def _write(file: "h5netcdf.File", at: str, variable: _Variable) -> None:
+    """Write a variable; a dimension is taken from the nearest group that has it in this size."""
+    path, _, name = at.rpartition("/")
+    group: h5netcdf.Group = file
+    for part in filter(None, path.split("/")):
+        group = group.groups[part] if part in group.groups else group.create_group(part)
+    for dimension, size in zip(variable.dims, variable.values.shape, strict=True):
+        known = group.dimensions.get(dimension)
+        if known is None or known.size != size:
+            group.dimensions[dimension] = size
+            if dimension == "draw":
+                _write(file, f"{path}/chain", _Variable(("chain",), np.zeros(1, int), {}))
+                _write(file, f"{path}/draw", _Variable(("draw",), np.arange(size), {}))
+    packed = variable.values.nbytes >= COMPRESSED_BYTES
+    options: dict[str, Any] = {"compression": "gzip", "shuffle": True} if packed else {}
+    written = group.create_variable(name, variable.dims, data=variable.values, **options)
+    written.attrs.update(variable.attributes)
 
 
-def _draws_group(parameters: Sequence[FittedParameter], draws: Array) -> dict[str, _Variable]:
-    """Draws (n, parameters) as ArviZ names them."""
-    columns = {
-        parameter.name: _Variable(
-            ("chain", "draw"),
-            draws[None, :, index],
-            {"unit": parameter.unit, "long_name": parameter.meaning},
-        )
-        for index, parameter in enumerate(parameters)
-    }
-    return {
-        "chain": _Variable(("chain",), np.array([0])),
-        "draw": _Variable(("draw",), np.arange(len(draws))),
-        **columns,
-    }
+class _Writer:
+    """Turns a result into a JSON tree and the variables that its arrays become."""
+
+    def __init__(self) -> None:
+        self.variables: dict[str, _Variable] = {}
+
+    def tree(self, value: Any, path: str, stored: Stored | None) -> Any:
+        """The JSON of a value at ``path`` below the root."""
+        if is_dataclass(value):
+            return self._object(value, path, stored)
+        if isinstance(value, np.generic):
+            return value.item()
+        if isinstance(value, tuple | list):
+            return [self.tree(item, f"{path}/{i}", stored) for i, item in enumerate(value)]
+        if isinstance(value, Mapping):
+            return {key: self.tree(item, f"{path}/{key}", stored) for key, item in value.items()}
+        if isinstance(value, np.ndarray):
+            return self._array(value, path, stored, None)
+        return value
+
+    def _object(self, value: Any, path: str, stored: Stored | None) -> dict[str, Any]:
+        tree, kind = {}, cast(Any, type(value))
+        for name, (_, own) in _fields(kind).items():
+            item, here = getattr(value, name), own or stored
+            if isinstance(item, np.ndarray):
+                tree[name] = self._array(item, f"{path}/{name}", here, value)
+            else:
+                tree[name] = self.tree(item, f"{path}/{name}", here)
+        return tree
+
+    def _array(
+        self, values: NDArray[Any], path: str, stored: Stored | None, owner: Any
+    ) -> dict[str, Any]:
+        if values.size == 0:
+            return {"empty": list(values.shape)}
+        group, _, name = path.rpartition("/")
+        if stored is None:
+            dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
+            return {"variable": self._add(path, dims, values, {})}
+        group = stored.group if stored.group[:1] == "/" else f"{group}/{stored.group}".rstrip("/")
+        if stored.dims[:1] == ("chain",):
+            values = values[None]
+        if not stored.columns:
+            at = f"{group}/{stored.name or name}"
+            return {"variable": self._add(at, stored.dims, values, {})}
+        columns = attrgetter(stored.columns)(owner)
+        paths = [
+            self._add(
+                f"{group}/{getattr(column, 'name', column)}",
+                stored.dims,
+                values[..., index],
+                {"unit": column.unit, "long_name": column.meaning}
+                if hasattr(column, "unit")
+                else {},
+            )
+            for index, column in enumerate(columns)
+        ]
+        return {"variables": paths}
+
+    def _add(
+        self, at: str, dims: tuple[str, ...], values: NDArray[Any], attributes: Mapping[str, str]
+    ) -> str:
+        if values.dtype == np.bool_:
+            values = values.astype(np.int8)
+        self.variables[at] = _Variable(dims, values, attributes)
+        return at
 
 
-_PREDICTED = ("predicted", "band_low", "band_high")
-_CONSTANT = ("time_s", "recording", "stroke", "opening", "opening_rate", "contact")
+@cache
+def _fields(kind: Any) -> Mapping[str, tuple[Any, Stored | None]]:
+    """Type and storage of each field that a dataclass is made of."""
+    hints = get_type_hints(kind, include_extras=True)
+    found = {}
+    for one in fields(kind):
+        if one.init:
+            hint, stored = hints[one.name], None
+            if get_origin(hint) is Annotated:
+                hint, *extras = get_args(hint)
+                stored = next((extra for extra in extras if isinstance(extra, Stored)), None)
+            found[one.name] = (hint, stored)
+    return found
 
 
-def _groups(result: FitResult) -> dict[str, dict[str, _Variable]]:
-    series = result.series
-
-    def by_point(names: Sequence[str]) -> dict[str, _Variable]:
-        return {name: _Variable(("point",), getattr(series, name)) for name in names}
-
-    groups = {
-        "posterior": _draws_group(result.parameters, result.draws),
-        "observed_data": {"torque": _Variable(("point",), series.measured)},
-        "posterior_predictive": by_point(_PREDICTED),
-        "constant_data": by_point(_CONSTANT),
-    }
-    if result.prior_draws is not None:
-        groups["prior"] = _draws_group(result.parameters, result.prior_draws)
-    if result.nuisance_draws is not None and result.nuisance:
-        groups["nuisance_posterior"] = _draws_group(result.nuisance, result.nuisance_draws)
-    if result.derived_draws is not None and result.derived:
-        groups["derived_posterior"] = _draws_group(result.derived, result.derived_draws)
-    return groups
-
-
-@dataclass(frozen=True)
-class FitHeader:
-    """What a stored fit is of: enough to tell whether it is current, and what law it chose."""
-
-    what: str
-    effort: str
-    rung: str
-    inputs_hash: str
+def _built(hint: Any, value: Any, file: "h5py.File | None", stored: Stored | None = None) -> Any:
+    """A value of type ``hint`` from its JSON. Raises ValueError where it is of another type."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return value
+    if origin in (Union, UnionType):
+        return _one_of(arguments, value, file, stored)
+    if origin is Literal:
+        return value if value in arguments else _refuse(hint, value)
+    if origin is np.ndarray:
+        return _array_of(get_args(arguments[1])[0], value, file, stored)
+    if origin is tuple and isinstance(value, list):
+        kinds = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
+        pairs = zip(kinds, value, strict=True)
+        return tuple(_built(kind, item, file, stored) for kind, item in pairs)
+    if is_dataclass(hint) and isinstance(value, dict):
+        return _object_of(hint, value, file, stored)
+    if hint is float and type(value) in (int, float):
+        return float(value)
+    wanted = dict if issubclass(origin or hint, Mapping) else origin or hint
+    return value if type(value) is wanted else _refuse(hint, value)
 
 
-def load_header(path: Path) -> FitHeader:
-    """Read what a stored fit is of, without its arrays.
-
-    Raises InputError if it is no fit, damaged, or of a later version.
-    """
-    with _opened(path) as file:
-        facts = _stored_facts(path, file)
-        return FitHeader(facts["what"], facts["effort"], facts["rung"], facts["inputs_hash"])
-
-
-def load_fit(path: Path) -> FitResult:
-    """Read a fit written by :func:`save_fit`, of this version or of one before.
-
-    Raises InputError if it is no fit, damaged, or of a later version.
-    """
-    with _opened(path) as file:
-        return _result(file, _stored_facts(path, file))
-
-
-def _result(file: "h5py.File", facts: Mapping[str, Any]) -> FitResult:
-    parameters = _rows(FittedParameter, facts["parameters"])
-    nuisance = _rows(FittedParameter, facts.get("nuisance", ()))
-    derived = _rows(FittedParameter, facts.get("derived", ()))
-    arrays = {name: file["posterior_predictive"][name][...] for name in _PREDICTED}
-    arrays |= {name: file["constant_data"][name][...] for name in _CONSTANT}
-    return FitResult(
-        what=facts["what"],
-        effort=facts["effort"],
-        rung=facts["rung"],
-        structure=facts["structure"],
-        parameters=parameters,
-        draws=_read_draws(file, "posterior", parameters),
-        map_point=np.array(facts["map_point"]),
-        series=FitSeries(measured=file["observed_data"]["torque"][...], **arrays),
-        held_out=_rows(StrokeError, facts["held_out"]),
-        rungs=tuple(facts["rungs"]),
-        diagnostics=facts["diagnostics"],
-        verdicts=_rows(Verdict, facts["verdicts"]),
-        effort_unit=facts["effort_unit"],
-        position_unit=facts["position_unit"],
-        inputs_hash=facts["inputs_hash"],
-        sources=tuple(facts["sources"]),
-        notes=tuple(facts["notes"]),
-        selection=facts.get("selection", ""),
-        critic=_rows(Proposal, facts.get("critic", ())),
-        replay=_replay(facts.get("replay")),
-        prior_draws=_read_draws(file, "prior", parameters) if facts.get("has_prior") else None,
-        nuisance=nuisance,
-        nuisance_draws=_read_draws(file, "nuisance_posterior", nuisance) if nuisance else None,
-        derived=derived,
-        derived_draws=_read_draws(file, "derived_posterior", derived) if derived else None,
-    )
-
-
-@contextmanager
-def _opened(path: Path) -> "Iterator[h5py.File]":
-    """Open a stored fit; what is wrong with it is an InputError."""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            yield file
-    except (OSError, KeyError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{path} is not a fit of scissorcal, or it is damaged ({error}); "
-            "remove it and run 'scissorcal fit' again."
-        ) from error
-
-
-def _stored_facts(path: Path, file: "h5py.File") -> dict[str, Any]:
-    attributes = file["posterior"].attrs
-    facts: dict[str, Any] = json.loads(attributes["scissorcal"])
-    version = str(attributes.get("format", "of no version"))
-    if version not in READABLE:
-        raise InputError(
-            f"{path} is {version}, and this scissorcal reads {' and '.join(READABLE)}: it was "
-            "written by a later version; install that one, or run 'scissorcal fit --force'."
-        )
-    return facts
-
-
-def _read_draws(file: "h5py.File", group: str, parameters: Sequence[FittedParameter]) -> Array:
-    return np.stack([file[group][p.name][0] for p in parameters], axis=1)
-
-
-def _rows(kind: type[Row], rows: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
-    return tuple(kind(**row) for row in rows)
-
-
-def _replay(facts: dict[str, Any] | None) -> ReplayComparison | None:
-    if facts is None:
+def _one_of(
+    kinds: tuple[Any, ...], value: Any, file: "h5py.File | None", stored: Stored | None
+) -> Any:
+    if value is None and NoneType in kinds:
         return None
-    arrays = {name: np.array(facts[name], dtype=np.float64) for name in ("opening", "torque")}
-    return ReplayComparison(**{**facts, **arrays, "rows": _rows(ReplayRow, facts["rows"])})
+    for kind in kinds:
+        if kind is not NoneType:
+            try:
+                return _built(kind, value, file, stored)
+            except (ValueError, TypeError, KeyError) as error:
+                reason = error
+    raise reason
 
 
-def _facts(result: FitResult) -> dict[str, Any]:
-    return {
-        "what": result.what,
-        "effort": result.effort,
-        "rung": result.rung,
-        "structure": dict(result.structure),
-        "parameters": [asdict(parameter) for parameter in result.parameters],
-        "map_point": result.map_point.tolist(),
-        "held_out": [asdict(error) for error in result.held_out],
-        "rungs": [dict(rung) for rung in result.rungs],
-        "diagnostics": dict(result.diagnostics),
-        "verdicts": [asdict(verdict) for verdict in result.verdicts],
-        "effort_unit": result.effort_unit,
-        "position_unit": result.position_unit,
-        "inputs_hash": result.inputs_hash,
-        "sources": list(result.sources),
-        "notes": list(result.notes),
-        "selection": result.selection,
-        "critic": [asdict(proposal) for proposal in result.critic],
-        "replay": _replay_facts(result.replay),
-        "has_prior": result.prior_draws is not None,
-        "nuisance": [asdict(parameter) for parameter in result.nuisance],
-        "derived": [asdict(parameter) for parameter in result.derived],
+def _object_of(
+    kind: Any, value: dict[str, Any], file: "h5py.File | None", stored: Stored | None
+) -> Any:
+    known = _fields(kind)
+    every = {one.name for one in fields(kind)}
+    if unknown := value.keys() - every:
+        raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")
+    given = {
+        name: _built(hint, value[name], file, own or stored)
+        for name, (hint, own) in known.items()
+        if name in value
     }
+    return kind(**given)
 
 
-def _replay_facts(replay: ReplayComparison | None) -> dict[str, Any] | None:
-    if replay is None:
-        return None
-    arrays = {"opening": replay.opening.tolist(), "torque": replay.torque.tolist()}
-    return {**asdict(replay), **arrays}
+def _array_of(
+    dtype: Any, value: Any, file: "h5py.File | None", stored: Stored | None
+) -> NDArray[Any]:
+    if not isinstance(value, dict) or len(value) != 1:
+        _refuse(np.ndarray, value)
+    if "empty" in value:
+        return np.zeros(value["empty"], dtype)
+    assert file is not None
+    if "variable" in value:
+        values = file[value["variable"]][...]
+    else:
+        values = np.stack([file[at][...] for at in value["variables"]], axis=-1)
+    chained = stored is not None and stored.dims[:1] == ("chain",)
+    return np.asarray(values[0] if chained else values, dtype=dtype)
+
+
+def _refuse(hint: Any, value: Any) -> Any:
+    raise ValueError(f"{str(value)[:40]!r} is not of type {getattr(hint, '__name__', hint)}")

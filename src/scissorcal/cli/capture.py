@@ -1,13 +1,13 @@
 """``scissorcal capture``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
+import typer
 
-from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
+from scissorcal.cli.options import Device, Folder, Seed, Yes
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import ScissorcalError
 
@@ -16,17 +16,25 @@ if TYPE_CHECKING:
     from scissorcal.workday.runs.capture import Captured
     from scissorcal.workday.workspace import Workspace
 
+_PHOTOGRAPHS = "scissorcal.cli.capture_photographs"
+
 _COMMANDS = {
     "friction": ("scissorcal.cli.capture:friction", "Empty strokes, then excited motion."),
     "cut": ("scissorcal.cli.capture:cut", "Strokes through fresh material, or presses."),
-    "camera": ("scissorcal.cli.capture_camera:camera", "Photographs of the printed camera board."),
-    "blade": ("scissorcal.cli.capture_blade:blade", "Photographs of a blade on the printed mat."),
-    "plate": ("scissorcal.cli.capture_plate:plate", "Photographs of the plate's target."),
+    "camera": (
+        f"{_PHOTOGRAPHS}:camera",
+        "Photographs of the printed camera board.",
+    ),
+    "blade": (
+        f"{_PHOTOGRAPHS}:blade",
+        "Photographs of a blade on the printed mat.",
+    ),
+    "plate": (f"{_PHOTOGRAPHS}:plate", "Photographs of the plate's target."),
     "track": ("scissorcal.cli.capture_track:track", "The plate's pose, picture by picture."),
 }
 
 
-@click.group("capture", cls=LazyGroup, lazy=_COMMANDS)
+@group(_COMMANDS)
 def capture() -> None:
     """Record friction or cuts from a rig, or take in photographs.
 
@@ -38,16 +46,11 @@ def capture() -> None:
     """
 
 
-@click.command("friction")
-@device_option
-@yes_option
-@seed_option
-@workspace_option
 @command
-def friction(device: str, yes: bool, seed: int, folder: Path | None) -> Answer:
+def friction(device: Device, yes: Yes = False, seed: Seed = 0, folder: Folder = None) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
-    Nothing may lie between the blades: the motors will move them.
+    Keep the space between the blades empty: the motors move them.
 
     \b
     Example:
@@ -59,17 +62,19 @@ def friction(device: str, yes: bool, seed: int, folder: Path | None) -> Answer:
     return _capture("friction", device, hand=False, yes=yes, seed=seed, folder=folder)
 
 
-@click.command("cut")
-@device_option
-@click.option("--hand", is_flag=True, help="Motor off: a person (or the virtual hand) cuts.")
-@yes_option
-@seed_option
-@workspace_option
 @command
-def cut(device: str, hand: bool, yes: bool, seed: int, folder: Path | None) -> Answer:
+def cut(
+    device: Device,
+    hand: Annotated[
+        bool, typer.Option("--hand", help="Motor off: a person (or the virtual hand) cuts.")
+    ] = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    folder: Folder = None,
+) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
 
-    Says when to put a fresh sheet in; a virtual rig does so by itself.
+    Asks for a fresh sheet before each stroke; a virtual rig loads its own.
 
     \b
     Example:
@@ -103,7 +108,7 @@ def _capture(
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:
-            note(f"What was recorded until then is kept in {workspace.relative(path)}.")
+            note(f"The samples recorded until then are kept in {workspace.relative(path)}.")
         if isinstance(error, ScissorcalError):
             error.kept = tuple(kept)
         raise
@@ -125,7 +130,7 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
     latency = report.motion.latency
     if latency is not None:
         lines.append(
-            f"answered a frame within {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
+            f"reply to a frame: {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
             f"{latency.worst:.0f} us (worst)"
         )
     return "\n".join(lines)

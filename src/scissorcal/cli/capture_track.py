@@ -1,45 +1,45 @@
 """``scissorcal capture track``"""
 
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.options import Folder, Seed, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.workday.runs.track import TrackSummary
+    from scissorcal.calibration.plate.track import TrackSummary
 
 _SIM_FRAMES = 24
 
 
-@click.command("track")
-@click.option(
-    "--camera",
-    "source",
-    metavar="NUMBER|VIDEO|sim",
-    required=True,
-    help="A camera by its number, a video file, or sim: a rendered plate that slides.",
-)
-@click.option(
-    "--seconds",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=None,
-    help="End after this long; Ctrl-C ends it sooner, and what was tracked is kept.",
-)
-@seed_option
-@workspace_option
 @command
-def track(source: str, seconds: float | None, seed: int, folder: Path | None) -> Answer:
+def track(
+    source: Annotated[
+        str,
+        typer.Option(
+            "--camera",
+            metavar="NUMBER|VIDEO|sim",
+            help="A camera by its number, a video file, or sim: a rendered plate that slides.",
+        ),
+    ],
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            callback=positive, help="Stop after this time; Ctrl-C stops sooner. Poses are kept."
+        ),
+    ] = None,
+    seed: Seed = 0,
+    folder: Folder = None,
+) -> Answer:
     """Follow the plate's pose on a running camera or a video, picture by picture.
 
     Needs the camera's fit. Writes a line of JSON for each picture as it comes: number, time, state,
-    and the plate's pose with its covariance, in the rig's frame where that is known. A picture that
-    gives no pose is a drop-out, and its line says why.
+    and the plate's pose with its covariance, in the rig's frame where that is known. A picture
+    without a pose is a drop-out; its line says why.
 
     \b
     Example:
@@ -49,7 +49,7 @@ def track(source: str, seconds: float | None, seed: int, folder: Path | None) ->
       ...
     """
     from scissorcal.vision.live import frames_of
-    from scissorcal.workday.demo.sim_plate import render_frames
+    from scissorcal.vision.sim.sim_camera import render_frames
     from scissorcal.workday.runs.track import track_plate
 
     workspace = open_workspace(folder)

@@ -1,11 +1,11 @@
 """``scissorcal demo``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
+import typer
 
-from scissorcal.cli.options import seed_option
+from scissorcal.cli.options import Seed
 from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
 
@@ -15,32 +15,25 @@ if TYPE_CHECKING:
 _ANSWERS = {True: "yes", False: "no", None: "-"}
 
 
-@click.command("demo")
-@click.option(
-    "--folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("demo-workspace"),
-    show_default=True,
-    help="Where the demo's workspace goes; that of an earlier demo is replaced.",
-)
-@click.option(
-    "--recipe", default="paper-photographed", show_default=True, help="A built-in recipe."
-)
-@click.option(
-    "--effort",
-    type=click.Choice(["draft", "standard", "thorough"]),
-    default=None,
-    help="Effort of the fits; the recipe's if not given.",
-)
-@seed_option
 @command
 def demo(
-    folder: Path, recipe: str, effort: Literal["draft", "standard", "thorough"] | None, seed: int
+    folder: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False, help="The demo's workspace; that of an earlier demo is replaced."
+        ),
+    ] = Path("demo-workspace"),
+    recipe: Annotated[str, typer.Option(help="A built-in recipe.")] = "paper-photographed",
+    effort: Annotated[
+        Literal["draft", "standard", "thorough"] | None,
+        typer.Option(help="Effort of the fits; the recipe's if not given."),
+    ] = None,
+    seed: Seed = 0,
 ) -> Answer:
     """Run the whole day on a virtual rig: capture, fit, report, package, render.
 
-    Time is virtual, so it goes as fast as the computer does. The specimen is drawn anew for each
-    seed and never seen by the fits; at the end, truth and estimate stand side by side.
+    Time is virtual: the demo runs as fast as the computer can. Each seed draws another specimen,
+    which the fits do not see; the result compares estimates with the truth.
 
     \b
     Example:
@@ -106,11 +99,11 @@ def _text(found: "DemoResult") -> str:
         "",
         table(rows, right=[2, 3, 4, 5]),
         "",
-        f"{sum(inside)} of {len(inside)} intervals (90 %) hold the truth",
-        f"rendered torque is off by {100 * found.torque_error:.2f} % (rms over the scene)",
+        f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
+        f"rendered torque error {100 * found.torque_error:.2f} % (rms over the scene)",
         f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
         "",
-        f"look at {_shown(found.workspace / 'report' / 'report.html')}",
+        f"report: {_shown(found.workspace / 'report' / 'report.html')}",
     ]
     return "\n".join(lines)
 

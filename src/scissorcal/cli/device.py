@@ -1,18 +1,16 @@
 """``scissorcal device``"""
 
-import click
-
-from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.lazy import group
 from scissorcal.cli.output import Answer, command
 
 _COMMANDS = {
     "list": ("scissorcal.cli.device:list_", "The serial ports of this machine."),
-    "doctor": ("scissorcal.cli.doctor:doctor", "Measure port, timer and scheduler; name mends."),
+    "doctor": ("scissorcal.cli.doctor:doctor", "Measure port, timer and scheduler; name remedies."),
     "simulate": ("scissorcal.cli.simulate:simulate", "Serve a virtual rig on a pseudo-terminal."),
 }
 
 
-@click.group("device", cls=LazyGroup, lazy=_COMMANDS)
+@group(_COMMANDS)
 def device() -> None:
     """Find, check or simulate a rig.
 
@@ -24,7 +22,6 @@ def device() -> None:
     """
 
 
-@click.command("list")
 @command
 def list_() -> Answer:
     """List the serial ports of this machine.

@@ -1,25 +1,23 @@
 """``scissorcal device doctor``"""
 
-import click
+from typing import Annotated
 
-from scissorcal.cli.options import device_option, seed_option
+import typer
+
+from scissorcal.cli.options import Device, Seed
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 
-@click.command("doctor")
-@device_option
-@click.option(
-    "--seconds",
-    type=click.FloatRange(0.2, 600.0),
-    default=5.0,
-    show_default=True,
-    help="How long to listen to the rig.",
-)
-@seed_option
 @command
-def doctor(device: str, seconds: float, seed: int) -> Answer:
-    """Measure the port, the timer and the scheduler, and name the mend for what is wrong.
+def doctor(
+    device: Device,
+    seconds: Annotated[
+        float, typer.Option(min=0.2, max=600.0, help="How long to listen to the rig.")
+    ] = 5.0,
+    seed: Seed = 0,
+) -> Answer:
+    """Measure the port, the timer and the scheduler, and name the remedy for what is wrong.
 
     No motor is enabled.
 

@@ -1,31 +1,29 @@
 """``scissorcal export``"""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-import click
+import typer
 
 from scissorcal.cli.output import Answer, command
 
 
-@click.command("export")
-@click.argument("recording", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("table", type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--overwrite", is_flag=True, help="Replace TABLE where it stands already.")
-@click.option(
-    "--style",
-    type=click.Choice(["opencv", "ros"]),
-    default="opencv",
-    show_default=True,
-    help="Of a camera's file.",
-)
 @command
 def export(
-    recording: Path, table: Path, overwrite: bool, style: Literal["opencv", "ros"]
+    recording: Annotated[
+        Path, typer.Argument(dir_okay=False, help="A recording (.mcap), or fits/camera.json.")
+    ],
+    table: Annotated[Path, typer.Argument(dir_okay=False, help="The file to write.")],
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace TABLE if it exists.")
+    ] = False,
+    style: Annotated[
+        Literal["opencv", "ros"], typer.Option(help="Format of a camera's file.")
+    ] = "opencv",
 ) -> Answer:
-    """Write RECORDING as TABLE: Parquet or CSV, by its ending. Units stand in the headings.
+    """Write RECORDING as TABLE: Parquet or CSV, by its suffix. Units stand in the headings.
 
-    Where RECORDING is the camera of a workspace (fits/camera.json), write it as a camera file for
+    Where RECORDING is the camera of a workspace (fits/camera.nc), write it as a camera file for
     OpenCV (.yml, .xml) or ROS (.yaml).
 
     \b
@@ -33,10 +31,10 @@ def export(
       $ scissorcal export captures/friction-20261121T131415Z.mcap friction.parquet
       friction.parquet: 24841 rows
       ...
-      $ scissorcal export fits/camera.json camera.yaml --style ros
+      $ scissorcal export fits/camera.nc camera.yaml --style ros
       camera.yaml: camera of 640 x 480 for ROS
     """
-    if recording.suffix == ".json":
+    if recording.suffix == ".nc":
         return _export_camera(recording, table, style, overwrite)
     from scissorcal.recording import export_table, read_recording
 
@@ -52,13 +50,14 @@ def export(
 def _export_camera(
     fit: Path, file: Path, style: Literal["opencv", "ros"], overwrite: bool
 ) -> Answer:
-    from scissorcal.calibration.camera.store import load_camera
+    from scissorcal.calibration import load
+    from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.errors import InputError
     from scissorcal.vision.camera_files import write_camera_file
 
-    camera = load_camera(fit).camera
+    camera = load(fit, CameraFit).camera
     if file.exists() and not overwrite:
-        raise InputError(f"{file} is there already: name another file, or give --overwrite.")
+        raise InputError(f"{file} already exists: name another file, or give --overwrite.")
     write_camera_file(camera, file, style)
     words = "OpenCV" if style == "opencv" else "ROS"
     text = f"{file}: camera of {camera.width} x {camera.height} for {words}"

@@ -1,63 +1,87 @@
-"""``scissorcal fit``"""
+"""``scissorcal fit``: one command for each fit, and for all that the scene requires."""
 
 import time
+from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import click
+import typer
 
+from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
-from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.options import Folder, Seed, positive
+from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from scissorcal.calibration import FittedParameter
     from scissorcal.workday.runs.fit import FitOutcome
 
 GRACE_S = 180.0
 """A fit that stops at its limit still measures curvature and scores; it is ended by force later."""
 
-EffortWord = Literal["draft", "standard", "thorough"]
+_COMMANDS = {
+    "camera": ("scissorcal.cli.fit:camera", "The camera, to photographs of its board."),
+    "blade": ("scissorcal.cli.fit:blade", "The blade's edge, to photographs."),
+    "plate": ("scissorcal.cli.fit:plate", "The plate's pose, to photographs of its target."),
+    "friction": ("scissorcal.cli.fit:friction", "Friction, to recordings of empty motion."),
+    "cut": ("scissorcal.cli.fit:cut", "Response, fracture and taper, to recordings of cuts."),
+    "all": ("scissorcal.cli.fit:all_", "All that the scene requires."),
+    "log": ("scissorcal.cli.fit_history:log", "The versions of each fit."),
+    "restore": ("scissorcal.cli.fit_history:restore", "Put an earlier version back in use."),
+}
+
+_SHOWN = {
+    "camera": "scissorcal.cli.fit_camera",
+    "blade": "scissorcal.cli.fit_blade",
+    "plate": "scissorcal.cli.fit_plate",
+    "friction": "scissorcal.cli.fit_law",
+    "cut": "scissorcal.cli.fit_law",
+}
+"""Which module says what a fit found: its ``text`` for people, its ``facts`` for ``--json``."""
+
+_EXAMPLES = {
+    "camera": "camera: 2000 x 1500, 15 photographs of the camera board, k1, k2, p1, p2",
+    "blade": "blade: arc, 74.92 mm long, 3 photographs",
+    "plate": "plate: 5 photographs of the plate board, rms 0.03 px",
+    "friction": "friction: stribeck + angle, symmetric (standard)",
+    "cut": "cut: power response, rippled fracture (standard)",
+    "all": "friction: stribeck + angle, symmetric (standard)",
+}
+"""What the help of each command shows as its first line of output."""
+
+Effort = Annotated[
+    Literal["draft", "standard", "thorough"] | None,
+    typer.Option(
+        help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of "
+        "walkers, continues where it was interrupted. The recipe's if not given."
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Fit again even where nothing changed.")]
+MaxMinutes = Annotated[
+    float,
+    typer.Option(
+        callback=positive,
+        help="Time after which each fit stops with the result it has; it is then unfinished.",
+    ),
+]
 
 
-@click.command("fit")
-@click.argument(
-    "what", type=click.Choice(["friction", "cut", "camera", "blade", "plate", "all"]), default="all"
-)
-@click.option(
-    "--effort",
-    type=click.Choice(["draft", "standard", "thorough"]),
-    default=None,
-    help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of walkers, "
-    "goes on where it was interrupted. The recipe's if not given.",
-)
-@click.option("--force", is_flag=True, help="Fit again even where nothing changed.")
-@click.option(
-    "--max-minutes",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=10.0,
-    show_default=True,
-    help="Time after which each fit ends with what it has, and says that it is not finished.",
-)
-@seed_option
-@workspace_option
+@group(_COMMANDS, runs_alone=True)
 @command
 def fit(
-    what: Literal["friction", "cut", "camera", "blade", "plate", "all"],
-    effort: EffortWord | None,
-    force: bool,
-    max_minutes: float,
-    seed: int,
-    folder: Path | None,
+    effort: Effort = None,
+    force: Force = False,
+    max_minutes: MaxMinutes = 10.0,
+    seed: Seed = 0,
+    folder: Folder = None,
 ) -> Answer:
     """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
 
-    A fit whose recordings, photographs and settings have not changed is not done again. Camera
-    and plate have one effort. How long it took and the time left are shown; no fit goes on for
-    more than --max-minutes (a stage that is under way is brought to its end).
+    A fit whose recordings, photographs and settings are unchanged is not repeated. --effort does
+    not apply to camera and plate. Each fit shows the time used and left, and stops after
+    --max-minutes (the stage that is running is finished first). The result that was there is kept:
+    'scissorcal fit log' lists the versions.
 
     \b
     Example:
@@ -70,182 +94,102 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
+    return _run((), folder, effort, force, max_minutes, seed)
+
+
+def _command_of(*wanted: str) -> Callable[..., None]:
+    """Make the command that fits one thing; it has the options of ``fit``."""
+
+    def fit_one(
+        effort: Effort = None,
+        force: Force = False,
+        max_minutes: MaxMinutes = 10.0,
+        seed: Seed = 0,
+        folder: Folder = None,
+    ) -> Answer:
+        return _run(wanted, folder, effort, force, max_minutes, seed)
+
+    what = wanted[0] if wanted else "all"
+    fit_one.__doc__ = f"""{_COMMANDS[what][1]} See 'scissorcal fit --help'.
+
+    \b
+    Example:
+      $ scissorcal fit {what}
+      {_EXAMPLES[what]}
+      ...
+    """
+    return command(fit_one)
+
+
+camera = _command_of("camera")
+blade = _command_of("blade")
+plate = _command_of("plate")
+friction = _command_of("friction")
+cut = _command_of("cut")
+all_ = _command_of()
+
+
+def _run(
+    wanted: Sequence[str],
+    folder: Path | None,
+    effort: Literal["draft", "standard", "thorough"] | None,
+    force: bool,
+    max_minutes: float,
+    seed: int,
+) -> Answer:
+    from scissorcal.workday.engine import Engine
+    from scissorcal.workday.runs.fit import fit_step, steps_to_fit
+
+    engine = Engine.of(open_workspace(folder))
     limit_s = 60.0 * max_minutes
-    if what == "camera" or what == "blade" or what == "plate":
-        return _geometry(what, folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
-    if what == "all":
-        from scissorcal.recipe.requirements import requirements
-
-        needed = requirements(open_workspace(folder).recipe()).geometry
-        before = [
-            (
-                item.name,
-                _geometry(
-                    item.name, folder, effort=effort, seed=seed, force=force, limit_s=limit_s
-                ),
+    outcomes = []
+    for step in steps_to_fit(engine, wanted):
+        ends_s = time.monotonic() + limit_s
+        with progress(limit_s, grace_s=GRACE_S) as tell:
+            outcome = fit_step(
+                engine,
+                step,
+                effort=effort,
+                seed=seed,
+                force=force and (not wanted or step.what in wanted),
+                progress=tell,
+                stop=lambda ends_s=ends_s: time.monotonic() > ends_s,  # type: ignore[misc]
             )
-            for item in needed
-        ]
-        last = _fits((), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
-        return _together(before, last)
-    return _fits((what,), folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
+        outcomes.append(outcome)
+    return _answer(outcomes)
 
 
-def _geometry(
-    what: str,
-    folder: Path | None,
-    *,
-    effort: EffortWord | None,
-    seed: int,
-    force: bool,
-    limit_s: float,
-) -> Answer:
-    if what == "camera":
-        from scissorcal.cli.fit_camera import fit_camera
+def _answer(outcomes: "Sequence[FitOutcome]") -> Answer:
+    """One answer of all fits: laws with their parameters, what photographs gave by its name."""
+    from scissorcal.cli.fit_law import parameter_facts
 
-        return fit_camera(folder, seed=seed, force=force, limit_s=limit_s)
-    if what == "blade":
-        from scissorcal.cli.fit_blade import fit_blade
-
-        return fit_blade(folder, effort=effort, seed=seed, force=force, limit_s=limit_s)
-    from scissorcal.cli.fit_plate import fit_plate
-
-    return fit_plate(folder, force=force)
-
-
-def _together(before: "list[tuple[str, Answer]]", last: Answer) -> Answer:
-    """One answer of several; what geometry's fits found stands below their names."""
-    answers = [answer for _, answer in before] + [last]
-    return Answer(
-        {**last.result, "geometry": {name: answer.result for name, answer in before}},
-        "\n\n".join(answer.text for answer in answers),
-        verdicts=[verdict for answer in answers for verdict in answer.verdicts],
-        files=[file for answer in answers for file in answer.files],
-    )
-
-
-def _fits(
-    wanted: "tuple[Literal['friction', 'cut'], ...]",
-    folder: Path | None,
-    *,
-    effort: EffortWord | None,
-    seed: int,
-    force: bool,
-    limit_s: float,
-) -> Answer:
-    from scissorcal.workday.runs.fit import fit_workspace
-
-    ends_s = time.monotonic() + limit_s
-    with progress(limit_s, grace_s=GRACE_S) as tell:
-        outcomes = fit_workspace(
-            open_workspace(folder),
-            wanted,
-            effort=effort,
-            seed=seed,
-            force=force,
-            progress=tell,
-            stop=lambda: time.monotonic() > ends_s,
-        )
-    fits = [
-        {
-            "what": outcome.what,
-            "cached": outcome.cached,
-            "rung": outcome.result.rung,
-            "parameters": [parameter.name for parameter in outcome.result.parameters],
-            "effort": outcome.result.effort,
-            "calibration": not outcome.result.rejected,
-            "verified": outcome.verified,
-            "rungs": outcome.result.rungs,
-            "selection": outcome.result.selection,
-            "critic": outcome.result.critic,
-            "replay": outcome.result.replay,
-            "diagnostics": outcome.result.diagnostics,
-            "held_out": outcome.result.held_out,
-            "inputs_hash": outcome.result.inputs_hash,
-            "notes": outcome.result.notes,
+    laws = [outcome for outcome in outcomes if outcome.what in ("friction", "cut")]
+    seen = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
+    result: dict[str, object] = {}
+    if laws:
+        passed = [outcome for outcome in laws if not outcome.result.rejected]
+        result = {
+            "parameters": [row for outcome in passed for row in parameter_facts(outcome)],
+            "not_a_calibration": {o.what: parameter_facts(o) for o in laws if o not in passed},
+            "fits": [_shown(outcome).facts(outcome) for outcome in laws],
+            "geometry": seen,
         }
-        for outcome in outcomes
-    ]
-    result = {
-        "parameters": [
-            row
-            for outcome in outcomes
-            for row in _parameter_facts(outcome)
-            if not outcome.result.rejected
-        ],
-        "not_a_calibration": {
-            outcome.what: _parameter_facts(outcome)
-            for outcome in outcomes
-            if outcome.result.rejected
-        },
-        "fits": fits,
-    }
+    elif len(seen) == 1:
+        (result,) = seen.values()
+    else:
+        result = {"geometry": seen}
     return Answer(
         result,
-        "\n\n".join(_text(outcome) for outcome in outcomes),
-        verdicts=[verdict for outcome in outcomes for verdict in outcome.result.verdicts],
-        files=[outcome.path for outcome in outcomes if not outcome.cached],
+        "\n\n".join(_shown(outcome).text(outcome) for outcome in outcomes),
+        verdicts=[verdict for outcome in outcomes for verdict in outcome.verdicts],
+        files=[
+            file
+            for outcome in outcomes
+            if not outcome.cached
+            for file in (outcome.path, *outcome.pictures)
+        ],
     )
 
 
-def _text(outcome: "FitOutcome") -> str:
-    fitted = outcome.result
-    head = f"{outcome.what}: {fitted.rung} ({fitted.effort})"
-    if outcome.cached:
-        head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
-    if fitted.rejected:
-        reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
-        shown = _shown(outcome).replace("\n", "\n  ")
-        return (
-            f"{outcome.what}: not a calibration:\n{reasons}\n"
-            f"{head}; the search ended with these numbers, which are not to be used:\n  {shown}"
-        )
-    said = [head, _shown(outcome), fitted.selection]
-    said += [proposal.sentence for proposal in fitted.critic]
-    said += [fitted.replay.sentence] if fitted.replay else []
-    if not outcome.verified:
-        said.append(
-            f"unverified: 'scissorcal verify {outcome.what}' checks whether these intervals hold."
-        )
-    return "\n".join(line for line in said if line)
-
-
-def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
-    return (*outcome.result.parameters, *outcome.result.derived)
-
-
-def _parameter_facts(outcome: "FitOutcome") -> list[dict[str, object]]:
-    """Parameters as ``--json`` prints them, each with what is known to be poor about it."""
-    from scissorcal.calibration.caveats import caveats_by_parameter
-
-    known = caveats_by_parameter(outcome.result)
-    return [
-        {**parameter.as_dict(), "caveats": list(known.get(parameter.name, ()))}
-        for parameter in _reported(outcome)
-    ]
-
-
-def _shown(outcome: "FitOutcome") -> str:
-    """The table of parameters, and below it which of their intervals are known to be poor."""
-    from scissorcal.calibration.caveats import caveats_of
-
-    known = caveats_of(outcome.result)
-    marked = {name for caveat in known for name in caveat.parameters}
-    lines = [parameter_table(_reported(outcome), marked)]
-    lines += [f"* {', '.join(caveat.parameters)}: {caveat.sentence}" for caveat in known]
-    return "\n".join(lines)
-
-
-def parameter_table(
-    parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
-) -> str:
-    """Set out fitted parameters for people; those that are ``marked`` get an asterisk."""
-    rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", "identifiability"]]
-    for parameter in parameters:
-        numbers = (parameter.mean, parameter.sd, parameter.q05, parameter.q95)
-        rows.append(
-            [f"{parameter.name} *" if parameter.name in marked else parameter.name, parameter.unit]
-            + [f"{number:.4g}" for number in numbers]
-            + [f"{parameter.identifiability:.2f}"]
-        )
-    return table(rows, right=range(2, 7))
+def _shown(outcome: "FitOutcome") -> Any:
+    return import_module(_SHOWN[outcome.what])

@@ -1,35 +1,20 @@
 """What ``scissorcal fit blade`` says."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.output import Answer, table
-from scissorcal.cli.progress import progress
+from scissorcal.cli.output import table
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.edge.result import BladeFit
-    from scissorcal.workday.runs.blade import BladeOutcome
+    from scissorcal.calibration.edge.result import BladeFit, BladeResult
+    from scissorcal.workday.runs.fit import FitOutcome
 
 
-def fit_blade(
-    folder: Path | None,
-    *,
-    effort: Literal["draft", "standard", "thorough"] | None,
-    seed: int,
-    force: bool,
-    limit_s: float | None = None,
-) -> Answer:
-    """Fit a workspace's blade, where its photographs changed, and say what its edge is."""
+def facts(outcome: "FitOutcome") -> dict[str, object]:
+    """What ``--json`` prints of a blade's fit."""
     from scissorcal.calibration.edge.result import blade_facts
-    from scissorcal.workday.runs.blade import fit_workspace_blade
 
-    with progress(limit_s) as tell:
-        outcome = fit_workspace_blade(
-            open_workspace(folder), effort=effort, seed=seed, force=force, progress=tell
-        )
-    result = outcome.result
-    facts = {
+    result: BladeResult = outcome.result
+    return {
         "cached": outcome.cached,
         "blades": [blade_facts(fit) for fit in result.blades],
         "openings": result.openings,
@@ -37,11 +22,10 @@ def fit_blade(
         "pictures": outcome.pictures,
         "notes": [note for fit in result.blades for note in fit.notes],
     }
-    files = () if outcome.cached else (outcome.path, *outcome.pictures)
-    return Answer(facts, _text(outcome), result.verdicts, files)
 
 
-def _text(outcome: "BladeOutcome") -> str:
+def text(outcome: "FitOutcome") -> str:
+    """What people read of a blade's fit."""
     lines = ["blade: nothing changed since the last fit"] if outcome.cached else []
     for fit in outcome.result.blades:
         lines += [_head(fit), _places(fit), *_nicks(fit), *fit.notes[:-1]]

@@ -1,30 +1,14 @@
 """What ``scissorcal fit camera`` says."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.output import Answer, table
-from scissorcal.cli.progress import progress
+from scissorcal.cli.output import table
 
 if TYPE_CHECKING:
     from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.workday.runs.camera import CameraOutcome
+    from scissorcal.workday.runs.fit import FitOutcome
 
 _WORST = 3
-
-
-def fit_camera(
-    folder: Path | None, *, seed: int, force: bool, limit_s: float | None = None
-) -> Answer:
-    """Fit a workspace's camera, where its photographs changed, and say how well it is known."""
-    from scissorcal.workday.runs.camera import fit_workspace_camera
-
-    workspace = open_workspace(folder)
-    with progress(limit_s) as tell:
-        outcome = fit_workspace_camera(workspace, seed=seed, force=force, progress=tell)
-    files = () if outcome.cached else (outcome.path, *outcome.pictures)
-    return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
 
 
 def camera_table(fit: "CameraFit") -> str:
@@ -46,8 +30,9 @@ def camera_table(fit: "CameraFit") -> str:
     return table(rows, right=(2, 3))
 
 
-def _text(outcome: "CameraOutcome") -> str:
-    fit = outcome.fit
+def text(outcome: "FitOutcome") -> str:
+    """What people read of the fit of a camera."""
+    fit: CameraFit = outcome.result
     camera = fit.camera
     size = f"{camera.width} x {camera.height}"
     if fit.origin == "imported":
@@ -80,8 +65,9 @@ def _text(outcome: "CameraOutcome") -> str:
     return "\n".join(lines)
 
 
-def _facts(outcome: "CameraOutcome") -> dict[str, object]:
-    fit = outcome.fit
+def facts(outcome: "FitOutcome") -> dict[str, object]:
+    """What ``--json`` prints of the fit of a camera."""
+    fit: CameraFit = outcome.result
     camera = fit.camera
     return {
         "camera": camera,

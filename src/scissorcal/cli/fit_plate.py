@@ -1,27 +1,18 @@
 """What ``scissorcal fit plate`` says."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.output import Answer, table
+from scissorcal.cli.output import table
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.vision.geometry.pose import Pose
-    from scissorcal.workday.runs.plate import PlateOutcome
+    from scissorcal.workday.runs.fit import FitOutcome
 
 
-def fit_plate(folder: Path | None, *, force: bool) -> Answer:
-    """Fit a workspace's plate, where its photographs changed, and say where it stands."""
-    from scissorcal.workday.runs.plate import fit_workspace_plate
-
-    outcome = fit_workspace_plate(open_workspace(folder), force=force)
-    files = () if outcome.cached else (outcome.path, *outcome.pictures)
-    return Answer(_facts(outcome), _text(outcome), outcome.fit.verdicts, files)
-
-
-def _text(outcome: "PlateOutcome") -> str:
-    fit = outcome.fit
+def text(outcome: "FitOutcome") -> str:
+    """What people read of the fit of a plate's pose."""
+    fit: PlateFit = outcome.result
     head = f"plate: {len(fit.views)} photographs of the {fit.target}, rms {fit.rms_px:.2f} px"
     if outcome.cached:
         head = "plate: nothing changed since the last fit"
@@ -47,8 +38,9 @@ def _row(name: str, pose: "Pose") -> list[str]:
     return [*cells, f"{1e3 * sd[3:].max():.2g}", f"{worst:.2g}"]
 
 
-def _facts(outcome: "PlateOutcome") -> dict[str, object]:
-    fit = outcome.fit
+def facts(outcome: "FitOutcome") -> dict[str, object]:
+    """What ``--json`` prints of the fit of a plate's pose."""
+    fit: PlateFit = outcome.result
     return {
         "cached": outcome.cached,
         "target": fit.target,

@@ -1,58 +1,64 @@
 """``scissorcal import``"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-import click
+import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import workspace_option
+from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command
+from scissorcal.errors import InputError
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml")
 
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+def _per_channel(short: str, long: str, help_text: str) -> Any:
+    return typer.Option(short, long, metavar="CHANNEL=...", help=help_text)
 
 
-def _map_option(short: str, long: str, target: str, help_text: str) -> Decorator:
-    return click.option(short, long, target, multiple=True, metavar="CHANNEL=...", help=help_text)
-
-
-@click.command("import")
-@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
-@_map_option("-c", "--column", "columns", "Which column holds a channel.")
-@_map_option("-u", "--unit", "units", "The unit of a column.")
-@_map_option("-s", "--scale", "scales", "What multiplies a column.")
-@click.option("--rate-hz", "rate_Hz", type=float, help="Samples a second, without a time column.")
-@click.option("--joint", type=click.Choice(["rotary", "linear"]), help="The recipe's if not given.")
-@click.option("--kind", type=click.Choice(["friction", "cut"]), default="friction")
-@click.option("--handle-radius-mm", type=float, help="The recipe's if not given.")
-@click.option("--min-travel", type=float, help="Least way of a stroke (rad, or m).")
-@click.option("--allow-gaps", is_flag=True, help="Keep gaps in time, with a note.")
-@click.option("--delimiter", help="What parts the columns of a CSV file.")
-@click.option("--output", type=click.Path(path_type=Path), help="Write here, without a workspace.")
-@workspace_option
 @command
 def import_(
-    file: Path,
-    columns: tuple[str, ...],
-    units: tuple[str, ...],
-    scales: tuple[str, ...],
-    rate_Hz: float | None,
-    joint: Literal["rotary", "linear"] | None,
-    kind: Literal["friction", "cut"],
-    handle_radius_mm: float | None,
-    min_travel: float | None,
-    allow_gaps: bool,
-    delimiter: str | None,
-    output: Path | None,
-    folder: Path | None,
+    file: Annotated[Path, typer.Argument(dir_okay=False, help="The log, or a camera's file.")],
+    columns: Annotated[
+        list[str] | None, _per_channel("-c", "--column", "Which column holds a channel.")
+    ] = None,
+    units: Annotated[
+        list[str] | None, _per_channel("-u", "--unit", "The unit of a channel's column.")
+    ] = None,
+    scales: Annotated[
+        list[str] | None, _per_channel("-s", "--scale", "The factor of a channel's column.")
+    ] = None,
+    rate_Hz: Annotated[
+        float | None,
+        typer.Option("--rate-hz", help="Samples per second, if there is no time column."),
+    ] = None,
+    joint: Annotated[
+        Literal["rotary", "linear"] | None, typer.Option(help="The recipe's if not given.")
+    ] = None,
+    kind: Annotated[
+        Literal["friction", "cut"], typer.Option(help="What was recorded.")
+    ] = "friction",
+    handle_radius_mm: Annotated[
+        float | None, typer.Option(help="The recipe's if not given.")
+    ] = None,
+    min_travel: Annotated[
+        float | None, typer.Option(help="Least travel of a stroke (rad, or m).")
+    ] = None,
+    allow_gaps: Annotated[
+        bool, typer.Option("--allow-gaps", help="Keep gaps in time, with a note.")
+    ] = False,
+    delimiter: Annotated[
+        str | None, typer.Option(help="What separates the columns of a CSV file.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option(help="Write here, without a workspace.")] = None,
+    folder: Folder = None,
 ) -> Answer:
-    """Bring in a log from FILE: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
+    """Import a log from FILE: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
 
-    A camera file is one of OpenCV, ROS (camera_info) or Kalibr (camchain); no option belongs to it
-    but --workspace.
+    A camera file is one of OpenCV, ROS (camera_info) or Kalibr (camchain), and takes no option but
+    --workspace.
 
     For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command and
     force_command; a column is a heading, a number from 0, or a variable of a .mat file (X[2] for
@@ -66,7 +72,7 @@ def import_(
       captures/friction-20261121T131415Z.mcap: 24841 samples, 24.8 s, 8 strokes, linear joint
       ...
       $ scissorcal import left_intrinsics.yml
-      fits/camera.json: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
+      fits/camera.nc: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
       ...
     """
     import math
@@ -99,8 +105,8 @@ def import_(
     notes = list(recording.notes)
     if rig and rig.joint != recording.joint.kind:
         notes.append(
-            f"The recipe says {rig.joint} joint: to be asked for what a {recording.joint.kind} one "
-            f'needs, set joint = "{recording.joint.kind}" in its [rig].'
+            f'The recipe has a {rig.joint} joint: set joint = "{recording.joint.kind}" in its '
+            f"[rig] to plan for a {recording.joint.kind} one."
         )
     lines = [
         f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
@@ -123,10 +129,11 @@ def import_(
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:
     from scissorcal.cli.fit_camera import camera_table
+    from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.camera import import_camera
 
     workspace = open_workspace(folder)
-    fit, read, path = import_camera(workspace, file)
+    fit, read, path = import_camera(Engine.of(workspace), file)
     camera = fit.camera
     text = (
         f"{workspace.relative(path)}: camera of {camera.width} x {camera.height} from {file.name} "
@@ -136,19 +143,16 @@ def _import_camera(file: Path, folder: Path | None) -> Answer:
     return Answer(result, text, fit.verdicts, files=[path])
 
 
-def _pairs(option: str, given: Sequence[str]) -> list[tuple[str, str]]:
+def _pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:
     """Read CHANNEL=... words; a channel may be given once."""
     pairs: list[tuple[str, str]] = []
-    for word in given:
+    for word in given or ():
         channel, equals, value = word.partition("=")
         if not equals or not channel.strip() or not value.strip():
-            raise click.BadParameter(
-                f"{word!r} is not of the form CHANNEL=..., as in opening=angle.",
-                param_hint=f"--{option}",
+            raise InputError(
+                f"--{option} {word!r} is not of the form CHANNEL=..., as in opening=angle."
             )
         if channel.strip() in [known for known, _ in pairs]:
-            raise click.BadParameter(
-                f"{channel.strip()} is given twice; give it once.", param_hint=f"--{option}"
-            )
+            raise InputError(f"--{option} {channel.strip()} is given twice; give it once.")
         pairs.append((channel.strip(), value.strip()))
     return pairs

@@ -1,23 +1,24 @@
 """``scissorcal init``"""
 
 from pathlib import Path
+from typing import Annotated
 
-import click
+import typer
 
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, works_in
 
 
-@click.command("init")
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--recipe",
-    default="paper-80gsm",
-    show_default=True,
-    help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), or a "
-    "recipe file (.toml).",
-)
 @command
-def init(folder: Path, recipe: str) -> Answer:
+def init(
+    folder: Annotated[Path, typer.Argument(file_okay=False, help="The new workspace.")],
+    recipe: Annotated[
+        str,
+        typer.Option(
+            help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), "
+            "or a recipe file (.toml)."
+        ),
+    ] = "paper-80gsm",
+) -> Answer:
     """Start a workspace in FOLDER from a recipe.
 
     The recipe is copied to FOLDER/recipe.toml, to be edited: your rig, your material, your scene.
@@ -26,17 +27,18 @@ def init(folder: Path, recipe: str) -> Answer:
     Example:
       $ scissorcal init my-paper --recipe paper-80gsm
       my-paper is a workspace for paper-80gsm (Office paper, 80 g/m^2, cut with office scissors.)
-      Edit my-paper/recipe.toml, then:
-        cd my-paper
-        scissorcal plan
+      Edit my-paper/recipe.toml, then go there: cd my-paper
+      next: scissorcal plan
     """
     from scissorcal.workday.workspace import create_workspace
 
     workspace = create_workspace(folder, recipe)
+    works_in(workspace)
     loaded = workspace.recipe()
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
-        f"Edit {folder / workspace.recipe_path.name}, then:\n  cd {folder}\n  scissorcal plan"
+        f"Edit {folder / workspace.recipe_path.name}, then go there: cd {folder}\n"
+        "next: scissorcal plan"
     )
     result = {"workspace": workspace.root, "recipe": loaded.name}
     return Answer(result, text, files=[workspace.recipe_path])

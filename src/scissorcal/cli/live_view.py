@@ -1,26 +1,32 @@
-"""What a person at the rig sees: how far it is, what is covered, and what to load."""
+"""What a person at the rig sees: progress, opening and torque, coverage, and what to load."""
 
+import math
 import sys
 import time
+from collections import deque
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import click
+import typer
 
 from scissorcal.cli.output import is_interactive
+from scissorcal.cli.progress import pace
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from rich.live import Live
 
-    from scissorcal.device.coverage import CoverageGrid
+    from scissorcal.device.recorder import Recorder
 
 _LINE_EVERY_S = 5.0
 _DRAW_EVERY_S = 0.1
+_TRACE_POINTS = 300
+_TRACE_SIZE = (60, 8)
+"""Columns and rows of the plot of torque over opening."""
 
 
 class LiveView:
-    """Shows progress and coverage on stderr, live on a terminal and as lines elsewhere.
+    """Shows progress, torque, opening and coverage on stderr: live on a terminal, else as lines.
 
     ``ask`` says whether a person is asked to load material and to press Enter.
     """
@@ -28,8 +34,10 @@ class LiveView:
     def __init__(self, ask: bool = True) -> None:
         self._ask = ask
         self._live: Live | None = None
+        self._began_s = time.monotonic()
         self._drawn_s = float("-inf")
         self._finished = False
+        self._trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_POINTS)
 
     def __enter__(self) -> Self:
         self._start()
@@ -43,35 +51,43 @@ class LiveView:
     ) -> None:
         self._stop()
 
-    def show(self, done: float, sentence: str, coverage: "CoverageGrid | None" = None) -> None:
-        """Show how far the work at the rig is, and what a capture covers so far."""
+    def show(self, done: float, sentence: str, recorder: "Recorder | None" = None) -> None:
+        """Show the progress of the work at the rig, and what a capture recorded so far."""
         now = time.monotonic()
+        if recorder is not None and recorder.last is not None:
+            last = recorder.last[0]
+            self._trace.append((math.degrees(last["opening"]), 1e3 * last["motor_torque"]))
         every = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
         finished = done >= 1.0 and not self._finished
         if now - self._drawn_s < every and not finished:
             return
         self._drawn_s, self._finished = now, done >= 1.0
-        head = f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}"
+        share = min(max(done, 0.0), 1.0)
+        head = f"{100 * share:3.0f} %  {sentence} ({pace(share, now - self._began_s)})"
+        if self._trace:
+            opening_deg, torque_mNm = self._trace[-1]
+            head += f"; opening {opening_deg:.1f} deg, motor torque {torque_mNm:.1f} mN m"
         if self._live is None:
-            click.echo(f"{head}; {coverage.sentence()}" if coverage else head, err=True)
+            coverage = f"; {recorder.coverage.sentence()}" if recorder else ""
+            typer.echo(head + coverage, err=True)
         else:
-            self._live.update(_drawing(done, head, coverage), refresh=True)
+            self._live.update(self._drawing(share, head, recorder), refresh=True)
 
     def confirm(self, request: str) -> None:
         """Ask a person for what must be done, and wait until it is.
 
-        Raises InputError where nobody is there to be asked, click.Abort where they give up.
+        Raises InputError where stdin or stderr is no terminal, typer.Abort where they give up.
         """
         if not self._ask:
-            click.echo(f"{request} (--yes: taken as done)", err=True)
+            typer.echo(f"{request} (--yes: taken as done)", err=True)
             return
         if not is_interactive():
             raise InputError(
-                f"{request} Nobody can be asked here: run this at a terminal, or give --yes once "
-                "it is done."
+                f"{request} This is not a terminal, so you cannot confirm it: run the command at a "
+                "terminal, or give --yes once it is done."
             )
         self._stop()
-        click.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
+        typer.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
         self._start()
 
     def _start(self) -> None:
@@ -87,11 +103,35 @@ class LiveView:
             self._live.stop()
             self._live = None
 
+    def _drawing(self, share: float, head: str, recorder: "Recorder | None") -> Any:
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.text import Text
 
-def _drawing(done: float, head: str, coverage: "CoverageGrid | None") -> Any:
-    from rich.console import Group
-    from rich.progress_bar import ProgressBar
-    from rich.text import Text
+        drawn: list[Any] = [Text(head), ProgressBar(total=1.0, completed=share, width=40)]
+        if self._trace:
+            drawn.append(Text(torque_plot(self._trace)))
+        if recorder:
+            drawn.append(recorder.coverage)
+        return Group(*drawn)
 
-    bar = ProgressBar(total=1.0, completed=done, width=40)
-    return Group(Text(head), bar, coverage) if coverage else Group(Text(head), bar)
+
+def torque_plot(points: "deque[tuple[float, float]]") -> str:
+    """Plot motor torque (mN m) over opening (deg) with characters; the newest point is an o."""
+    columns, rows = _TRACE_SIZE
+    left, right = _range([point[0] for point in points])
+    low, high = _range([point[1] for point in points])
+    grid = [[" "] * columns for _ in range(rows)]
+    for index, (opening_deg, torque_mNm) in enumerate(points, start=1):
+        column = round((columns - 1) * (opening_deg - left) / (right - left))
+        row = round((rows - 1) * (high - torque_mNm) / (high - low))
+        grid[row][column] = "o" if index == len(points) else "."
+    marks = [f"{high:9.1f}", *[" " * 9] * (rows - 2), f"{low:9.1f}"]
+    lines = [f"{mark} |{''.join(cells)}".rstrip() for mark, cells in zip(marks, grid, strict=True)]
+    axis = f"{left:<10.1f}{'opening (deg)':^{columns - 20}}{right:>10.1f}"
+    return "\n".join(["motor torque (mN m)", *lines, " " * 11 + axis])
+
+
+def _range(values: list[float]) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)

@@ -1,24 +1,25 @@
-"""Open a workspace for a command: found upward, interrupted captures recovered first."""
+"""Open a workspace for a command; interrupted captures are recovered first."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.cli.output import note
+from scissorcal.cli.output import note, works_in
 
 if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace
 
 
 def open_workspace(folder: Path | None) -> "Workspace":
-    """Find the workspace that ``folder`` (or where you stand) lies in.
+    """Find the workspace that contains ``folder`` (default: the current folder).
 
-    Captures that were interrupted are finished first, and what became of them is said on stderr.
-    Raises MissingError where there is no workspace.
+    Captures that were interrupted are recovered first, and reported on stderr. Raises MissingError
+    where there is no workspace.
     """
     from scissorcal.workday.recordings import recover_recordings
     from scissorcal.workday.workspace import find_workspace
 
     workspace = find_workspace(folder)
+    works_in(workspace)
     for sentence in recover_recordings(workspace):
         note(sentence)
     return workspace

@@ -1,49 +1,51 @@
-"""Options that several commands share."""
+"""Options that several commands share, as types of their parameters."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-import click
+import typer
 
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        "--workspace",
+        "-w",
+        file_okay=False,
+        help="The workspace, or a folder in it; the current folder if not given.",
+    ),
+]
 
-workspace_option: Decorator = click.option(
-    "--workspace",
-    "-w",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=None,
-    help="The workspace, or a folder in it; where you stand if not given.",
-)
+Seed = Annotated[
+    int, typer.Option("--seed", min=0, help="Seed of all random numbers; a run can be repeated.")
+]
 
-seed_option: Decorator = click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of everything random, so that a run can be repeated.",
-)
+Device = Annotated[
+    str,
+    typer.Option(
+        "--device",
+        metavar="PORT|sim",
+        help='Serial port of the rig, such as /dev/ttyUSB0, or "sim" for a virtual rig.',
+    ),
+]
 
-device_option: Decorator = click.option(
-    "--device",
-    required=True,
-    metavar="PORT|sim",
-    help='Serial port of the rig, such as /dev/ttyUSB0, or "sim" for a virtual one.',
-)
+Yes = Annotated[
+    bool,
+    typer.Option("--yes", help="Ask no questions: the blades are clear, or material is loaded."),
+]
 
-yes_option: Decorator = click.option(
-    "--yes", is_flag=True, help="Ask nobody: blades are clear, or material is loaded."
-)
+Images = Annotated[
+    list[Path] | None,
+    typer.Option("--image", "-i", help="A photograph; repeat the option for each."),
+]
+
+MoreImages = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="FILE", help="More photographs: what --image *.jpg expands to."),
+]
 
 
-def images_option(of_what: str) -> Decorator:
-    """``--image``, which may be given many times, for photographs of something."""
-    return click.option(
-        "--image",
-        "-i",
-        "images",
-        type=click.Path(path_type=Path),
-        multiple=True,
-        help=f"A photograph of {of_what}; give it again for each.",
-    )
+def positive(value: float | None) -> float | None:
+    """Accept a number above zero, or none; for options of which 0 makes no sense."""
+    if value is not None and not value > 0.0:
+        raise typer.BadParameter(f"{value:g} is not above 0.")
+    return value

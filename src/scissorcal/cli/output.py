@@ -5,27 +5,36 @@ one object alone, and the text goes to stderr with everything else that people r
 """
 
 import functools
+import inspect
 import json
 import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
+import typer
 
+from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
+from scissorcal.cli.log import log_command
 from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
 
-P = ParamSpec("P")
+if TYPE_CHECKING:
+    from scissorcal.workday.workspace import Workspace
 
 VERDICT_FAILED = 3
-UNEXPECTED = 1
-INTERRUPTED = 130
 _MARKS = {"pass": ("pass", "green"), "fail": ("FAIL", "red"), "not_evaluated": ("----", "yellow")}
+
+_SHARED_OPTIONS = {
+    "verbose": typer.Option("--verbose", "-v", help="Show the checks that passed, too."),
+    "as_json": typer.Option("--json", help="Print one JSON object on stdout."),
+    "show_traceback": typer.Option("--traceback", help="Show where an error arose."),
+}
 
 
 @dataclass(frozen=True)
@@ -42,42 +51,91 @@ class Answer:
     files: Sequence[Path] = field(default=())
 
 
-def command(function: Callable[P, Answer]) -> Callable[..., None]:
-    """Make a click callback of a function that returns an `Answer`.
+@dataclass
+class _Running:
+    """The running command: its options for output, the workspace that it opened, its end."""
 
-    Adds ``--json`` and ``--traceback``, prints the answer, and ends with the exit code that belongs
-    to it. An error that scissorcal raises on purpose is its sentence and its exit code. On a group
-    it is what the group does without a subcommand.
+    as_json: bool
+    verbose: bool
+    show_traceback: bool
+    workspace: "Workspace | None" = None
+    trace: str = ""
+
+    def run(self, function: Callable[..., Answer], options: dict[str, Any]) -> tuple[int, Answer]:
+        """Run a command's function; return its exit code and answer, errors turned into both."""
+        try:
+            answer = function(**options)
+        except (typer.Abort, typer.Exit, typer.TyperException, BrokenPipeError):
+            raise
+        except KeyboardInterrupt:
+            return INTERRUPTED, self._refuse("Interrupted.", INTERRUPTED)
+        except Exception as error:  # noqa: BLE001 - the last line of defence: a sentence, a code
+            known = user_error(error, self.workspace.root if self.workspace else None)
+            if self.show_traceback:
+                note(traceback.format_exc())
+            if known:
+                return known.exit_code, self._refuse(str(known), known.exit_code, known.kept)
+            self.trace = traceback.format_exc()
+            return UNEXPECTED, self._refuse(unexpected(error), UNEXPECTED)
+        return VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0, answer
+
+    def _refuse(self, sentence: str, code: int, kept: Sequence[Path] = ()) -> Answer:
+        typer.echo(f"{typer.style('Error:', fg='red')} {sentence}", err=True)
+        return Answer({"error": sentence, "exit_code": code}, files=kept)
+
+
+_running: ContextVar[_Running | None] = ContextVar("running", default=None)
+
+
+def command(function: Callable[..., Answer]) -> Callable[..., None]:
+    """Make a command of a function that returns an `Answer`.
+
+    Adds ``--verbose``, ``--json`` and ``--traceback``, prints the answer and the next command of
+    the plan, logs the command in the workspace, and ends with its exit code. An error that
+    scissorcal raises on purpose, or that the user can remedy, is a sentence and an exit code. On a
+    group it is what the group does without a subcommand.
     """
 
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-    @click.option("--traceback", "show_traceback", is_flag=True, help="Show where an error arose.")
-    @click.pass_context
     @functools.wraps(function)
     def callback(
-        context: click.Context, /, *args: Any, as_json: bool, show_traceback: bool, **options: Any
+        context: typer.Context, verbose: bool, as_json: bool, show_traceback: bool, **options: Any
     ) -> None:
         if context.invoked_subcommand is not None:
             return
-        name = context.command_path.partition(" ")[2]
         began = time.perf_counter()
+        running = _Running(as_json, verbose, show_traceback)
+        token = _running.set(running)
         try:
-            answer = function(*args, **options)
-        except ScissorcalError as error:
-            code, answer = error.exit_code, _refusal(error, error.exit_code, show_traceback)
-        except click.ClickException:
-            raise
-        except KeyboardInterrupt:
-            code, answer = INTERRUPTED, _refusal("Interrupted.", INTERRUPTED, False)
-        except Exception as error:  # noqa: BLE001 - the last line of defence: a sentence, exit code 1
-            code, answer = UNEXPECTED, _unexpected(error, show_traceback)
-        else:
-            code = VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0
-            _say(answer, as_json)
+            code, answer = running.run(function, options)
+        finally:
+            _running.reset(token)
+        seconds = time.perf_counter() - began
+        if running.workspace:
+            words = context.find_root().obj or context.command_path.split()[1:]
+            error = str(answer.result.get("error", "")) if code else ""
+            log_command(running.workspace.root, words, code, seconds, error, running.trace)
+        _say(answer, running)
         if as_json:
-            print_envelope(name, answer, code, time.perf_counter() - began)
-        context.exit(code)
+            print_envelope(context.command_path.partition(" ")[2], answer, code, seconds)
+        raise typer.Exit(code)
 
+    return _with_shared_options(callback, function)
+
+
+def _with_shared_options(
+    callback: Callable[..., None], function: Callable[..., Answer]
+) -> Callable[..., None]:
+    """Give ``callback`` the parameters of ``function`` and those that every command has."""
+    kind = inspect.Parameter.KEYWORD_ONLY
+    own = inspect.signature(function, eval_str=True).parameters.values()
+    parameters = [inspect.Parameter("context", kind, annotation=typer.Context)]
+    parameters += [parameter.replace(kind=kind) for parameter in own]
+    parameters += [
+        inspect.Parameter(name, kind, default=False, annotation=Annotated[bool, option])
+        for name, option in _SHARED_OPTIONS.items()
+    ]
+    callback.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    callback.__annotations__ = {item.name: item.annotation for item in parameters}
     return callback
 
 
@@ -91,26 +149,43 @@ def print_envelope(name: str, answer: Answer, code: int, seconds: float) -> None
         files=[str(path) for path in answer.files],
         seconds=round(seconds, 3),
     )
-    click.echo(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False))
+    typer.echo(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False))
 
 
 def note(sentence: str) -> None:
     """Tell people something on the side, on stderr."""
-    click.echo(sentence, err=True)
+    typer.echo(sentence, err=True)
 
 
 def stdout_is_for_json() -> bool:
     """Whether the running command was given ``--json``, so that stdout is the object's alone."""
-    return bool(click.get_current_context().params.get("as_json"))
+    running = _running.get()
+    return running is not None and running.as_json
+
+
+def works_in(workspace: "Workspace") -> None:
+    """Note the workspace that the running command opened."""
+    running = _running.get()
+    if running is not None:
+        running.workspace = workspace
+
+
+def is_interactive() -> bool:
+    """Whether a person sits at both ends: stdin to answer, stderr to read."""
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     """Lay out rows of words in columns; columns named in ``right`` are set flush right.
 
+    The first row is the head. On a terminal, rich sets the table to its width.
+
     >>> print(table([["name", "mean"], ["kappa", "0.4"]], right=[1]))
     name   mean
     kappa   0.4
     """
+    if sys.stdout.isatty():
+        return _rich_table(rows[0], rows[1:], right)
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = []
     for row in rows:
@@ -122,48 +197,63 @@ def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     return "\n".join(lines)
 
 
+def _rich_table(
+    head: Sequence[str] | None, rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+) -> str:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    laid = Table(box=None, show_header=head is not None, header_style="bold", pad_edge=False)
+    for column in range(len(head or rows[0])):
+        laid.add_column(
+            head[column] if head else "", justify="right" if column in right else "left"
+        )
+    for row in rows:
+        laid.add_row(*map(Text.from_ansi, row))
+    console = Console(force_terminal=True)
+    with console.capture() as captured:
+        console.print(laid)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
 def verdict_lines(verdicts: Sequence[Verdict]) -> str:
     """Set out verdicts for people, one line each: outcome, scope, check, value and limit, why."""
-    rows = []
-    for verdict in verdicts:
-        word, _ = _MARKS[verdict.status]
-        rows.append([word, verdict.scope, verdict.check, verdict.limited, verdict.why])
-    if not rows:
+    if not verdicts:
         return ""
-    lines = table(rows).splitlines()
-    return "\n".join(
-        click.style(line[:4], fg=_MARKS[verdict.status][1]) + line[4:]
-        for line, verdict in zip(lines, verdicts, strict=True)
-    )
+    rows = [
+        [
+            typer.style(_MARKS[verdict.status][0], fg=_MARKS[verdict.status][1]),
+            verdict.scope,
+            verdict.check,
+            verdict.limited,
+            verdict.why,
+        ]
+        for verdict in verdicts
+    ]
+    return _rich_table(None, rows) if sys.stdout.isatty() else table(rows)
 
 
-def _say(answer: Answer, as_json: bool) -> None:
-    parts = [answer.text.rstrip(), verdict_lines(answer.verdicts)]
+def _say(answer: Answer, running: _Running) -> None:
+    shown = [v for v in answer.verdicts if running.verbose or v.status != "pass"]
+    hidden = len(answer.verdicts) - len(shown)
+    checks = verdict_lines(shown)
+    if hidden:
+        checks += f"\n{hidden} of {len(answer.verdicts)} checks passed (-v shows them)"
+    parts = [answer.text.rstrip(), checks.strip(), _next_line(answer, running)]
     text = "\n\n".join(part for part in parts if part)
     if text:
-        click.echo(text, err=as_json)
+        typer.echo(text, err=running.as_json)
 
 
-def _refusal(error: ScissorcalError | str, code: int, show_traceback: bool) -> Answer:
-    if show_traceback:
-        note(traceback.format_exc())
-    click.echo(f"{click.style('Error:', fg='red')} {error}", err=True)
-    kept = error.kept if isinstance(error, ScissorcalError) else ()
-    return Answer({"error": str(error), "exit_code": code}, files=kept)
+def _next_line(answer: Answer, running: _Running) -> str:
+    """Name the next command of the plan, unless the answer did, or only a program reads it."""
+    if running.workspace is None or running.as_json or not answer.text or "next: " in answer.text:
+        return ""
+    from scissorcal.workday.plan import make_plan
 
-
-def _unexpected(error: Exception, show_traceback: bool) -> Answer:
-    if show_traceback:
-        note(traceback.format_exc())
-    words = str(error).strip().splitlines()
-    what = f"{type(error).__name__}: {words[0]}" if words else type(error).__name__
-    sentence = (
-        f"Unexpected failure ({what}). This is a fault of scissorcal, not of your input: run the "
-        "same command with --traceback and report what it prints."
-    )
-    return _refusal(sentence, UNEXPECTED, False)
-
-
-def is_interactive() -> bool:
-    """Whether a person sits at both ends: stdin to answer, stderr to read."""
-    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+    try:
+        following = make_plan(running.workspace).next_command
+    except (ScissorcalError, OSError):  # the recipe or a file is wrong, as 'plan' says
+        following = "scissorcal plan"
+    return f"next: {following or 'nothing is left to do'}"

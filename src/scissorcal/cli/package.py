@@ -1,13 +1,13 @@
 """``scissorcal package``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
-from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import seed_option, workspace_option
+from scissorcal.cli.options import Folder, Seed
 from scissorcal.cli.output import Answer, command
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _COMMANDS = {
 }
 
 
-@click.group("package", cls=LazyGroup, lazy=_COMMANDS)
+@group(_COMMANDS)
 def package() -> None:
     """Build or check the model package, the one file that a rig renders.
 
@@ -31,13 +31,24 @@ def package() -> None:
     """
 
 
-@click.command("build")
-@click.option("--force", is_flag=True, help="Build again even where nothing changed.")
-@seed_option
-@workspace_option
 @command
-def build(force: bool, seed: int, folder: Path | None) -> Answer:
+def build(
+    force: Annotated[
+        bool, typer.Option("--force", help="Build again even where nothing changed.")
+    ] = False,
+    allow_failed: Annotated[
+        bool,
+        typer.Option(
+            "--allow-failed",
+            help="Build from a fit that failed a check; the package says so on every use.",
+        ),
+    ] = False,
+    seed: Seed = 0,
+    folder: Folder = None,
+) -> Answer:
     """Compile the workspace's fits into package/<recipe>.zip, and check it.
+
+    A fit that failed a check is refused, with the command that may clear it.
 
     \b
     Example:
@@ -45,10 +56,13 @@ def build(force: bool, seed: int, folder: Path | None) -> Answer:
       package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
       ...
     """
+    from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.package import build_workspace_package
 
     workspace = open_workspace(folder)
-    built = build_workspace_package(workspace, seed=seed, force=force)
+    built = build_workspace_package(
+        Engine.of(workspace), seed=seed, force=force, allow_failed=allow_failed
+    )
     head = f"{workspace.relative(built.path)}: {_contents(built.manifest)}"
     if built.cached:
         head += "\nnothing changed since it was built, so it is as it was"
@@ -58,12 +72,14 @@ def build(force: bool, seed: int, folder: Path | None) -> Answer:
     return Answer(result, text, built.verdicts, files)
 
 
-@click.command("check")
-@click.argument("path", type=click.Path(path_type=Path), required=False)
-@workspace_option
 @command
-def check(path: Path | None, folder: Path | None) -> Answer:
-    """Check a package (PATH, or the workspace's): bytes, bound, extremes, fits.
+def check(
+    path: Annotated[
+        Path | None, typer.Argument(help="The package; the workspace's if not given.")
+    ] = None,
+    folder: Folder = None,
+) -> Answer:
+    """Check a package: bytes, error bound, extremes, fits.
 
     \b
     Example:
@@ -76,7 +92,7 @@ def check(path: Path | None, folder: Path | None) -> Answer:
     if path is None:
         workspace = open_workspace(folder)
         path = workspace.package_path(workspace.recipe())
-    manifest = open_package(path).manifest
+    manifest = open_package(path, warn=False).manifest
     return Answer(_facts(manifest), f"{path}: {_contents(manifest)}", check_package(path))
 
 

@@ -1,32 +1,29 @@
 """``scissorcal plan``"""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import workspace_option
+from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
 
 if TYPE_CHECKING:
     from scissorcal.workday.plan import Plan
 
 
-@click.command("plan")
-@workspace_option
 @command
-def plan(folder: Path | None) -> Answer:
-    """What the scene requires: what is done, missing or stale, and what comes next.
+def plan(folder: Folder = None) -> Answer:
+    """Show the state of every step that the scene requires, and the next command.
 
-    Stale means that what it was made from has changed since, by content.
+    missing: not there. incomplete: a capture lacks what the recipe plans. stale: made from other
+    inputs than there are now. failed: a check failed. unverified: no trust check yet. done: none
+    of these.
 
     \b
     Example:
       $ scissorcal plan
       paper-80gsm:
       ...
-      fit cut           missing  not fitted yet        response and toughness
+      fit cut           missing     not there yet         response and toughness
       ...
       next: scissorcal capture friction --device PORT
     """
@@ -48,7 +45,7 @@ def plan(folder: Path | None) -> Answer:
 
 def _text(found: "Plan") -> str:
     rows = [["step", "state", "found", "needed for"]]
-    rows += [[step.name, step.status, step.state, step.why] for step in found.steps]
+    rows += [[step.name, step.state, step.found, step.why] for step in found.steps]
     lines = [f"{found.recipe}:", "", table(rows), ""]
     if found.tables:
         lines.append("tables to build: " + ", ".join(item.name for item in found.tables))

@@ -1,12 +1,12 @@
 """``scissorcal predict``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
+import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import workspace_option
+from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
@@ -14,33 +14,27 @@ if TYPE_CHECKING:
     from scissorcal.workday.runs.predict import PredictionOutcome
 
 
-@click.command("predict")
-@click.argument("what", type=click.Choice(["friction", "load"]))
-@click.argument("motion", type=click.Path(path_type=Path, dir_okay=False))
-@click.option(
-    "--level",
-    type=click.FloatRange(min=0.5, max=0.99),
-    default=0.9,
-    show_default=True,
-    help="Probability with which a measured sample lies in the band.",
-)
-@click.option(
-    "--table", type=click.Path(path_type=Path, dir_okay=False), help="Write a table here (.csv)."
-)
-@click.option(
-    "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw it here (.svg or .png)."
-)
-@workspace_option
 @command
 def predict(
-    what: Literal["friction", "load"],
-    motion: Path,
-    level: float,
-    table: Path | None,
-    plot: Path | None,
-    folder: Path | None,
+    what: Annotated[Literal["friction", "load"], typer.Argument(help="What to predict.")],
+    motion: Annotated[
+        Path, typer.Argument(dir_okay=False, help="A recording, or a table of the motion.")
+    ],
+    level: Annotated[
+        float,
+        typer.Option(
+            min=0.5, max=0.99, help="Probability with which a measured sample lies in the band."
+        ),
+    ] = 0.9,
+    table: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="Write a table here (.csv).")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="Draw it here (.svg or .png).")
+    ] = None,
+    folder: Folder = None,
 ) -> Answer:
-    """Predict what the friction fit says of MOTION, with a band that measurements lie in.
+    """Predict the effort of MOTION from the friction fit, with a band for measured samples.
 
     friction: the effort that drives the empty joint through MOTION. load: the load at the far end
     of a two-ended tool, from torque and motion at the driven end; the law must know load. MOTION is
@@ -99,7 +93,7 @@ def _text(what: str, outcome: "PredictionOutcome") -> str:
     lines = [head, width, band.sentence]
     inside = _number(found.share_inside)
     if inside is None:
-        lines.append("measured: nothing to compare with in this file")
+        lines.append("measured: this file holds no effort to compare with")
     else:
         import numpy as np
 

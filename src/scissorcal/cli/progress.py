@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import click
+import typer
 
 from scissorcal.errors import VerdictError
 
@@ -103,4 +103,4 @@ class _Lines:
         if now - self._printed_s < wait:
             return
         self._last, self._printed_s = stage, now
-        click.echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)
+        typer.echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)

@@ -1,24 +1,27 @@
 """``scissorcal recording``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
-from scissorcal.cli.lazy import LazyGroup
+from scissorcal.cli.lazy import group
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
     from scissorcal.recording import RecordingSummary
 
 _COMMANDS = {
+    "list": ("scissorcal.cli.recording_list:list_", "All recordings, and whether fits use them."),
+    "exclude": ("scissorcal.cli.recording_list:exclude", "Do not use a recording, with a reason."),
+    "include": ("scissorcal.cli.recording_list:include", "Use an excluded recording again."),
     "show": ("scissorcal.cli.recording:show", "What a recording holds: strokes, ranges, gaps."),
 }
 
 
-@click.group("recording", cls=LazyGroup, lazy=_COMMANDS)
+@group(_COMMANDS)
 def recording() -> None:
-    """Look into recordings.
+    """List, show, exclude and include recordings.
 
     \b
     Example:
@@ -28,10 +31,10 @@ def recording() -> None:
     """
 
 
-@click.command("show")
-@click.argument("path", type=click.Path(path_type=Path, dir_okay=False))
 @command
-def show(path: Path) -> Answer:
+def show(
+    path: Annotated[Path, typer.Argument(dir_okay=False, help="The recording (.mcap).")],
+) -> Answer:
     """Show what the recording at PATH holds.
 
     A capture that was interrupted (PATH.part) is recovered first.

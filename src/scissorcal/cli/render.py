@@ -3,56 +3,36 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
+import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import device_option, seed_option, workspace_option, yes_option
+from scissorcal.cli.options import Device, Folder, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.render import Rendered
 
 
-@click.command("render")
-@device_option
-@click.option(
-    "--package",
-    "package_path",
-    type=click.Path(path_type=Path),
-    help="The package to render; the workspace's if not given.",
-)
-@click.option(
-    "--seconds",
-    type=click.FloatRange(min=0, min_open=True),
-    default=30.0,
-    show_default=True,
-    help="How long to render, by the rig's clock.",
-)
-@click.option("--strokes", type=click.IntRange(1), default=4, show_default=True, help="sim only.")
-@click.option(
-    "--rate-rad-per-s",
-    type=click.FloatRange(min=0, min_open=True),
-    default=0.3,
-    show_default=True,
-    help="Speed of the virtual hand; sim only.",
-)
-@click.option("--no-record", is_flag=True, help="Keep no recording.")
-@yes_option
-@seed_option
-@workspace_option
 @command
 def render(
-    device: str,
-    package_path: Path | None,
-    seconds: float,
-    strokes: int,
-    rate_rad_per_s: float,
-    no_record: bool,
-    yes: bool,
-    seed: int,
-    folder: Path | None,
+    device: Device,
+    package_path: Annotated[
+        Path | None,
+        typer.Option("--package", help="The package to render; the workspace's if not given."),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(callback=positive, help="How long to render, by the rig's clock.")
+    ] = 30.0,
+    strokes: Annotated[int, typer.Option(min=1, help="Strokes of the virtual hand.")] = 4,
+    rate_rad_per_s: Annotated[
+        float, typer.Option(callback=positive, help="Speed of the virtual hand.")
+    ] = 0.3,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    folder: Folder = None,
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
 
@@ -69,15 +49,9 @@ def render(
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.render import VirtualStrokes
-    from scissorcal.workday.runs.render import (
-        package_has_fallen_behind,
-        package_warnings,
-        render_workspace,
-    )
+    from scissorcal.workday.runs.render import package_warnings, render_workspace
 
     workspace = open_workspace(folder)
-    if package_path is None and package_has_fallen_behind(workspace):
-        note("The package is not of the fits and recipe as they are now; see 'scissorcal plan'.")
     for sentence in package_warnings(workspace, package_path):
         note(sentence)
     with LiveView(ask=not yes) as view:

@@ -3,50 +3,61 @@
 import os
 import sys
 from collections.abc import Sequence
+from typing import Annotated
 
-import click
+import typer
 
 import scissorcal
-from scissorcal.cli.lazy import LazyGroup
-from scissorcal.cli.output import Answer, print_envelope
+from scissorcal.cli.lazy import group
+from scissorcal.errors import ScissorcalError
 
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What libraries of linear algebra read once, when they are loaded: after the command has begun."""
 
 _COMMANDS = {
     "init": ("scissorcal.cli.init:init", "Start a workspace from a recipe."),
-    "plan": ("scissorcal.cli.plan:plan", "What the scene needs; done, missing, stale; what next."),
-    "target": (
-        "scissorcal.cli.target:target",
-        "Sheets to print: camera board, blade mat, markers.",
-    ),
-    "capture": ("scissorcal.cli.capture:capture", "Record friction or cuts from a rig."),
-    "import": ("scissorcal.cli.import_:import_", "Bring in a log from CSV, Parquet or .mat."),
+    "plan": ("scissorcal.cli.plan:plan", "The state of every step, and the next command."),
+    "recipe": ("scissorcal.cli.recipe:recipe", "Settings and priors, with defaults."),
+    "target": ("scissorcal.cli.target:target", "Sheets to print: camera board, mat, markers."),
+    "capture": ("scissorcal.cli.capture:capture", "Record friction, cuts or photographs."),
+    "import": ("scissorcal.cli.import_:import_", "Import a log (CSV, Parquet, .mat) or a camera."),
     "export": ("scissorcal.cli.export:export", "Write a recording as Parquet or CSV."),
     "recording": ("scissorcal.cli.recording:recording", "Look into recordings."),
     "fit": ("scissorcal.cli.fit:fit", "Fit what the scene requires; cached."),
     "verify": ("scissorcal.cli.verify:verify", "Check whether a fit's intervals can be trusted."),
-    "predict": ("scissorcal.cli.predict:predict", "Predict efforts of a motion, with a band."),
-    "report": ("scissorcal.cli.report:report", "One HTML file to review; compare two; sign."),
+    "predict": ("scissorcal.cli.predict:predict", "Predict the effort of a motion, with a band."),
+    "report": ("scissorcal.cli.report:report", "Write, compare or sign the report."),
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),
     "device": ("scissorcal.cli.device:device", "Find, check or simulate a rig."),
-    "demo": ("scissorcal.cli.demo:demo", "The whole day on a virtual rig, truth against estimate."),
+    "demo": ("scissorcal.cli.demo:demo", "The whole day on a virtual rig; estimates and truth."),
 }
 
 
-@click.group(
-    cls=LazyGroup,
-    lazy=_COMMANDS,
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"scissorcal, version {scissorcal.__version__}")
+        raise typer.Exit
+
+
+@group(
+    _COMMANDS,
+    add_completion=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.version_option(scissorcal.__version__, prog_name="scissorcal")
-def scissorcal_command() -> None:
+def scissorcal_command(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
     """Calibrate, identify and render a haptic scissors rig.
 
-    A workspace is a folder with a recipe.toml. Every command takes --json, and ends with
-    0 done, 1 unexpected failure, 2 wrong usage or input file, 3 a verdict failed, 4 device or link
-    fault, 5 something must come first.
+    A workspace is a folder with a recipe.toml. Every command takes --json. Exit codes: 0 done,
+    1 unexpected failure, 2 wrong usage or input file, 3 a verdict failed, 4 device or link fault,
+    5 another command must run first.
 
     \b
     Example:
@@ -67,26 +78,50 @@ def run(arguments: Sequence[str] | None = None) -> None:
         os.environ.setdefault(variable, "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = scissorcal_command.main(given, prog_name="scissorcal", standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-        if "--json" in given:
-            _refuse_as_json(error)
-    except click.Abort:
-        click.echo("Interrupted.", err=True)
+        main = typer.main.get_command(scissorcal_command).main
+        code = main(given, prog_name="scissorcal", standalone_mode=False, obj=given)
+    except (typer.TyperException, ScissorcalError) as error:
+        code = _refuse_usage(error, "--json" in given)
+    except typer.Abort:
+        typer.echo("Interrupted.", err=True)
         code = 130
     except BrokenPipeError:
         sys.stderr.close()
         code = 1
     except OSError as error:
-        click.echo(f"Error: The answer could not be written: {error.strerror}.", err=True)
-        code = 1
+        code = _refuse_write(error)
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _refuse_as_json(error: click.ClickException) -> None:
-    context = getattr(error, "ctx", None)
-    name = context.command_path.partition(" ")[2] if context else ""
-    answer = Answer({"error": error.format_message(), "exit_code": error.exit_code})
-    print_envelope(name, answer, error.exit_code, 0.0)
+def _refuse_write(error: OSError) -> int:
+    """Say which file could not be written, or that stdout took no answer; return the exit code."""
+    from scissorcal.cli.failures import user_error
+
+    known = user_error(error, None) if error.filename else None
+    sentence = known or f"The answer could not be written: {error.strerror}."
+    typer.echo(f"Error: {sentence}", err=True)
+    return known.exit_code if known else 1
+
+
+def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) -> int:
+    """Say what is wrong with the words of the command line, and return the exit code.
+
+    Where an option or argument is missing, its help says what to give.
+    """
+    if isinstance(error, typer.BadParameter):
+        error.message = error.message.removeprefix("Value error, ")
+        error.message = error.message or getattr(error.param, "help", None) or ""
+    if isinstance(error, typer.TyperException):
+        error.show()  # type: ignore[attr-defined]  # every error of the parser has it
+        sentence = error.format_message()
+    else:
+        sentence = str(error)
+        typer.echo(f"Error: {sentence}", err=True)
+    if as_json:
+        from scissorcal.cli.output import Answer, print_envelope
+
+        context = getattr(error, "ctx", None)
+        name = context.command_path.partition(" ")[2] if context else ""
+        answer = Answer({"error": sentence, "exit_code": error.exit_code})
+        print_envelope(name, answer, error.exit_code, 0.0)
+    return error.exit_code

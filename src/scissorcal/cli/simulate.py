@@ -1,28 +1,33 @@
 """``scissorcal device simulate``"""
 
-import click
+from typing import Annotated
 
-from scissorcal.cli.options import seed_option
+import typer
+
+from scissorcal.cli.options import Seed
 from scissorcal.cli.output import Answer, command, note, stdout_is_for_json
 
 
-@click.command("simulate")
-@click.argument("specimen", default="office-paper")
-@click.option(
-    "--fault",
-    "faults",
-    multiple=True,
-    metavar="KIND=VALUE",
-    help="drop=0.01, garble=0.01 (shares of frames), delay=16 (ms), unplug=5 or stuck-encoder=5 "
-    "(seconds after streaming begins); may be repeated.",
-)
-@seed_option
 @command
-def simulate(specimen: str, faults: tuple[str, ...], seed: int) -> Answer:
+def simulate(
+    specimen: Annotated[
+        str, typer.Argument(help="A built-in specimen, or a .toml file.")
+    ] = "office-paper",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="KIND=VALUE",
+            help="drop=0.01, garble=0.01 (shares of frames), delay=16 (ms), unplug=5 or "
+            "stuck-encoder=5 (seconds after streaming begins); may be repeated.",
+        ),
+    ] = None,
+    seed: Seed = 0,
+) -> Answer:
     """Serve a virtual rig with SPECIMEN between its blades, until interrupted.
 
-    SPECIMEN is the name of a built-in specimen or a .toml file. The port's path is the first line
-    on stdout (on stderr with --json, where stdout has one object at the end).
+    The port's path is the first line on stdout (on stderr with --json, where stdout has one object
+    at the end).
 
     \b
     Example:
@@ -37,11 +42,11 @@ def simulate(specimen: str, faults: tuple[str, ...], seed: int) -> Answer:
 
     def announce(path: str) -> None:
         announced.append(path)
-        click.echo(path, err=stdout_is_for_json())
+        typer.echo(path, err=stdout_is_for_json())
         note("Serving a virtual rig; interrupt (Ctrl-C) to end it.")
 
     loaded = load_specimen(specimen)
-    ended = serve(loaded, seed, parse_faults(faults), announce)
+    ended = serve(loaded, seed, parse_faults(faults or []), announce)
     why = "unplugged, as its fault said" if ended.unplugged else "ended"
     text = f"{why} after {ended.ticks} ticks; the machine held it up {ended.stalls} times"
     result = {

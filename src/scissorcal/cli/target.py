@@ -1,36 +1,30 @@
 """``scissorcal target``"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
+import typer
 
 from scissorcal.cli.output import Answer, command
 
 if TYPE_CHECKING:
-    from scissorcal.vision.targets.sheet import Paper, Sheet, SheetName
+    from scissorcal.vision.targets.sheet import Sheet, SheetName
 
 
-@click.command("target")
-@click.argument("what", type=click.Choice(["camera", "blade", "plate", "all"]), default="all")
-@click.option("--paper", type=click.Choice(["A4", "Letter"]), default="A4", show_default=True)
-@click.option(
-    "--output",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path(),
-    help="Folder to write into; where you stand if not given.",
-)
 @command
 def target(
-    what: 'SheetName | Literal["all"]',
-    paper: "Paper",
-    folder: Path,
+    what: Annotated[
+        Literal["camera", "blade", "plate", "all"], typer.Argument(help="The sheet to write.")
+    ] = "all",
+    paper: Annotated[Literal["A4", "Letter"], typer.Option(help="Size of the paper.")] = "A4",
+    folder: Annotated[
+        Path, typer.Option("--output", file_okay=False, help="Folder to write into.")
+    ] = Path(),
 ) -> Answer:
     """Write the sheets to print, as PDF and PNG: camera board, blade mat, plate and rig markers.
 
-    Print the PDF at 100 %, and lay a steel rule along both rulers of the sheet. Each target has
-    markers of its own, so a photograph tells which one it shows.
+    Print the PDF at 100 %, and check both rulers of the sheet with a steel rule. No two targets
+    share a marker, so a photograph shows which target it is of.
 
     \b
     Example:

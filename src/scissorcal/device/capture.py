@@ -1,6 +1,6 @@
-"""Capture friction and cuts: drive the rig, or let a hand move it, and record what it does."""
+"""Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
 
-CaptureProgress = Callable[[float, str, CoverageGrid], None]
-"""Called with the share done (0 to 1), a sentence, and the coverage so far."""
+CaptureProgress = Callable[[float, str, Recorder], None]
+"""Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
 SUPERVISOR_S = 1.0
 RATE_CUTOFF_HZ = 120.0
@@ -30,17 +30,17 @@ FAULT_CLEARINGS_PER_S = 1.0
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut's capture: a second of it tells zeros of sensors."""
+"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
 
 CLEAR_REQUEST = (
-    "Take everything out from between the blades and keep clear: they will open, and the sledge "
-    "will go to its start."
+    "Take everything out from between the blades and keep clear: they open, and the sledge "
+    "moves to its start."
 )
 
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """What a capture recorded, what it met on the way, and how the servo did."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
 
     sample_count: int
     coverage: CoverageGrid
@@ -51,7 +51,7 @@ class CaptureReport:
 def open_writer(
     path: Path, kind: Kind, link: Link, recipe: Recipe, recipe_toml: str, *, hand: bool = False
 ) -> RecordingWriter:
-    """Open the recording of a capture, with everything that is known before it starts.
+    """Open the recording of a capture and write all that is known before it starts.
 
     ``recipe_toml`` is the recipe's text, as it stands in its file. Raises as RecordingWriter
     does, and as the plan of the capture does.
@@ -81,7 +81,7 @@ def capture_friction(
     *,
     confirm: Confirm | None = None,
 ) -> CaptureReport:
-    """Drive empty sweeps and a swing, and record them.
+    """Drive sweeps with empty blades and an excitation, and record them.
 
     ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
@@ -106,7 +106,7 @@ def capture_cut(
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
 ) -> CaptureReport:
-    """Drive strokes through sheet after sheet (or presses), or watch a hand make them.
+    """Drive strokes through sheets (or presses), or record those of a hand.
 
     With ``hand`` the motors are off while the hand moves; strokes are found from the motion. On
     a simulator the virtual hand does it, and motors bring the rig back before each sheet.
@@ -121,7 +121,7 @@ def capture_cut(
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
-                motion, recipe, recorder, loader, lambda done, what: tell(done, what, coverage)
+                motion, recipe, recorder, loader, lambda done, what: tell(done, what, recorder)
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
@@ -141,8 +141,8 @@ def capture_cut(
 def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
 
-    A computer that hesitates for 10 ms makes the device brake and latch a fault. That spoils a few
-    samples and no capture, so it is cleared, unless it comes more often than once a second.
+    A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
+    samples only, so the fault is cleared, unless there are more than one per second.
     """
     limits, control = recipe.limits, recipe.rig.control
     return ServoConfig(
@@ -173,8 +173,15 @@ def identity_facts(identity: Identity) -> dict[str, Any]:
     return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
 
 
+def identity_of(facts: Mapping[str, Any]) -> Identity:
+    """The identity that a recording's facts state, as `identity_facts` wrote them."""
+    known = {name: facts[name] for name in Identity._fields if name in facts}
+    known["schema_hash"] = int(str(facts["schema_hash"]), 16)
+    return Identity(**{**known, "nonce_echo": 0})
+
+
 class _Drive:
-    """Runs segments of a plan and tells how far it is."""
+    """Runs segments of a plan and reports progress."""
 
     def __init__(
         self, motion: Motion, recorder: Recorder, plan: Plan, progress: CaptureProgress | None
@@ -189,25 +196,25 @@ class _Drive:
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
         for samples in self._motion.track(segment.reference.head()):
-            self._take(samples, "going to where the next piece is loaded")
+            self._take(samples, "moving to where the next piece is loaded")
 
     def follow(self, segment: Segment) -> None:
         """Run a segment and record it."""
         begun = self._done
         for samples in self._motion.track(segment.reference):
-            passed = self._motion.track_index - self._motion.way_there
+            passed = self._motion.track_index - self._motion.approach_ticks
             self._done = max(self._done, begun + min(passed, len(segment.reference)))
             self._take(samples, self._doing(samples))
         self._done = begun + len(segment.reference)
 
     def idle(self) -> None:
-        """Record a second with the motors off, which shows the zeros of the sensors."""
+        """Record with the motors off, which shows the sensor zeros."""
         for samples in self._motion.idle(IDLE_S):
-            self._take(samples, "motors off, to see where the sensors have their zeros")
+            self._take(samples, "motors off, measuring sensor zeros")
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
-        self._tell(self._done / self._total, sentence, self._recorder.coverage)
+        self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
         labels = samples["stroke"]
@@ -232,5 +239,5 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
 
 
-def _silent(done: float, sentence: str, coverage: CoverageGrid) -> None:
+def _silent(done: float, sentence: str, recorder: Recorder) -> None:
     pass

@@ -1,4 +1,4 @@
-"""Coverage of a capture: which speeds it has seen at which angles, in which direction, live."""
+"""Coverage of a capture: which speeds were recorded at which angles, per direction, live."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -35,11 +35,11 @@ class Cell:
 
 
 class CoverageGrid:
-    """Seconds of motion by direction, speed and angle; a cell is filled from ``needed_s`` on.
+    """Seconds of motion by direction, speed and angle; a cell is filled once it has ``needed_s``.
 
     ``speeds`` (rad/s, ascending) are the nominal ones; a cell of speed reaches half-way to its
     neighbours in the logarithm, and by the same factor outwards. ``cells`` are ranges of opening
-    (rad). Motion that fits no cell is left out. Samples may come in blocks of any size.
+    (rad). Motion outside all cells is not counted. Samples may come in blocks of any size.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class CoverageGrid:
         return float(self.filled.mean())
 
     def thin(self) -> tuple[Cell, ...]:
-        """Return the cells that still have too little, the emptiest first."""
+        """Return the cells that are not filled, the emptiest first."""
         cells = [
             Cell(
                 self.directions[d],
@@ -106,7 +106,7 @@ class CoverageGrid:
         return tuple(sorted(cells, key=lambda cell: cell.seconds))
 
     def sentence(self) -> str:
-        """Say in one line what is covered and what is thin.
+        """One line: how many cells are filled, and which speeds are not.
 
         >>> CoverageGrid((0.1, 0.5), even_cells((0.2, 0.8))).sentence()
         '0 of 32 cells filled; thin: closing at 0.1, 0.5 rad/s; opening at 0.1, 0.5 rad/s'
@@ -124,10 +124,11 @@ class CoverageGrid:
         return f"{counts}; thin: {'; '.join(parts)}" if parts else counts
 
     def table(self) -> "Table":
-        """Return the grid as a small table for rich: a row per speed, a column per angle."""
+        """Return the grid as a table for rich: a row per speed, a column per angle."""
         from rich.table import Table
 
-        table = Table(title=f"coverage {100 * self.share:.0f} %", title_justify="left")
+        title = f"coverage {100 * self.share:.0f} %: speed (rad/s) over opening (deg)"
+        table = Table(title=title, title_justify="left")
         table.add_column("rad/s", justify="right")
         for low, high in self.cells:
             table.add_column(f"{np.degrees(low):.0f}-{np.degrees(high):.0f}", justify="center")
@@ -158,7 +159,7 @@ class CoverageGrid:
 
 
 def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:
-    """Cut a range of openings into cells of one width."""
+    """Divide a range of openings into cells of equal width."""
     edges = [float(edge) for edge in np.linspace(*opening, count + 1)]
     return tuple(pairwise(edges))
 

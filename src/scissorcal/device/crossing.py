@@ -1,4 +1,4 @@
-"""Where the recipe's edge stands over the plate: what a plan needs to place cuts and presses."""
+"""Where the recipe's edge crosses the plate, for planning cuts and presses."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ class Blade:
         """Distance from the pivot (m) at which the edge is ``above`` m over the upper face.
 
         The root of s sin(beta) + e(s) cos(beta) = y_top + above, a quadratic in s, put into
-        x = s cos(beta) - e(s) sin(beta). NaN where the edge never stands there, or not before
+        x = s cos(beta) - e(s) sin(beta). NaN where the edge never reaches it, or only beyond
         the blade's tip.
 
         >>> from scissorcal.recipe.library import builtin_recipe

@@ -1,4 +1,4 @@
-"""What the rig shall do with material between its blades: strokes through sheets, or presses."""
+"""The plan of a capture with material: strokes through sheets, or presses."""
 
 from dataclasses import dataclass
 from itertools import cycle
@@ -24,11 +24,11 @@ from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.schema import Recipe
 
 OPENING_SPEED = 1.0
-"""Speed at which the blades open again, rad/s; bounded by the scene's."""
+"""Speed at which the blades open again, rad/s; at most the scene's."""
 
 FIRST_LEAD_M = 1e-3
 LEAD_M = 4e-3
-"""How far before the end of the cut a stroke starts: a crack stays a little behind the blades."""
+"""Distance before the end of the cut at which a stroke starts: the crack lags the blades."""
 
 ADVANCE_MARGIN_M = 2e-3
 SHEET_MARGIN_M = 2e-3
@@ -42,17 +42,17 @@ DEPTH_PER_FACE = 0.9
 def cut_plan(recipe: Recipe, identity: Identity) -> Plan:
     """Plan strokes through fresh material, or presses where the scene cuts nothing.
 
-    Every sheet is one segment: close at one of the recipe's speeds (in turn), open, move on so
-    that the next stroke starts just before the end of the cut, and at last go back to where the
+    Every sheet is one segment: close at one of the recipe's speeds (in turn), open, advance so
+    that the next stroke starts just before the end of the cut, and finally return to where the
     next sheet is loaded. A press closes at one contact position and opens again. Raises
-    DeviceError where the rig has no advance motor or too little way, InputError where the recipe
+    DeviceError where the rig has no advance motor or too little travel, InputError where the recipe
     leaves nothing to cut or press.
     """
     refuse_linear(recipe)
     if not identity.capabilities & Capability.ADVANCE_MOTOR:
         raise DeviceError(
-            f"The device {identity.name} has no advance motor, so it cannot move on through the "
-            "material by itself: capture with --hand."
+            f"The device {identity.name} has no advance motor, so it cannot advance through the "
+            "material: capture with --hand."
         )
     if recipe.scene.cut:
         return _through_sheets(recipe, identity)
@@ -120,7 +120,7 @@ def _through_sheets(recipe: Recipe, identity: Identity) -> Plan:
 
 
 def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
-    """Place up to strokes_per_sheet strokes on one sheet, within the sledge's way and the sheet."""
+    """Place up to strokes_per_sheet strokes on a sheet, within it and the sledge's travel."""
     blade = Blade.of(recipe)
     openings = blade.cutting_range(opening_range(recipe, identity), recipe.scene.contact_m)
     if openings is None:
@@ -128,7 +128,7 @@ def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
     bottom, top = openings
     inner, outer = float(blade.crossing(top)), float(blade.crossing(bottom))
     end = recipe.material.sheet_length_mm * 1e-3 - SHEET_MARGIN_M
-    first, last = _sledge_way(identity)
+    first, last = _sledge_travel(identity)
     cuts: list[_Cut] = []
     crack = 0.0
     for number in range(recipe.capture.cut.strokes_per_sheet):
@@ -200,7 +200,7 @@ def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut,
     tip = TIP_SHARE * blade.length
     nearest = max(recipe.scene.contact_m[0], min(above, default=np.inf))
     farthest = min(recipe.scene.contact_m[1], max(below, default=-np.inf), tip)
-    first, last = _sledge_way(identity)
+    first, last = _sledge_travel(identity)
     places = []
     for contact in np.linspace(nearest, farthest, count) if nearest < farthest else ():
         top = blade.opening_at(float(contact), openings, CLEARANCE_M)
@@ -212,7 +212,7 @@ def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut,
     return tuple(places)
 
 
-def _sledge_way(identity: Identity) -> tuple[float, float]:
+def _sledge_travel(identity: Identity) -> tuple[float, float]:
     return identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
 
 

@@ -1,4 +1,4 @@
-"""What the doctor's measurements mean: a verdict for each, with the mend where one failed."""
+"""A verdict on each of the doctor's measurements, with the remedy where one failed."""
 
 import math
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class Measurements:
 
 
 def judge(m: Measurements, port: str) -> tuple[Verdict, ...]:
-    """Turn measurements into verdicts; each ``why`` of a failed one says what to do."""
+    """Turn measurements into verdicts; ``why`` of a failed one names the remedy."""
     return (
         _round_trip(m),
         _intervals(m),
@@ -80,10 +80,10 @@ def adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
 
 
 def _verdict(
-    scope: str, check: str, passed: bool, value: float, threshold: float, good: str, mend: str
+    scope: str, check: str, passed: bool, value: float, threshold: float, good: str, remedy: str
 ) -> Verdict:
     status: Status = "pass" if passed else "fail"
-    return Verdict(scope, check, status, value, threshold, good if passed else f"{good} {mend}")
+    return Verdict(scope, check, status, value, threshold, good if passed else f"{good} {remedy}")
 
 
 def _round_trip(m: Measurements) -> Verdict:
@@ -94,10 +94,10 @@ def _round_trip(m: Measurements) -> Verdict:
         m.round_trip.p99 <= limit and m.unanswered == 0,
         m.round_trip.p99,
         limit,
-        f"From question to answer: {m.round_trip.p50:.2f} ms in the middle, 99 % within "
-        f"{m.round_trip.p99:.2f} ms; {m.unanswered} of {m.round_trips} stayed unanswered.",
+        f"Round trip: median {m.round_trip.p50:.2f} ms, 99 % within {m.round_trip.p99:.2f} ms; "
+        f"{m.unanswered} of {m.round_trips} unanswered.",
         "Connect the device directly (no hub), set the adapter's latency timer to 1 ms, and close "
-        "what keeps the processor busy.",
+        "programs that load the processor.",
     )
 
 
@@ -109,11 +109,11 @@ def _intervals(m: Measurements) -> Verdict:
         m.interval.p99 <= limit,
         m.interval.p99,
         limit,
-        f"{m.frames} frames came {m.interval.p50:.2f} ms apart in the middle, 99 % within "
-        f"{m.interval.p99:.2f} ms, 99.9 % within {m.interval.p999:.2f} ms, at worst "
+        f"{m.frames} frames: median interval {m.interval.p50:.2f} ms, 99 % within "
+        f"{m.interval.p99:.2f} ms, 99.9 % within {m.interval.p999:.2f} ms, longest "
         f"{m.interval.worst:.1f} ms.",
-        "They come in bunches: set the adapter's latency timer to 1 ms, and close what keeps the "
-        "processor busy.",
+        "Frames arrive in batches: set the adapter's latency timer to 1 ms, and close programs "
+        "that load the processor.",
     )
 
 
@@ -138,7 +138,7 @@ def _adapter(m: Measurements, port: str) -> Verdict:
             "not_evaluated",
             None,
             ADAPTER_LIMIT_MS,
-            f"{port} is no USB adapter with a latency timer.",
+            f"{port} has no USB adapter with a latency timer.",
         )
     return _verdict(
         "device.port",
@@ -146,7 +146,7 @@ def _adapter(m: Measurements, port: str) -> Verdict:
         m.adapter_timer_ms <= ADAPTER_LIMIT_MS,
         m.adapter_timer_ms,
         ADAPTER_LIMIT_MS,
-        f"The adapter holds data back for up to {m.adapter_timer_ms:g} ms.",
+        f"The adapter delays data by up to {m.adapter_timer_ms:g} ms.",
         f"Run: echo 1 | sudo tee {adapter_timer_path(port)}",
     )
 
@@ -159,7 +159,7 @@ def _drift(m: Measurements) -> Verdict:
             "not_evaluated",
             None,
             DRIFT_LIMIT_PPM,
-            "Too few frames came to compare the clocks.",
+            "Too few frames arrived to compare the clocks.",
         )
     if m.simulated:
         return Verdict(
@@ -168,18 +168,18 @@ def _drift(m: Measurements) -> Verdict:
             "not_evaluated",
             m.drift_ppm,
             DRIFT_LIMIT_PPM,
-            f"The clock of a virtual rig stands still while this computer is busy elsewhere "
-            f"({m.drift_ppm:.0f} ppm now).",
+            f"The clock of a virtual rig stops while this computer is busy "
+            f"({m.drift_ppm:.0f} ppm now), so its drift is not judged.",
         )
-    way = "faster" if m.drift_ppm > 0 else "slower"
+    direction = "faster" if m.drift_ppm > 0 else "slower"
     return _verdict(
         "device.clock",
         "drift",
         abs(m.drift_ppm) - 2 * m.drift_se_ppm <= DRIFT_LIMIT_PPM,
         m.drift_ppm,
         DRIFT_LIMIT_PPM,
-        f"The device's clock runs {abs(m.drift_ppm):.0f} ppm {way} than this computer's (standard "
-        f"error {m.drift_se_ppm:.0f} ppm).",
+        f"The device's clock runs {abs(m.drift_ppm):.0f} ppm {direction} than this computer's "
+        f"(standard error {m.drift_se_ppm:.0f} ppm).",
         "Check the device's oscillator, and that its microseconds are microseconds: rates and "
         "accelerations are computed from them.",
     )

@@ -1,4 +1,4 @@
-"""The doctor: measure port, clocks and scheduler, and judge each."""
+"""The doctor: measure port, clocks and scheduler, with a verdict on each."""
 
 import math
 import os
@@ -30,21 +30,21 @@ U32 = 2**32
 
 @dataclass(frozen=True)
 class Examination:
-    """Measurements and what they mean."""
+    """Measurements and the verdicts on them."""
 
     measurements: Measurements
     verdicts: tuple[Verdict, ...]
 
 
 def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = None) -> Examination:
-    """Listen to a device for ``seconds``, measure this machine, and judge both.
+    """Receive frames for ``seconds``, measure this machine, and judge both.
 
     No motor is enabled. Raises DeviceError if the device stops answering.
     """
     tell = progress or (lambda done, sentence: None)
     tell(0.0, "measuring the round trip")
     trips = np.array([link.round_trip() for _ in range(ROUND_TRIPS)])
-    tell(0.2, f"listening to frames for {seconds:g} s")
+    tell(0.2, f"receiving frames for {seconds:g} s")
     arrival, device_us, sequence, garbled = _listen(link, seconds)
     tell(0.8, "measuring timer and scheduler")
     answered = trips[np.isfinite(trips)]
@@ -73,7 +73,7 @@ def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = No
 def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
     """How much faster the device's clock runs than the host's, in ppm, with its standard error.
 
-    Frames are only ever late, so a line is fitted to the earliest frame of each of some chunks.
+    Frames are late, never early, so a line is fitted to the earliest frame of each chunk.
     ``arrival_s`` and ``device_us`` (unwrapped), both (n,). NaN for fewer than 100 frames.
     """
     if len(arrival_s) < 100:
@@ -116,7 +116,7 @@ def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, 
                     states.append(message)
             if not states:
                 raise DeviceError(
-                    f"{link.name} was asked to stream and sends no state: restart the device."
+                    f"{link.name} sends no state after STREAM = 1: restart the device."
                 )
     finally:
         garbled = link.garbled
@@ -144,7 +144,7 @@ def _lateness() -> Array:
 
 
 def _realtime_priority() -> int:
-    """Highest real-time priority that this process may have; 0 where it gets none when it tries."""
+    """Highest real-time priority that this process may have; 0 where the system grants none."""
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))

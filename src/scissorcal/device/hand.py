@@ -33,14 +33,14 @@ def hand_strokes(
 ) -> None:
     """Record the strokes that a hand makes through each sheet.
 
-    A sheet is done once its strokes are made and the blades stand open again, or nothing has
-    moved for a minute (which becomes a note). Raises DeviceError where the rig fails, or has no
+    A sheet is finished once its strokes are made and the blades are open again, or after a minute
+    without motion (which becomes a note). Raises DeviceError where the rig fails, or has no
     sensor for the force of the hand.
     """
     if not motion.identity.capabilities & Capability.HANDLE_FORCE_SENSOR:
         raise DeviceError(
             f"The device {motion.identity.name} does not measure the force on its handles, so a "
-            "capture by hand would not know what drives the blades: capture without --hand."
+            "capture by hand cannot measure what drives the blades: capture without --hand."
         )
     watch = _Watch(motion, recipe, recorder, tell)
     speeds = cycle(recipe.capture.cut.speeds_rad_per_s)
@@ -72,7 +72,7 @@ def hand_travel(recipe: Recipe, identity: Identity) -> float:
 
 
 class _Watch:
-    """Records what comes, and counts the strokes of the sheet at hand."""
+    """Records samples and counts the strokes of the current sheet."""
 
     def __init__(self, motion: Motion, recipe: Recipe, recorder: Recorder, tell: Tell) -> None:
         self._motion = motion
@@ -86,12 +86,12 @@ class _Watch:
         self._opening: list[NDArray[np.float64]] = []
 
     def begin(self, sheet: int) -> None:
-        """Forget what came before: a fresh sheet lies between the blades."""
+        """Restart the count: a fresh sheet is between the blades."""
         self._sheet = sheet
         self._time, self._opening = [], []
 
     def until(self, strokes: int, give_up_s: float) -> bool:
-        """Record until so many strokes of this sheet are made; False if nothing moves any more."""
+        """Record until ``strokes`` of this sheet are made; False if nothing moved for too long."""
         every = max(1, round(THINNED_S / self._motion.tick_s))
         while True:
             for samples in self._motion.idle(LOOK_EVERY_S):
@@ -107,7 +107,7 @@ class _Watch:
             if rest >= give_up_s:
                 self._recorder.writer.note(
                     f"Piece {self._sheet + 1} was left after {made} of {self._wanted} strokes: "
-                    f"nothing moved for {give_up_s:g} s."
+                    f"no motion for {give_up_s:g} s."
                 )
                 return False
 
@@ -117,19 +117,19 @@ class _Watch:
         self._opening.append(samples["opening"][::every])
 
     def _made(self, time: NDArray[np.float64], opening: NDArray[np.float64]) -> int:
-        """Closings so far, the one under way included."""
+        """Closing strokes so far, including the current one."""
         if len(time) == 0:
             return 0
         strokes = label_strokes(opening, time, self.travel).strokes
         return sum(stroke.kind == "closing" for stroke in strokes)
 
     def _closed(self, opening: NDArray[np.float64]) -> bool:
-        """Whether the blades still stand where a closing left them."""
+        """Whether the blades are still closed."""
         return float(opening[-1]) < float(opening.min()) + 0.5 * self.travel
 
 
 def _bring_back(motion: Motion, recipe: Recipe, recorder: Recorder, loader: Loader) -> None:
-    """Let a simulator's motors do what a person does: draw back before the next sheet."""
+    """Move a simulator back to where the next sheet is loaded, as a person would."""
     motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
     loader.retract()
     recorder.writer.mark_sheet(-1)
@@ -139,7 +139,7 @@ def _bring_back(motion: Motion, recipe: Recipe, recorder: Recorder, loader: Load
 
 
 def _rest_s(time: NDArray[np.float64], opening: NDArray[np.float64], within: float) -> float:
-    """Seconds for which the opening has stayed within a band around where it is now."""
+    """Seconds for which the opening has stayed within a band around its last value."""
     if len(time) == 0:
         return 0.0
     away = np.flatnonzero(np.abs(opening - opening[-1]) > within)

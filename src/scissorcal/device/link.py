@@ -8,7 +8,6 @@ import select
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
 from scissorcal.device.ports import open_port
@@ -41,7 +40,7 @@ IDENTITY_TYPE = 0x11
 
 
 class Link(Protocol):
-    """What every way to a rig can do; see PortLink for a port, LockstepLink for virtual time."""
+    """What every link to a rig has; see PortLink for a port, LockstepLink for virtual time."""
 
     @property
     def identity(self) -> Identity: ...
@@ -55,12 +54,12 @@ class Link(Protocol):
 
 
 def open_link(port: str, baud: int = DEFAULT_BAUD, timeout: float = 2.0) -> "PortLink":
-    """Open a port, throw away what waited in it, and ask the device who it is.
+    """Open a port, discard what waits in it, and ask the device for its identity.
 
     The port is locked against a second user. ``timeout`` (s) bounds the wait for the answer; a
     device that needs longer to boot after its port is opened needs more. Raises DeviceError, with
-    what to do next, where the port is missing, busy or forbidden, where nothing answers, where
-    something else speaks there, and where the device's wire version or schema is another one.
+    the remedy, where the port is missing, busy or forbidden, where nothing or something else
+    answers, and where the device has another wire version or schema.
     """
     link = PortLink(open_port(port, baud), port)
     try:
@@ -83,14 +82,16 @@ class PortLink(AbstractContextManager["PortLink"]):
 
     @property
     def identity(self) -> Identity:
-        """Who the device said it is."""
+        """The identity that the device stated."""
         if self._identity is None:
-            raise DeviceError(f"{self.name}: the device has not been asked who it is.")
+            raise DeviceError(
+                f"{self.name}: call shake_hands() first; the device has not stated its identity."
+            )
         return self._identity
 
     @property
     def garbled(self) -> int:
-        """Frames from the device that were thrown away since the port was flushed."""
+        """Frames from the device that were discarded since the port was flushed."""
         return self.received.garbled
 
     def fileno(self) -> int:
@@ -98,25 +99,20 @@ class PortLink(AbstractContextManager["PortLink"]):
         return int(self._port.fileno())
 
     def close(self) -> None:
-        """Close the port; a port that is gone already is no error."""
+        """Close the port; no error where the port is gone."""
         with suppress(OSError):
             self._port.close()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def send(self, message: Message) -> None:
-        """Write one message whole. DeviceError if the port is gone or takes nothing for 1 s."""
+        """Write one message whole. DeviceError if the port is gone or accepts no data for 1 s."""
         data = encode(message)
         while data:
             try:
                 if not select.select([], [self.fileno()], [], 1.0)[1]:
-                    raise DeviceError(f"{self.name} takes no data: unplug and replug the device.")
+                    raise DeviceError(f"{self.name} accepts no data: unplug and replug the device.")
                 data = data[os.write(self.fileno(), data) :]
             except (OSError, ValueError) as error:
                 raise self._gone() from error
@@ -124,14 +120,15 @@ class PortLink(AbstractContextManager["PortLink"]):
     def receive(self, timeout: float) -> Iterator[Message]:
         """Yield the messages that arrive within ``timeout`` seconds; unreadable ones are skipped.
 
-        Payloads of unknown type are dropped: a newer device may say more than this host knows.
+        Payloads of unknown type are dropped: a newer device may send messages that this host does
+        not know.
         """
         for payload in self._payloads(timeout):
             with suppress(ValueError):
                 yield decode(payload)
 
     def configure(self, key: int, value: float) -> float:
-        """Set one value and return what is in force then; lost frames are sent again.
+        """Set one value and return the value in force; lost frames are sent again.
 
         Raises DeviceError where the device does not know the key, refuses the value, or does not
         answer.
@@ -145,7 +142,7 @@ class PortLink(AbstractContextManager["PortLink"]):
                     return message.value
         raise DeviceError(
             f"{self.name} did not confirm {_key_name(key)} = {value:g} in {CONFIGURE_ATTEMPTS} "
-            f"attempts ({self.received.garbled} frames arrived garbled): check the cable and the "
+            f"attempts ({self.received.garbled} frames were garbled): check the cable and the "
             "baud rate."
         )
 
@@ -165,7 +162,7 @@ class PortLink(AbstractContextManager["PortLink"]):
             if isinstance(message, State):
                 return message
         raise DeviceError(
-            f"{self.name} answers, but sent no state for {timeout:g} s: restart the device."
+            f"{self.name} answers but sent no state for {timeout:g} s: restart the device."
         )
 
     def flush(self) -> None:
@@ -203,21 +200,21 @@ class PortLink(AbstractContextManager["PortLink"]):
         heard = self.received.bytes_received
         if heard == 0:
             return DeviceError(
-                f"{self.name} is silent: {timeout:g} s after the question who it is, nothing has "
-                "arrived. Check that the rig is powered and that this is its port."
+                f"{self.name} sent nothing within {timeout:g} s of the handshake. Check that the "
+                "rig is powered and that this is its port."
             )
         if frames == 0:
             return DeviceError(
-                f"Something else speaks on {self.name}: {heard} bytes arrived and none made a "
-                "frame. Check the port and the baud rate (the device's, 921600 by default)."
+                f"{self.name} sent {heard} bytes but no valid frame: another device, or another "
+                "baud rate. Check the port and the baud rate (921600 by default)."
             )
         return DeviceError(
-            f"{self.name} sends sound frames ({frames}) but does not say who it is: restart the "
-            "device, and check that its line towards it is connected."
+            f"{self.name} sends valid frames ({frames}) but does not answer the handshake: restart "
+            "the device, and check that its receive line is connected."
         )
 
     def _payloads(self, timeout: float) -> Iterator[bytes]:
-        """Yield payloads until ``timeout``; one bunch that has arrived is always given whole."""
+        """Yield payloads until ``timeout``; what has arrived at once is always given whole."""
         deadline = time.monotonic() + timeout
         while True:
             left = max(deadline - time.monotonic(), 0.0)
@@ -243,7 +240,7 @@ class PortLink(AbstractContextManager["PortLink"]):
         return data
 
     def _write_delimiter(self) -> None:
-        """End whatever half a frame the device may still hold from an earlier talk."""
+        """End an incomplete frame that the device may still hold from an earlier connection."""
         with suppress(BlockingIOError):
             try:
                 os.write(self.fileno(), b"\0")
@@ -254,8 +251,8 @@ class PortLink(AbstractContextManager["PortLink"]):
 
     def _gone(self) -> DeviceError:
         return DeviceError(
-            f"{self.name} went away: the device was unplugged or switched off. Plug it in and "
-            "start again."
+            f"{self.name} is gone: the device was unplugged or switched off. Plug it in and start "
+            "again."
         )
 
     def _nonce(self) -> int:
@@ -266,29 +263,22 @@ class PortLink(AbstractContextManager["PortLink"]):
 
 
 def check_identity(name: str, identity: Identity) -> Identity:
-    """Return an identity that this host can work with.
+    """Return the identity if this host can work with it.
 
     Raises DeviceError where version or schema differ, or where a limit is no number or empty.
     """
     if identity.schema_hash != SCHEMA_HASH:
         raise DeviceError(
-            f"{name} speaks another wire schema: the device (firmware "
+            f"{name} has another wire schema: the device (firmware "
             f"{identity.firmware_version}) has {identity.schema_hash:016x}, this scissorcal has "
             f"{SCHEMA_HASH:016x}. Update the device's firmware to this scissorcal's "
             "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
         )
-    fields = (
-        "torque_limit",
-        "force_limit",
-        "opening_min",
-        "opening_max",
-        "advance_min",
-        "advance_max",
-        "opening_resolution",
-        "advance_resolution",
-        "handle_radius",
-    )
-    wrong = [field for field in fields if not math.isfinite(getattr(identity, field))]
+    wrong = [
+        name
+        for name, value in identity._asdict().items()
+        if isinstance(value, float) and not math.isfinite(value)
+    ]
     if not identity.torque_limit > 0:
         wrong.append("torque_limit")
     if not identity.opening_min < identity.opening_max:
@@ -299,14 +289,14 @@ def check_identity(name: str, identity: Identity) -> Identity:
         wrong.append("tick_us")
     if wrong:
         raise DeviceError(
-            f"{name} states limits that cannot be right ({', '.join(dict.fromkeys(wrong))}): "
-            "correct its firmware's identity; no motor is moved before that."
+            f"{name} states impossible limits ({', '.join(dict.fromkeys(wrong))}): "
+            "correct the identity in its firmware. No motor was moved."
         )
     return identity
 
 
 def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
-    """Raise DeviceError unless the echo says that the device took the value."""
+    """Raise DeviceError unless the echo confirms the value."""
     if echo.status == ConfigStatus.UNKNOWN_KEY:
         raise DeviceError(
             f"{name} does not know the setting {_key_name(key)}: update its firmware"
@@ -314,9 +304,9 @@ def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
         )
     if echo.status != ConfigStatus.OK:
         raise DeviceError(
-            f"{name} refused {_key_name(key)} = {value:g} (it holds {echo.value:g})"
+            f"{name} refused {_key_name(key)} = {value:g} (in force: {echo.value:g})"
             + (
-                "; to take a fresh sheet the blades must stand open before it."
+                "; open the blades before a fresh sheet is loaded."
                 if key == ConfigKey.MATERIAL
                 else "."
             )
@@ -327,7 +317,7 @@ def _refuse_other_version(name: str, payload: bytes) -> None:
     if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] != PROTOCOL_VERSION:
         older = "the device's firmware" if payload[1] < PROTOCOL_VERSION else "scissorcal"
         raise DeviceError(
-            f"{name} speaks wire protocol version {payload[1]}, this scissorcal version "
+            f"{name} has wire protocol version {payload[1]}, this scissorcal version "
             f"{PROTOCOL_VERSION}: update {older}."
         )
 

@@ -1,4 +1,4 @@
-"""Who puts material between the blades: a person who is asked, or a simulator that is told."""
+"""Loading material: a person is asked, a simulator is commanded."""
 
 from collections.abc import Callable
 
@@ -8,16 +8,16 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity
 
 Confirm = Callable[[str], None]
-"""Shows a request to a person and returns once it is done; raises to give up."""
+"""Shows a request to a person and returns once it is done; raises to cancel."""
 
 
 def is_simulator(identity: Identity) -> bool:
-    """Whether the rig is a virtual one, which loads and clears by itself."""
+    """Whether the rig is virtual, and so loads and clears material by itself."""
     return bool(identity.capabilities & Capability.SIMULATOR)
 
 
 class Loader:
-    """Sees to it that the blades are empty, or have a fresh sheet before them.
+    """Has the blades cleared, or a fresh sheet loaded.
 
     On a simulator it sets MATERIAL. Elsewhere it switches the motors off and calls ``confirm``
     with the request; InputError, before anything moves, if there is no ``confirm``.
@@ -30,8 +30,8 @@ class Loader:
         self.simulated = is_simulator(motion.identity)
         if not self.simulated and confirm is None:
             raise InputError(
-                "This capture has to ask somebody to clear the blades and load material: give it "
-                "a confirm callback that shows a sentence and returns when that is done."
+                "This capture must ask a person to clear the blades and load material: pass a "
+                "confirm callback that shows a sentence and returns when that is done."
             )
 
     def clear(self, request: str) -> None:

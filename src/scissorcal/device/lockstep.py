@@ -32,10 +32,10 @@ ANSWER_TICKS = 50
 
 
 class LockstepLink:
-    """The face of a link (``identity``, ``configure``, ``close``) plus :meth:`exchange`.
+    """A link (``identity``, ``configure``, ``close``) with :meth:`exchange`.
 
     ``specimen`` is a Specimen, its name or its path; ``rng`` seeds everything random in the rig.
-    ``rig`` gives the truth to tests and judges.
+    ``rig`` gives tests the truth.
 
     >>> from scissorcal.kernel import ConfigKey
     >>> link = LockstepLink("office-paper", np.random.default_rng(1))
@@ -51,7 +51,7 @@ class LockstepLink:
         rng: np.random.Generator,
         faults: Faults | None = None,
     ) -> None:
-        """Power on a rig and ask who it is; DeviceError if it never answers."""
+        """Power on a rig and read its identity; DeviceError if it never answers."""
         loaded = specimen if isinstance(specimen, Specimen) else load_specimen(specimen)
         rig_rng, line_rng = rng.spawn(2)
         self.name = f"The virtual rig {loaded.name}"
@@ -66,8 +66,8 @@ class LockstepLink:
         )
         if not isinstance(answer, Identity):
             raise DeviceError(
-                f"{self.name} did not answer {ATTEMPTS} times: its faults leave no frame whole, "
-                "so ask for fewer."
+                f"{self.name} did not answer {ATTEMPTS} times: its faults garble every frame. "
+                "Set fewer faults."
             )
         self.identity: Identity = check_identity(self.name, answer)
 
@@ -78,11 +78,11 @@ class LockstepLink:
 
     @property
     def garbled(self) -> int:
-        """Frames from the rig that were thrown away."""
+        """Frames from the rig that were discarded."""
         return self._decoder.garbled
 
     def exchange(self, command_frame: bytes | None) -> list[bytes]:
-        """Send a frame (or none), let one tick pass, and give the STATE payloads that arrive.
+        """Send a frame (or none), advance one tick, and return the STATE payloads that arrive.
 
         There is one payload per tick unless faults drop or delay it, and none before STREAM is
         set. Raises DeviceError once the rig is unplugged or the link closed.
@@ -93,7 +93,7 @@ class LockstepLink:
         return [payload for payload in self._pass_tick() if _is_state(payload)]
 
     def configure(self, key: int, value: float) -> float:
-        """Set a value of the device, wait for its echo and return the value that it holds now.
+        """Set a value of the device, wait for its echo and return the value in force.
 
         Sent again (with a new nonce) if no echo arrives; ticks pass only while waiting for one.
         Raises DeviceError if the device does not know the key, refuses the value, or never
@@ -107,13 +107,13 @@ class LockstepLink:
         if not isinstance(answer, ConfigEcho):
             raise DeviceError(
                 f"{self.name} did not confirm setting {int(key):#06x} in {ATTEMPTS} attempts: its "
-                "faults lose too many frames, so ask for fewer."
+                "faults drop too many frames. Set fewer faults."
             )
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
 
     def close(self) -> None:
-        """Let go of the rig; doing so twice is fine."""
+        """Release the rig; may be called twice."""
         self._closed = True
 
     def __enter__(self) -> "LockstepLink":
@@ -125,7 +125,7 @@ class LockstepLink:
     def _ask(
         self, question: Callable[[int], Message], answers: Callable[[Message, int], bool]
     ) -> Message | None:
-        """Ask until the answer comes; STATE payloads that pass meanwhile are let go."""
+        """Ask until the answer arrives; STATE payloads that arrive before it are dropped."""
         for _ in range(ATTEMPTS):
             self._nonce += 1
             self._protocol.receive(encode(question(self._nonce)))
@@ -143,7 +143,7 @@ class LockstepLink:
             self._closed = True
             raise DeviceError(
                 f"{self.name} was unplugged after {self._protocol.faults.unplug_s:g} s of "
-                f"streaming, as its faults ask ({self.virtual_time / TICK_S:.0f} ticks in all)."
+                f"streaming, as its faults specify ({self.virtual_time / TICK_S:.0f} ticks in all)."
             )
         return self._collect()
 

@@ -20,7 +20,7 @@ from scissorcal.kernel import (
     StopReason,
 )
 
-FAREWELLS = 3
+RELEASE_COMMANDS = 3
 SILENCE_S = 1.0
 
 
@@ -43,7 +43,7 @@ class Exchanging(Protocol):
 
 
 class LockstepMotion(Motion):
-    """Runs the same servo as the loop does, frame by frame; made by open_motion.
+    """Runs the servo of the loop frame by frame; made by open_motion.
 
     The host's clock is the virtual one, in nanoseconds since the rig was switched on.
     """
@@ -94,7 +94,7 @@ class LockstepMotion(Motion):
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Virtual time stands still in a pause."""
+        """Virtual time stops during a pause."""
         self.engage(Mode.IDLE)
         self.step()
         yield
@@ -117,7 +117,7 @@ class LockstepMotion(Motion):
             return
         self._servo.stop()
         try:
-            for _ in range(FAREWELLS):
+            for _ in range(RELEASE_COMMANDS):
                 self._exchange()
             self._link.configure(ConfigKey.STREAM, 0.0)
         except DeviceError as error:
@@ -138,7 +138,7 @@ class LockstepMotion(Motion):
         return self._without_repeats(samples)
 
     def _exchange(self) -> list[bytes]:
-        """Let one tick pass: send the newest command, take what arrives, give its samples."""
+        """Advance one tick: send the newest command, return the samples of the frames received."""
         payloads = self._link.exchange(self._frame)
         self._frame = None
         rows = []
@@ -149,7 +149,7 @@ class LockstepMotion(Motion):
         return rows
 
     def _without_repeats(self, samples: Samples) -> Samples:
-        """Drop the samples of repeated frames, for which the servo tells of the last one again."""
+        """Drop the samples of repeated frames, for which the servo returns the previous sample."""
         sequence = samples["sequence"].astype(np.int64)
         fresh = np.diff(sequence, prepend=self._last_sequence) != 0
         if len(sequence):

@@ -1,14 +1,13 @@
-"""One way to run the servo on a rig, whether through a port in real time or in virtual time.
+"""The servo on a rig, through a port in real time or in virtual time.
 
-A motion idles (motors off), tracks a reference, renders, or damps. In each of these it hands over
-samples in blocks, as they come.
+A motion idles (motors off), tracks a reference, renders, or damps. In each mode it yields samples
+in blocks, as they arrive.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +40,11 @@ class Latency:
 
 @dataclass(frozen=True)
 class MotionReport:
-    """How a motion went.
+    """Counts, energies and latencies of a motion.
 
-    ``counters`` count frames and limits; ``garbled`` frames were thrown away, ``stalls`` are
+    ``counters`` count frames and limits; ``garbled`` frames were discarded, ``stalls`` are
     pauses of more than five ticks between frames by the host's clock, ``overrun`` samples were
-    overwritten before they were fetched. ``latency`` is None in virtual time, where it means
-    nothing.
+    overwritten before they were read. ``latency`` is None in virtual time.
     """
 
     counters: ServoCounters
@@ -61,11 +59,10 @@ class MotionReport:
 
 
 class Motion(AbstractContextManager["Motion"], ABC):
-    """The servo at work on a rig; leaving the context switches the motors off.
+    """A running servo on a rig; leaving the context switches the motors off.
 
-    ``identity`` says whose rig it is, ``position`` where it stood last (opening in rad, advance
-    in m). Everything that yields samples raises DeviceError once the servo has stopped by itself,
-    after the last sample has been handed over.
+    ``identity`` is the rig's, ``position`` its last opening (rad) and advance (m). Methods that
+    yield samples raise DeviceError once the servo has stopped by itself, after the last sample.
     """
 
     identity: Identity
@@ -73,7 +70,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def __init__(self, identity: Identity) -> None:
         self.identity = identity
         self._position: tuple[float, float] | None = None
-        self._way_there = 0
+        self._approach_ticks = 0
 
     @property
     def tick_s(self) -> float:
@@ -90,32 +87,32 @@ class Motion(AbstractContextManager["Motion"], ABC):
         return self._position
 
     @property
-    def way_there(self) -> int:
-        """Ticks that the way to the reference takes, before it begins itself."""
-        return self._way_there
+    def approach_ticks(self) -> int:
+        """Ticks of the approach to the start of the reference."""
+        return self._approach_ticks
 
     def idle(self, seconds: float) -> Iterator[Samples]:
-        """Switch the motors off and yield what comes for ``seconds`` of the device's time."""
+        """Switch the motors off and yield samples for ``seconds`` of the device's time."""
         self.engage(Mode.IDLE)
         yield from self._for_ticks(round(seconds / self.tick_s))
 
     def track(self, reference: Reference) -> Iterator[Samples]:
-        """Follow a reference from where the rig stands, smoothly, to its end; then motors off.
+        """Move smoothly to the start of a reference and follow it to its end; then motors off.
 
-        Goes to the reference's start first (stroke -1). Raises InputError, before anything moves,
+        Samples of the approach have stroke -1. Raises InputError, before anything moves,
         if the reference leaves the device's limits.
         """
-        way = approach(*self.position, reference, self.tick_s)
-        whole = way + reference
+        path = approach(*self.position, reference, self.tick_s)
+        whole = path + reference
         check_reference(reference, self.identity)
-        self._way_there = len(way)
+        self._approach_ticks = len(path)
         self.set_reference(whole)
         self.engage(Mode.TRACK)
         while not (self.mode is Mode.TRACK and self.track_index >= len(whole) - 1):
             if self.mode is Mode.DAMP:
                 raise DeviceError(
-                    "The servo fell back to damping because this process was too late to show that "
-                    "it lives: close what keeps the computer busy, and start again."
+                    "The servo fell back to damping: this process did not send its heartbeat in "
+                    "time. Close programs that load the processor, and start again."
                 )
             yield self.step()
         yield from self.idle(BLOCK_S)
@@ -127,7 +124,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         yield from self.idle(BLOCK_S)
 
     def step(self) -> Samples:
-        """Let about 50 ms pass and return the samples that came; shows that the host lives."""
+        """Wait about 50 ms, send a heartbeat, and return the samples that arrived."""
         samples = self._pass_time()
         if len(samples):
             place = (float(samples["opening"][-1]), float(samples["advance"][-1]))
@@ -139,11 +136,11 @@ class Motion(AbstractContextManager["Motion"], ABC):
 
     @abstractmethod
     def engage(self, mode: Mode) -> None:
-        """Order a mode; it holds from the next frame on."""
+        """Request a mode; it takes effect with the next frame."""
 
     @abstractmethod
     def set_reference(self, reference: Reference) -> None:
-        """Set what TRACK follows; not while it does."""
+        """Set what TRACK follows; not while TRACK is engaged."""
 
     @abstractmethod
     def fresh_sheet(self, crack: float = 0.0) -> None:
@@ -151,15 +148,15 @@ class Motion(AbstractContextManager["Motion"], ABC):
 
     @abstractmethod
     def configure(self, key: int, value: float) -> float:
-        """Set a value of the device and return what is in force; DeviceError if it refuses."""
+        """Set a value of the device and return the value in force; DeviceError if it refuses."""
 
     @abstractmethod
     def paused(self) -> AbstractContextManager[None]:
-        """Motors off while somebody else has the word; the samples of that time are dropped."""
+        """Motors off while the caller waits for a person; the samples of that time are dropped."""
 
     @abstractmethod
     def report(self) -> MotionReport:
-        """How it has gone so far."""
+        """Counts, energies and latencies so far."""
 
     @abstractmethod
     def close(self) -> None:
@@ -173,7 +170,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @property
     @abstractmethod
     def track_index(self) -> int:
-        """How many ticks of the reference have passed."""
+        """Ticks of the reference that have passed."""
 
     @property
     @abstractmethod
@@ -183,14 +180,14 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @property
     @abstractmethod
     def garbled(self) -> int:
-        """Frames thrown away so far."""
+        """Frames discarded so far."""
 
     @abstractmethod
     def _pass_time(self) -> Samples: ...
 
     @abstractmethod
     def _why_lost(self) -> DeviceError | None:
-        """Say why the rig is out of reach, None where the servo itself stopped."""
+        """The error where the link to the rig failed, None where the servo itself stopped."""
 
     def _stopped(self) -> DeviceError:
         lost = self._why_lost()
@@ -199,8 +196,8 @@ class Motion(AbstractContextManager["Motion"], ABC):
         sentence = self.stop_reason.sentence
         if self.stop_reason is StopReason.TRACKING_LOST:
             sentence += (
-                " Where the port is slow ('scissorcal device doctor' tells), lower the gains in "
-                "the recipe's rig.control."
+                " If 'scissorcal device doctor' finds the port slow, lower the gains in the "
+                "recipe's rig.control."
             )
         return DeviceError(sentence)
 
@@ -214,10 +211,5 @@ class Motion(AbstractContextManager["Motion"], ABC):
                 passed = (int(samples["sequence"][-1]) - first) % 2**32 + 1
             yield samples
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

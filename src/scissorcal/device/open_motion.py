@@ -7,7 +7,7 @@ from scissorcal.device.port_motion import PortMotion
 from scissorcal.kernel import ModelTables, ServoConfig
 
 SPARE_S = 30.0
-"""What a block of shared memory has room for beyond the longest reference: the way there."""
+"""Room in the shared memory beyond the longest reference, for the approach to its start."""
 
 
 def open_motion(
@@ -17,11 +17,12 @@ def open_motion(
     *,
     longest_reference: int = 0,
 ) -> Motion:
-    """Start the servo on a link: in a process of its own on a port, in this one in virtual time.
+    """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 
-    ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It begins idle, and
-    knows where the rig stands. A fault that the device has latched is cleared.
+    ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It starts idle, with
+    the rig's position known. A fault that the device has latched is cleared.
 
+    >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
     >>> link = LockstepLink("office-paper", np.random.default_rng(1))
     >>> limits = ServoConfig(torque_limit=1, torque_slew=200, force_limit=0, force_slew=0)

@@ -12,7 +12,7 @@ LEAST_RAMP_S = 0.03
 
 @dataclass(frozen=True)
 class Reference:
-    """Where the rig shall be at each tick; all arrays (n,).
+    """Commanded position at each tick; all arrays (n,).
 
     ``opening`` rad, ``opening_rate`` rad/s, ``advance`` m, ``stroke`` the stroke's index or -1.
     """
@@ -26,7 +26,7 @@ class Reference:
         return len(self.opening)
 
     def head(self) -> "Reference":
-        """Return where it begins, as a rest of one tick that belongs to no stroke."""
+        """Return the start as a rest of one tick that belongs to no stroke."""
         still = np.zeros(1)
         return Reference(self.opening[:1], still, self.advance[:1], np.full(1, -1, dtype=np.int32))
 
@@ -40,7 +40,7 @@ class Reference:
 
 
 class PathBuilder:
-    """Strings movements together, one axis at a time, from a place to start at.
+    """Joins movements of one axis at a time, from a start position.
 
     >>> path = PathBuilder(opening=0.5, advance=0.0, tick_s=1e-3)
     >>> path.open_to(0.4, speed=0.1, acceleration=20.0, stroke=0)
@@ -76,7 +76,7 @@ class PathBuilder:
         self._append(still, np.zeros(count), np.full(count, self.advance), -1)
 
     def swing(self, way: Array, rate: Array, stroke: int) -> None:
-        """Follow an excitation around where the blades stand; it must end where it began."""
+        """Follow an excitation around the current opening; it must end where it began."""
         self._append(self.opening + way, rate, np.full(len(way), self.advance), stroke)
 
     def reference(self) -> Reference:
@@ -96,7 +96,7 @@ class PathBuilder:
 
 
 def glide(distance: float, speed: float, acceleration: float, tick_s: float) -> tuple[Array, Array]:
-    """Way and rate from rest to rest: raised-cosine ramps with a cruise at ``speed`` between.
+    """Displacement and rate from rest to rest: raised-cosine ramps, between them ``speed``.
 
     ``acceleration`` bounds the ramps' peak; where the distance is too short to reach ``speed``,
     the cruise is slower. Both arrays (n,): the first entry is one tick after the start, the last
@@ -126,7 +126,7 @@ def ramp_time(speed: float, acceleration: float) -> float:
 
 
 def ramp_way(speed: float, acceleration: float) -> float:
-    """Way that one ramp from rest to ``speed`` takes."""
+    """Displacement of one ramp from rest to ``speed``."""
     return 0.5 * speed * ramp_time(speed, acceleration)
 
 
@@ -146,7 +146,7 @@ def multisine(
     tick_s: float,
     tones: int = 14,
 ) -> tuple[Array, Array]:
-    """Way and rate of a multisine that fades in and out, as large as its limits allow.
+    """Displacement and rate of a multisine that fades in and out, as large as its limits allow.
 
     Tones lie evenly in the logarithm of frequency, on multiples of 1/duration, with equal rate
     amplitudes and Schroeder phases (Schroeder 1970, doi:10.1109/TIT.1970.1054411), which keep the

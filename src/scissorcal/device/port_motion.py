@@ -1,4 +1,4 @@
-"""The servo on a port, in real time: a process of its own does the work, this one watches."""
+"""The servo on a port, in real time: a separate process runs it, this one supervises."""
 
 import time
 from collections.abc import Iterator
@@ -23,11 +23,11 @@ from scissorcal.kernel import (
 DRAIN_S = 0.05
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
-FIRST_PLACE_TIMEOUT_S = 2.0
+FIRST_POSITION_TIMEOUT_S = 2.0
 
 
 class PortMotion(Motion):
-    """Steers a ServoProcess through its block; made by open_motion."""
+    """Controls a ServoProcess through its shared memory block; made by open_motion."""
 
     def __init__(
         self, link: PortLink, config: ServoConfig, tables: ModelTables | None, capacity: int
@@ -40,7 +40,7 @@ class PortMotion(Motion):
         self._final: MotionReport | None = None
         try:
             self._process.start()
-            until = time.monotonic() + FIRST_PLACE_TIMEOUT_S
+            until = time.monotonic() + FIRST_POSITION_TIMEOUT_S
             while self._position is None and time.monotonic() < until:
                 self.step()
         except BaseException:
@@ -62,7 +62,7 @@ class PortMotion(Motion):
 
     @property
     def stop_reason(self) -> StopReason:
-        """As the loop says; SUPERVISOR_LOST never, HANGUP where its process died."""
+        """As the loop reports it, HANGUP where its process died."""
         if not self._process.alive and self._block.stop_reason is StopReason.NONE:
             return StopReason.HANGUP
         return self._block.stop_reason
@@ -99,7 +99,7 @@ class PortMotion(Motion):
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Motors off, heart kept beating by a thread, and what was sampled meanwhile dropped."""
+        """Motors off; a thread sends the heartbeat, and samples of this time are dropped."""
         self._go_idle()
         with self._process.kept_alive():
             yield
@@ -134,7 +134,7 @@ class PortMotion(Motion):
             self._link.flush()
 
     def _pass_time(self) -> Samples:
-        """Wait until 50 ms after the last call, or less if the loop has ended; drain the ring."""
+        """Wait until 50 ms after the last call, or the end of the loop; empty the ring buffer."""
         self._block.beat()
         self._drain_at = max(self._drain_at + DRAIN_S, time.monotonic())
         while (left := self._drain_at - time.monotonic()) > 0 and self._process.alive:
@@ -151,7 +151,7 @@ class PortMotion(Motion):
         return None
 
     def _go_idle(self) -> None:
-        """Switch the motors off and wait until that holds."""
+        """Switch the motors off and wait for the mode to change."""
         self.engage(Mode.IDLE)
         until = time.monotonic() + IDLE_TIMEOUT_S
         while self.mode is not Mode.IDLE:

@@ -1,4 +1,4 @@
-"""Serial ports and pseudo-terminals: open one for a rig, or say why that cannot be."""
+"""Serial ports and pseudo-terminals: open one for a rig, or raise an error with the reason."""
 
 import errno
 import os
@@ -16,9 +16,9 @@ BUSY_PATIENCE_S = 0.5
 
 
 def open_port(port: str, baud: int) -> "serial.Serial":
-    """Open a port for one user alone, raw, without blocking, and without its adapter's delay.
+    """Open a port exclusively, raw, non-blocking, with the adapter's latency at its least.
 
-    A busy port is tried for half a second, in which a capture that was killed lets go of it.
+    A busy port is retried for half a second, until a capture that was killed has released it.
     Raises DeviceError, with what to do next, where it is missing, busy, forbidden or no port.
     """
     import serial
@@ -50,7 +50,7 @@ def _why_not_open(port: str, baud: int, error: Exception) -> str:
     number = _errno_of(error)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         found = known_ports()
-        there = f"There are: {', '.join(found)}." if found else "This machine has none at all."
+        there = f"Ports found: {', '.join(found)}." if found else "No port was found."
         return f"There is no port {port}. {there} Plug the rig in, or use --device sim."
     if number in (errno.EACCES, errno.EPERM):
         return (
@@ -58,14 +58,14 @@ def _why_not_open(port: str, baud: int, error: Exception) -> str:
             "'sudo usermod -aG dialout $USER'), log in again, and retry."
         )
     if number in BUSY:
-        return f"{port} is in use by another program: close that one first."
+        return f"{port} is in use by another program: close that program first."
     if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):
-        return f"{port} is no serial port, or cannot do {baud} baud: name the rig's port."
-    return f"{port} cannot be opened: {error}."
+        return f"{port} is not a serial port, or does not support {baud} baud: name the rig's port."
+    return f"{port} cannot be opened ({error}): check the cable and the port's name."
 
 
 def _errno_of(error: BaseException | None) -> int | None:
-    """Find the error number: pyserial keeps it, wraps it, or leaves it to what termios raised."""
+    """Find the error number, which may be pyserial's own or in an exception that it wraps."""
     while error is not None:
         number: Any = getattr(error, "errno", None)
         if number is None and error.args and isinstance(error.args[0], int):

@@ -1,4 +1,4 @@
-"""Between a motion and a recording: appends samples, counts coverage, notes what went wrong."""
+"""From a motion into a recording: appends samples, counts coverage, notes gaps and faults."""
 
 import time
 from collections import Counter
@@ -17,7 +17,7 @@ U32 = 2**32
 
 @dataclass
 class Tally:
-    """What a capture met: gaps and the frames lost in them, faults, and the frames garbled."""
+    """Gaps of a capture and the frames lost in them, faults, and garbled frames."""
 
     gaps: int = 0
     lost: int = 0
@@ -26,10 +26,10 @@ class Tally:
 
 
 class Recorder:
-    """Takes blocks of samples as they come and keeps the writer's file close behind.
+    """Appends blocks of samples to the recording as they arrive.
 
     The first gaps, faults and garbled frames become notes at once, so that they survive a killed
-    capture; of what follows only the total is noted, at the end.
+    capture; of later ones only the total is noted, at the end.
     """
 
     def __init__(self, writer: RecordingWriter, coverage: CoverageGrid) -> None:
@@ -47,7 +47,7 @@ class Recorder:
         return self.writer.sample_count
 
     def take(self, samples: NDArray[np.void], garbled: int = 0) -> None:
-        """Record a block; ``garbled`` is the number of frames thrown away since the start."""
+        """Record a block; ``garbled`` is the number of frames discarded since the start."""
         if len(samples) == 0:
             self.writer.poll(time.time_ns())
         else:
@@ -58,21 +58,21 @@ class Recorder:
             self.last = samples[-1:].copy()
         if garbled > self.tally.garbled:
             self.tally.garbled = garbled
-            self._note("garbled", f"{_frames(garbled)} had arrived garbled by {self._when()}.")
+            self._note("garbled", f"{_frames(garbled)} were garbled until {self._when()}.")
 
     def resume(self, sentence: str) -> None:
-        """Begin anew after a pause in which nothing was recorded; it counts as no gap."""
+        """Continue after a pause in which nothing was recorded, which is no gap."""
         if self.last is not None:
             self.writer.note(f"Paused at {self._when()}: {sentence}")
         self.last = None
 
     def finish(self, overrun: int = 0) -> None:
-        """Note the totals; ``overrun`` counts samples that were never fetched from the loop."""
+        """Note the totals; ``overrun`` counts samples that were not read from the loop in time."""
         tally = self.tally
         totals = {
-            "gap": f"{_frames(tally.lost)} lost in {tally.gaps} gaps in all.",
-            "garbled": f"{_frames(tally.garbled)} arrived garbled in all.",
-            "fault": f"The device latched a fault {tally.faults} times in all.",
+            "gap": f"{_frames(tally.lost)} lost in {tally.gaps} gaps in total.",
+            "garbled": f"{_frames(tally.garbled)} garbled in total.",
+            "fault": f"The device latched a fault {tally.faults} times in total.",
         }
         for kind, sentence in totals.items():
             if self._noted[kind] > NOTES_OF_A_KIND:

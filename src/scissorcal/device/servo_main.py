@@ -1,8 +1,8 @@
-"""The servo's own process: runs the C loop on descriptors that its parent passed on.
+"""The servo process: runs the C loop on file descriptors that its parent passed.
 
 ``python -m scissorcal.device.servo_main LINE_FD BLOCK_FD``. It ends when the block asks for it,
-when the device goes away, when its stdin ends (because the parent died, however that came about),
-or when the parent's heartbeat stops; the exit code is 0 then, and the reason stands in the block.
+when the device goes away, when its stdin ends (the parent died),
+or when the parent's heartbeat stops; the exit code is 0 then, and the block has the reason.
 """
 
 import gc
@@ -21,7 +21,7 @@ PRIORITY = 10
 def main(arguments: list[str]) -> int:
     """Run the loop; returns the exit code."""
     line, memory = (int(argument) for argument in arguments)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and asks for a stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent requests the stop
     block = LoopBlock.attach(memory)
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -32,7 +32,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _stop_with_parent(block: LoopBlock) -> None:
-    """Wait for the end of the pipe that the parent holds, then let the loop release the motors."""
+    """Wait for the end of the pipe that the parent holds, then make the loop release the motors."""
     while os.read(sys.stdin.fileno(), 1):
         pass
     block.stop()

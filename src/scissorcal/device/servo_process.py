@@ -1,4 +1,4 @@
-"""The servo loop in a process of its own: started, kept alive, watched, ended, cleaned up."""
+"""The servo loop in a separate process: started, monitored and ended."""
 
 import subprocess
 import sys
@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Self
 
 from scissorcal.device.link import PortLink
@@ -24,9 +23,9 @@ BEAT_S = 0.02
 class ServoProcess:
     """Runs the loop on a link's port in another process; a context manager.
 
-    The process has the port to itself from :meth:`start` to :meth:`close`. It gets no Ctrl-C (it
-    stands in a session of its own). When this process dies the end of a pipe stops it, and when
-    this process hangs the missing heartbeat does.
+    The process owns the port from :meth:`start` to :meth:`close`. It runs in its own session, so
+    Ctrl-C does not reach it. It stops when this process dies (the end of a pipe) or hangs (the
+    missing heartbeat).
     """
 
     def __init__(self, link: PortLink, block: LoopBlock) -> None:
@@ -46,7 +45,7 @@ class ServoProcess:
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> None:
-        """Start the loop, let the device stream, and wait for its first state.
+        """Start the loop, start the stream, and wait for the first state.
 
         Raises DeviceError if the process does not start or the device sends nothing.
         """
@@ -65,7 +64,7 @@ class ServoProcess:
         self._begin_streaming()
 
     def close(self) -> None:
-        """Ask the loop to release the motors and end; kill it if it does not. Twice is fine."""
+        """Ask the loop to release the motors and end; kill it if it does not. Idempotent."""
         process, self._process = self._process, None
         if process is not None:
             self._block.stop()
@@ -80,7 +79,7 @@ class ServoProcess:
 
     @contextmanager
     def kept_alive(self) -> Iterator[None]:
-        """Let a thread show the loop that this process lives, while the caller is busy."""
+        """Send the heartbeat from a thread while the caller is busy."""
         over = threading.Event()
 
         def beat() -> None:
@@ -96,14 +95,15 @@ class ServoProcess:
             thread.join()
 
     def why_dead(self) -> DeviceError:
-        """Say how the process ended, for when it ended by itself."""
+        """The error where the process ended by itself: how, and its last words."""
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
         code = None if self._process is None else self._process.poll()
         how = f"was killed by signal {-code}" if code and code < 0 else f"ended with code {code}"
-        said = f" It said: {lines[-1]}" if lines else ""
+        said = f" Its last message: {lines[-1]}" if lines else ""
         return DeviceError(
-            f"The servo's process {how}; without commands the device brakes by itself.{said}"
+            f"The servo process {how}. Without commands the device brakes by itself.{said} Start "
+            "again."
         )
 
     def _await_loop(self) -> None:
@@ -113,8 +113,8 @@ class ServoProcess:
                 raise self.why_dead()
             if time.monotonic() > until:
                 raise DeviceError(
-                    f"The servo's process did not begin within {START_TIMEOUT_S:g} s: this machine "
-                    "is too busy."
+                    f"The servo process did not start within {START_TIMEOUT_S:g} s: close programs "
+                    "that load the processor, and start again."
                 )
             self._block.beat()
             time.sleep(0.002)
@@ -131,7 +131,7 @@ class ServoProcess:
                 raise self.why_dead()
             if self._block.stop_reason is not StopReason.NONE or time.monotonic() > until:
                 raise DeviceError(
-                    f"{self._link.name} was asked to stream and sends no state: restart the device."
+                    f"{self._link.name} sends no state after STREAM = 1: restart the device."
                 )
             self._block.beat()
             time.sleep(0.002)
@@ -144,10 +144,5 @@ class ServoProcess:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

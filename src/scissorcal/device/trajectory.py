@@ -1,7 +1,7 @@
-"""What the rig shall do in a capture: references and strokes from the recipe. Pure functions.
+"""The plan of a capture: references and strokes from the recipe. Pure functions.
 
-A plan is a row of segments. Between two segments the motors are off and somebody clears the
-blades or loads material; each segment ends in the pose in which the next one is loaded.
+A plan is a sequence of segments. Between two segments the motors are off and a person clears
+the blades or loads material; each segment ends in the pose in which the next one is loaded.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ SWING_ACCELERATION = 80.0
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of motion without a pause, and what lies between the blades meanwhile.
+    """Motion without a pause, and what is between the blades during it.
 
     ``sheet`` counts fresh pieces of material, -1 where the blades are empty. ``request`` asks a
     person for what must be done before it starts.
@@ -62,23 +62,23 @@ class Plan:
 
 
 class StrokeList:
-    """Numbers strokes as they are planned."""
+    """Numbers the planned strokes."""
 
     def __init__(self) -> None:
         self.all: list[Stroke] = []
 
     def add(self, kind: StrokeKind, speed: float = float("nan"), sheet: int = -1) -> int:
-        """Note one more stroke and return its index."""
+        """Add a stroke and return its index."""
         self.all.append(Stroke(len(self.all), kind, float(speed), sheet))
         return len(self.all) - 1
 
 
 def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> Plan:
-    """Plan empty sweeps at every speed in both directions, then a swing for the inertia.
+    """Plan empty sweeps at every speed in both directions, then an excitation for the inertia.
 
-    Every repeat goes through all speeds, so that a capture that is cut short has them all. Ramps
+    Every repeat has all speeds, so that an interrupted capture has them too. Ramps
     lie outside the scene's range of openings where the rig's stops leave room. ``advance`` (m) is
-    where the sledge stands and stays.
+    the fixed position of the sledge.
     """
     refuse_linear(recipe)
     stops = usable_opening(identity)
@@ -111,7 +111,7 @@ def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> P
 
 
 def approach(opening: float, advance: float, start: Reference, tick_s: float) -> Reference:
-    """Path from where the rig stands to the start of a reference: blades first, then the sledge."""
+    """Path from the rig's position to the start of a reference: blades first, then the sledge."""
     path = PathBuilder(opening, advance, tick_s)
     path.open_to(float(start.opening[0]), APPROACH_SPEED, TURN_ACCELERATION)
     path.rest(DWELL_S)
@@ -160,7 +160,7 @@ def opening_range(recipe: Recipe, identity: Identity) -> tuple[float, float]:
 
 
 def refuse_linear(recipe: Recipe) -> None:
-    """Raise InputError for a joint that slides: no capture drives one."""
+    """Raise InputError for a linear joint, which no capture drives."""
     if recipe.rig.joint == "linear":
         raise InputError(
             'rig.joint = "linear": a capture drives a rotary rig. Record the linear joint with its '

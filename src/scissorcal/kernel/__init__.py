@@ -7,7 +7,8 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihood,
     cut_log_likelihoods,
 )
-from scissorcal.kernel.frames import (
+from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
     Capability,
@@ -22,10 +23,7 @@ from scissorcal.kernel.frames import (
     Message,
     State,
     StateFlag,
-    decode,
-    encode,
 )
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
@@ -40,7 +38,7 @@ from scissorcal.kernel.servo import (
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.tables import ModelTables, Table
-from scissorcal.kernel.wire import FrameDecoder, crc16, encode_frame
+from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [
     "PROTOCOL_VERSION",

@@ -10,6 +10,7 @@ from cffi import FFI
 
 C = Path("src/scissorcal/kernel/c")  # relative: setuptools refuses absolute source paths
 HEADERS = (
+    "sc_messages.h",
     "sc_wire.h",
     "sc_table.h",
     "sc_edge.h",

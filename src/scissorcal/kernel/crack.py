@@ -1,4 +1,4 @@
-"""A crack that a blade loads, walked in C from sample to sample: arrays in, arrays out."""
+"""A crack under a blade's load, computed in C from sample to sample: arrays in, arrays out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class CrackLaw:
 
 @dataclass(frozen=True)
 class CrackPath:
-    """What a walk gives.
+    """The result of a walk.
 
     ``torque`` and ``push`` (n - 1,) are means over each tick, ``place`` (n,) is the crack's.
     ``torque`` (N m) opens the blades, ``push`` (N) acts on the sledge against the advance.

@@ -1,8 +1,8 @@
-"""The loop on a file descriptor, and the block of shared memory that steers it.
+"""The loop on a file descriptor, and the block of shared memory that controls it.
 
 One process creates a LoopBlock and hands its ``fileno()`` to another, which attaches it and calls
-:func:`run_loop`; that one runs in C without the GIL until it stops. The creator gives orders, keeps
-the heart beating and reads samples, all without touching the line.
+:func:`run_loop`; that one runs in C without the GIL until it stops. The creator sends orders and
+heartbeats and reads samples, without touching the line.
 """
 
 import mmap
@@ -16,16 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.frames import ConfigEcho
+from scissorcal.kernel.messages import ConfigEcho
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    EnergyLedger,
     Mode,
     ServoConfig,
-    ServoCounters,
+    ServoView,
     StopReason,
-    counters_of,
-    ledger_of,
     reference_arrays,
 )
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
@@ -36,7 +33,7 @@ _PER_OCTAVE = int(lib.SC_BINS_PER_OCTAVE)
 
 
 def run_loop(fd: int, block: "LoopBlock") -> StopReason:
-    """Serve the device on ``fd`` until a stop, a hangup, silence or an error; say which.
+    """Run the loop on ``fd`` until a stop, a hangup, silence or an error; return which.
 
     Runs in C with the GIL released. ``fd`` stays open, and is non-blocking meanwhile. A block is
     run once; make a new one to start again.
@@ -48,8 +45,8 @@ def run_loop(fd: int, block: "LoopBlock") -> StopReason:
 class LoopCounters:
     """What happened on the line.
 
-    ``garbled`` frames were thrown away, ``other_frames`` were sound but no STATE, ``answers`` are
-    commands written and ``unsent`` those the line did not take in time. ``stalls`` are pauses of
+    ``garbled`` frames were discarded, ``other_frames`` were valid but no STATE, ``answers`` are
+    commands written and ``unsent`` those the line did not accept in time. ``stalls`` are pauses of
     more than five ticks between two STATE by the host's clock; ``lost_samples`` were overwritten
     in the ring before this process read them.
     """
@@ -93,10 +90,10 @@ class Histogram:
         return float(min(self.edges_us[index + 1], self.largest_us))
 
 
-class LoopBlock:
+class LoopBlock(ServoView):
     """Shared memory between the loop and its supervisor.
 
-    It has no name in the system: the memory lives as long as a process holds it, so that a killed
+    It has no name in the system: the memory exists as long as a process holds it, so a killed
     process leaves nothing behind.
     """
 
@@ -106,6 +103,7 @@ class LoopBlock:
         self._memory = mmap.mmap(fd, size)
         self._keep = ffi.from_buffer(self._memory, require_writable=True)
         self.pointer = ffi.cast("sc_block *", self._keep)
+        self._servo = ffi.addressof(self.pointer, "servo")
         self._cursor = ffi.new("uint64_t *")
         self._lost = ffi.new("uint64_t *")
 
@@ -118,7 +116,7 @@ class LoopBlock:
         reference_capacity: int = 0,
         silence_limit_ms: int = 1000,
     ) -> Self:
-        """Make a block with everything the loop needs.
+        """Create a block with everything the loop needs.
 
         ``reference_capacity``: longest reference in ticks that TRACK will get.
         ``silence_limit_ms``: how long the device may send no STATE before the loop gives up.
@@ -147,8 +145,8 @@ class LoopBlock:
         if not lib.sc_block_is_sound(block.pointer, size):
             block._unmap()
             raise ValueError(
-                f"Descriptor {fd} holds no block of this version of scissorcal; both processes "
-                "must run the same one."
+                f"Descriptor {fd} has no block of this version of scissorcal; both processes "
+                "must run the same version."
             )
         return block
 
@@ -157,19 +155,19 @@ class LoopBlock:
         return self._fd
 
     def close(self) -> None:
-        """Let go of the memory; the block cannot be used any more."""
+        """Release the memory; the block cannot be used any more."""
         if self._fd >= 0:
             self._unmap()
             os.close(self._fd)
             self._fd = -1
 
     def _unmap(self) -> None:
-        self.pointer = ffi.NULL
+        self.pointer = self._servo = ffi.NULL
         ffi.release(self._keep)
         self._memory.close()
 
     def engage(self, mode: Mode) -> None:
-        """Order a mode; it engages with the next frame (RENDER from zero force)."""
+        """Request a mode; it engages with the next frame (RENDER from zero force)."""
         if mode is Mode.RENDER and not self.pointer.has_model:
             raise ValueError("RENDER needs the tables of a model, and this block has none.")
         if mode is Mode.TRACK and self.pointer.reference_size == 0:
@@ -200,17 +198,17 @@ class LoopBlock:
         lib.sc_block_fresh_sheet(self.pointer, crack)
 
     def beat(self) -> None:
-        """Tell the loop that its supervisor lives; at least every supervisor_ticks ticks."""
+        """Send a heartbeat to the loop; at least every supervisor_ticks ticks."""
         lib.sc_block_beat(self.pointer)
 
     def stop(self) -> None:
-        """Ask the loop to release the motors and return."""
+        """Request that the loop releases the motors and returns."""
         lib.sc_block_stop(self.pointer)
 
     def configure(self, key: int, value: float, timeout_s: float = 1.0) -> ConfigEcho | None:
-        """Have the loop send a CONFIG; give the device's echo, None if none came in time.
+        """Have the loop send a CONFIG; return the device's echo, None if it is late.
 
-        The heart keeps beating meanwhile.
+        Heartbeats are sent meanwhile.
         """
         mailbox = self.pointer.mailbox
         request = lib.sc_block_request(self.pointer, int(key), value)
@@ -240,37 +238,9 @@ class LoopBlock:
         return bool(self.pointer.running)
 
     @property
-    def mode(self) -> Mode:
-        """The mode in force, DAMP where silence of the supervisor fell back to it."""
-        return Mode(self.pointer.servo.mode)
-
-    @property
     def stop_reason(self) -> StopReason:
         """Why the loop ended or is about to; NONE while it runs."""
-        return StopReason(self.pointer.exit_reason or self.pointer.servo.stop_reason)
-
-    @property
-    def exit_errno(self) -> int:
-        """The system's error number behind HANGUP or LINE_ERROR, 0 if there was none."""
-        return int(self.pointer.exit_errno)
-
-    @property
-    def track_index(self) -> int:
-        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
-        return int(self.pointer.servo.track_index)
-
-    @property
-    def crack(self) -> float:
-        """The rendered crack tip X (m, plate frame)."""
-        return float(self.pointer.servo.crack.crack)
-
-    @property
-    def ledger(self) -> EnergyLedger:
-        return ledger_of(self.pointer.servo)
-
-    @property
-    def counters(self) -> ServoCounters:
-        return counters_of(self.pointer.servo)
+        return StopReason(self.pointer.exit_reason or self._servo.stop_reason)
 
     @property
     def line(self) -> LoopCounters:

@@ -1,4 +1,4 @@
-"""Dahl's presliding along a path, in C: one pass, whatever the number of turns."""
+"""Dahl's presliding along a path, in C, in one pass."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.frames import Command, State
 from scissorcal.kernel.layout import dtype_of
+from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")
-"""One frame's telemetry, as the loop's ring and a recording hold it: 80 bytes."""
+"""One frame's telemetry, as in the loop's ring buffer and in a recording: 80 bytes."""
 
 U32 = 0xFFFFFFFF
 
@@ -30,7 +30,7 @@ class Mode(IntEnum):
 
 
 class StopReason(IntEnum):
-    """Why a servo or a loop stopped; ``sentence`` says it to people."""
+    """Why a servo or a loop stopped; ``sentence`` states it with the remedy."""
 
     NONE = 0
     ASKED = 1
@@ -53,19 +53,19 @@ _STOP_SENTENCES = {
     StopReason.NONE: "The loop has not stopped.",
     StopReason.ASKED: "The loop stopped because it was asked to.",
     StopReason.SUPERVISOR_LOST: (
-        "The loop stopped because its supervising process fell silent; see why that one hung or "
-        "died, then start again."
+        "The loop stopped because the heartbeat of its supervising process was missing. Check why "
+        "that process hung or died, then start again."
     ),
     StopReason.DEVICE_FAULT: (
         "The device latched a fault that did not clear, or latched faults too often. Remove the "
-        "cause; if the computer answers late, close what keeps it busy or raise BRAKE_AFTER_MS; "
+        "cause; if the computer answers late, close programs that load it or raise BRAKE_AFTER_MS; "
         "then start again."
     ),
     StopReason.ENCODER_FAULT: (
         "The device reports a fault of its encoder; check the encoder and its cable."
     ),
     StopReason.TRACKING_LOST: (
-        "The blades did not follow the motion that was asked for; look for an obstacle, a stuck "
+        "The blades did not follow the commanded motion; check for an obstacle, a stuck "
         "encoder or gains that are too weak."
     ),
     StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
@@ -74,13 +74,14 @@ _STOP_SENTENCES = {
     ),
     StopReason.LINE_ERROR: "Reading or writing the port failed; check the port and start again.",
     StopReason.BAD_BLOCK: (
-        "The loop refused its parameters: a limit, gain or table is not a usable number."
+        "The loop refused its parameters: a limit, gain or table is not a finite number. Check the "
+        "recipe's limits and rig.control."
     ),
 }
 
 
 class SampleFlag(IntFlag):
-    """What a sample's ``flags`` say above bit 15; below stand the device's own (StateFlag).
+    """A sample's ``flags`` above bit 15; below are the device's own (StateFlag).
 
     A rendered step's flags (StepFlag) follow from bit 24 on.
     """
@@ -96,13 +97,13 @@ class SampleFlag(IntFlag):
 class ServoConfig:
     """Limits and gains of the servo, in SI units and radians.
 
-    Nothing leaves beyond ``torque_limit`` (N m) and ``force_limit`` (N; 0 switches the advance
-    motor off) or faster than the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
+    Commands stay within ``torque_limit`` (N m) and ``force_limit`` (N; 0 switches the advance
+    motor off) and the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
     full force. ``damping_Nm_s_per_rad`` acts in DAMP. ``rate_cutoff_Hz``: low-pass of the rate
     estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
     ``supervisor_ticks`` frames without a heartbeat leave damping only, five times as many stop;
-    0 switches that off. ``fault_clearings``: so many latched faults of the device are cleared;
-    one more stops. Raises ValueError for a number that is not finite or below 0.
+    0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
+    more stops. Raises ValueError for a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -129,7 +130,7 @@ class ServoConfig:
             value = getattr(self, field.name)
             if not 0 <= value <= U32:  # NaN and infinity fail this too
                 raise ValueError(
-                    f"{field.name} = {value} is no usable number: give one from 0 to 2**32 - 1."
+                    f"{field.name} = {value} is not usable: give a number from 0 to 2**32 - 1."
                 )
         for name in ("opening_error_limit", "advance_error_limit", "tick_us"):
             if not getattr(self, name) > 0:
@@ -145,9 +146,9 @@ class ServoConfig:
 class EnergyLedger:
     """Joules since the start.
 
-    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest are the
-    model's books while rendering: what the material stores now, what the cut took
-    (kappa J_c h dX), what arresting cracks lost, what rendered friction took.
+    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest is the
+    model's energy while rendering: stored in the material now, taken by the cut
+    (kappa J_c h dX), lost by arresting cracks, taken by rendered friction.
     """
 
     delivered_J: float
@@ -158,9 +159,9 @@ class EnergyLedger:
 
     @property
     def created_J(self) -> float:  # noqa: N802  (J is the unit)
-        """What a rendering put out beyond what its model took up; above 0 it was not passive.
+        """Energy delivered beyond what the model absorbed; above 0 the rendering was not passive.
 
-        Meant for runs whose motors only rendered: tracking a reference delivers work as well.
+        For runs that only rendered: tracking a reference delivers work as well.
         """
         return self.delivered_J + self.stored_J + self.fracture_J + self.arrest_J + self.friction_J
 
@@ -185,8 +186,49 @@ class ServoCounters:
     faults: int
 
 
-class Servo:
-    """The servo on its own, for lockstep runs, tests and other people's loops.
+class ServoView:
+    """What can be read off a C servo, be it one's own or the one in a loop's block."""
+
+    _servo: Any
+
+    @property
+    def mode(self) -> Mode:
+        """The mode in force, DAMP after a missing heartbeat of the supervisor."""
+        return Mode(self._servo.mode)
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """Why it stopped; NONE while it has not."""
+        return StopReason(self._servo.stop_reason)
+
+    @property
+    def track_index(self) -> int:
+        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
+        return int(self._servo.track_index)
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """Estimated rates of opening (rad/s) and advance (m/s)."""
+        return float(self._servo.motion.opening_rate), float(self._servo.motion.advance_rate)
+
+    @property
+    def crack(self) -> float:
+        """The rendered crack tip X (m, plate frame)."""
+        return float(self._servo.crack.crack)
+
+    @property
+    def ledger(self) -> EnergyLedger:
+        ledger = self._servo.ledger
+        return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
+
+    @property
+    def counters(self) -> ServoCounters:
+        names = (field.name for field in fields(ServoCounters))
+        return ServoCounters(*(int(getattr(self._servo, name)) for name in names))
+
+
+class Servo(ServoView):
+    """The servo on its own, for lockstep runs, tests and other loops.
 
     ``tables`` is needed for RENDER only. It starts in IDLE with a fresh sheet (crack at 0).
 
@@ -214,7 +256,7 @@ class Servo:
         self._payload = ffi.new("uint8_t[]", int(lib.SC_SIZE_COMMAND))
 
     def engage(self, mode: Mode) -> None:
-        """Order a mode; it engages with the next frame (RENDER from zero force)."""
+        """Request a mode; it engages with the next frame (RENDER from zero force)."""
         if mode is Mode.RENDER and not self._has_model:
             raise ValueError("RENDER needs the tables of a model, and this servo has none.")
         if mode is Mode.TRACK and self._reference.size == 0:
@@ -257,11 +299,11 @@ class Servo:
         host_time_ns: int = 0,
         answered: bool = True,
     ) -> Command:
-        """Take a state, give the command.
+        """Take a state and return the command.
 
-        ``heartbeat=False`` plays a silent supervisor. ``answered=False`` says that this command is
-        not sent, as for all but the newest of states that arrived at once: a fault that the
-        device has latched stops only once 100 commands that were sent have not cleared it.
+        ``heartbeat=False`` simulates a supervisor without heartbeat. ``answered=False`` says that
+        this command is not sent, as for all but the newest of states that arrived at once: a fault
+        that the device has latched stops only once 100 commands that were sent have not cleared it.
         """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
@@ -279,7 +321,7 @@ class Servo:
         host_time_ns: int = 0,
         answered: bool = True,
     ) -> bytes:
-        """Take a STATE payload, give the whole COMMAND frame: :meth:`step` for bytes, faster.
+        """Take a STATE payload and return the whole COMMAND frame: :meth:`step` for bytes, faster.
 
         Raises ValueError if the payload is no STATE.
         """
@@ -311,44 +353,11 @@ class Servo:
         data = bytes(ffi.buffer(ffi.addressof(self._servo, "sample")))
         return np.frombuffer(data, dtype=SAMPLE_DTYPE)
 
-    @property
-    def mode(self) -> Mode:
-        """The mode in force, DAMP where silence of the supervisor fell back to it."""
-        return Mode(self._servo.mode)
-
-    @property
-    def stop_reason(self) -> StopReason:
-        """Why it stopped; NONE while it has not."""
-        return StopReason(self._servo.stop_reason)
-
-    @property
-    def track_index(self) -> int:
-        """Where TRACK is in its reference; at or beyond its length once the last place is held."""
-        return int(self._servo.track_index)
-
-    @property
-    def rates(self) -> tuple[float, float]:
-        """Estimated rates of opening (rad/s) and advance (m/s)."""
-        return float(self._servo.motion.opening_rate), float(self._servo.motion.advance_rate)
-
-    @property
-    def crack(self) -> float:
-        """The rendered crack tip X (m, plate frame)."""
-        return float(self._servo.crack.crack)
-
-    @property
-    def ledger(self) -> EnergyLedger:
-        return ledger_of(self._servo)
-
-    @property
-    def counters(self) -> ServoCounters:
-        return counters_of(self._servo)
-
 
 def reference_arrays(
     opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
-    """Check a reference and give it as the C core takes it; ValueError says what is wrong."""
+    """Check a reference and return it as the C core takes it; ValueError if it is not valid."""
     places = [np.ascontiguousarray(a, dtype=np.float32) for a in (opening, opening_rate, advance)]
     strokes = np.ascontiguousarray(stroke, dtype=np.int32)
     n = places[0].size
@@ -359,13 +368,3 @@ def reference_arrays(
     if np.any(np.abs(places[0]) > math.pi):
         raise ValueError("A reference's opening must stay within half a turn.")
     return places[0], places[1], places[2], strokes
-
-
-def ledger_of(servo: Any) -> EnergyLedger:
-    """Read the ledger out of a C servo."""
-    return EnergyLedger(*(getattr(servo.ledger, field.name) for field in fields(EnergyLedger)))
-
-
-def counters_of(servo: Any) -> ServoCounters:
-    """Read the counters out of a C servo."""
-    return ServoCounters(*(int(getattr(servo, field.name)) for field in fields(ServoCounters)))

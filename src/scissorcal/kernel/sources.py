@@ -1,4 +1,4 @@
-"""Where the C core's own sources lie, for whoever builds it into firmware or another engine."""
+"""Path of the C core's sources, to build them into firmware or another engine."""
 
 from pathlib import Path
 
@@ -9,6 +9,6 @@ def c_sources() -> Path:
     All but ``sc_block`` and ``sc_loop``, which need POSIX, is portable C99 without allocation.
 
     >>> sorted(path.name for path in c_sources().glob("*.h"))[:2]
-    ['sc_block.h', 'sc_crack.h']
+    ['sc_block.h', 'sc_bytes.h']
     """
     return Path(__file__).parent / "c"

@@ -15,7 +15,7 @@ STEP_DTYPE = dtype_of("sc_step_output")
 
 
 class StepFlag(IntFlag):
-    """What a step has to say besides its numbers.
+    """Flags of a step.
 
     INVALID: an input was not finite, or the edge stands upright; torque and force are 0.
     TOUCHING: the edge indents the material. ADVANCED: the crack did, in this step.
@@ -33,7 +33,7 @@ class StepFlag(IntFlag):
 
 
 class StepOutput(NamedTuple):
-    """What one step gives.
+    """The output of one step.
 
     ``torque`` (N m, positive opens; friction included if rendered) and ``force`` (N, along the
     cut) act on the pivot. ``contact``, ``indentation`` and ``height`` phi are metres,

@@ -1,21 +1,27 @@
-"""Friction against opening, rate and load: Coulomb, viscous, Stribeck, place, load, presliding."""
+"""Friction against opening, rate and load, as a sum over the rows of the table of terms."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.model.terms import TERMS, Motion
+from scissorcal.model.friction_terms import PARAMETERS, TERMS, side_of
+from scissorcal.model.terms import Motion, Role, Term
 
 Array = NDArray[np.float64]
+
+COMPLEX_STEP = 1e-30
+"""Imaginary step by which a term is differentiated: exact to rounding, as nothing is subtracted
+(Squire and Trapp 1998, doi:10.1137/S003614459631241X)."""
 
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """The friction ladder's parameters; a rung leaves those it lacks at zero.
+    """Friction with given parameters; those that are left out are zero.
 
-    F = A(theta) {z [Fc + S exp(-(|w| / w_s)^2) + mu |L|] + sgn(w) Fv |w|} + terms
+    F = A(theta) {z [Fc + S exp(-(|w| / w_s)^2) + mu |L|] + Fv w} + terms
     A = 1 + a_1 (theta - c) + a_2 (theta - c)^2
     z = (1 - p) sgn(w) + p z_d,     length dz_d/dtheta = 1 - z_d sgn(w)
 
@@ -26,27 +32,36 @@ class FrictionLaw:
     After a reversal the share p = ``presliding_share`` of dry friction builds up over
     ``presliding_length`` (Dahl 1976, doi:10.2514/3.61511; see :func:`presliding_state`), the
     Stribeck part with the rest (Canudas de Wit et al. 1995, doi:10.1109/9.376053). Levels in N m
-    (N for a linear joint), rates in rad/s (m/s). ``terms`` are names of
-    :data:`scissorcal.model.terms.TERMS` with their ``coefficients``; those of the rate alone count
-    as levels, and A multiplies them too. Fields may be arrays that broadcast with what they are
-    evaluated on.
+    (N for a linear joint), rates in rad/s (m/s).
+
+    ``values`` are parameters by name (:mod:`scissorcal.model.friction_terms`), adopted terms among
+    them; the place c is ``angle_center``. Values may be arrays that broadcast with what the law is
+    evaluated on. ValueError for a name that is in no row.
     """
 
-    coulomb_pos: float | Array = 0.0
-    coulomb_neg: float | Array = 0.0
-    viscous_pos: float | Array = 0.0
-    viscous_neg: float | Array = 0.0
-    stribeck: float | Array = 0.0
-    stribeck_rate: float | Array = 1.0
-    angle_slope: float | Array = 0.0
-    angle_curvature: float | Array = 0.0
+    values: Mapping[str, float | Array] = field(default_factory=dict)
     angle_center: float = 0.0
-    load_share: float | Array = 0.0
-    load_gain: float | Array = 0.0
-    presliding_share: float | Array = 0.0
-    presliding_length: float | Array = 1.0
-    terms: tuple[str, ...] = ()
-    coefficients: tuple[float | Array, ...] = ()
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.values if _row(name) is None]
+        if unknown:
+            raise ValueError(f'"{unknown[0]}" is no parameter of a friction law')
+
+    @classmethod
+    def of_fit(cls, values: Mapping[str, float | Array], angle_center: float) -> "FrictionLaw":
+        """The law among a fit's parameters by name; those of the drive and the noise are left."""
+        return cls({n: v for n, v in values.items() if _row(n) is not None}, angle_center)
+
+    def __getitem__(self, name: str) -> float | Array:
+        """A parameter by name, 0 where the law lacks it; that of both directions for either."""
+        found = side_of(name, self.values)
+        return 0.0 if found is None else self.values[found]
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Rows of the table that the law has."""
+        rows = [_row(name) for name in self.values]
+        return tuple(dict.fromkeys(row for row in rows if row is not None))
 
 
 def friction_torque(
@@ -59,34 +74,47 @@ def friction_torque(
     """Friction that the drive must overcome: it has the sign of the rate, and is 0 at rest.
 
     ``opening`` (rad), ``rate`` (rad/s) and ``load`` (N m, what the joint bears) broadcast with each
-    other and with the law's fields. ``state`` is z_d of :func:`presliding_state`; without it
+    other and with the law's values. ``state`` is z_d of :func:`presliding_state`; without it
     friction is that of long strokes, fully built up. ``load_gain`` times the load is added: what a
     transmission takes off or a sensor's scale is wrong by, which is no friction but comes with it.
 
-    >>> law = FrictionLaw(coulomb_pos=0.010, coulomb_neg=0.012, viscous_neg=0.002)
+    >>> law = FrictionLaw({"coulomb_pos": 0.010, "coulomb_neg": 0.012, "viscous_neg": 0.002})
     >>> friction_torque(law, 0.3, [-1.0, 0.0, 1.0])
     array([-0.014,  0.   ,  0.01 ])
     """
-    w = np.asarray(rate, dtype=np.float64)
-    borne = np.asarray(load, dtype=np.float64)
-    speed, sign = np.abs(w), np.sign(w)
-    forward = w > 0
-    dry = np.where(forward, law.coulomb_pos, law.coulomb_neg) + law.load_share * np.abs(borne)
-    if np.any(np.asarray(law.stribeck) != 0.0):
-        dry = dry + law.stribeck * np.exp(-((speed / law.stribeck_rate) ** 2))
-    sliding = np.where(forward, law.viscous_pos, law.viscous_neg) * speed
-    built_up = sign
+    moving, place, borne = (np.asarray(a, dtype=np.float64) for a in (rate, opening, load))
+    motion = Motion(place, moving, np.zeros_like(moving), borne)
+    built_up = motion.direction
     if state is not None:
-        built_up = sign + law.presliding_share * (np.asarray(state, dtype=np.float64) - sign)
-    levels = built_up * dry + sign * sliding + _adopted(law, opening, w, borne, of_rate_only=True)
-    others = _adopted(law, opening, w, borne, of_rate_only=False)
-    return np.asarray(levels * angle_factor(law, opening) + law.load_gain * borne + others)
+        lacking = np.asarray(state, dtype=np.float64) - built_up
+        built_up = built_up + law["presliding_share"] * lacking
+    levels = built_up * _sum(law, motion, Role.DRY) + _sum(law, motion, Role.SLIDING)
+    return np.asarray(levels * angle_factor(law, opening) + _sum(law, motion, Role.PLAIN))
+
+
+def friction_level(law: FrictionLaw, sign: float, speed: Array) -> tuple[Array, Array]:
+    """Magnitude of friction moving one way, and its slope over the speed, at the law's centre.
+
+    ``sign`` is 1 where the blades open and -1 where they close; at rest the magnitude is its limit
+    from that side. Without load, and without what the place changes in another way.
+    """
+    moving = np.maximum(speed, np.finfo(np.float64).tiny) + COMPLEX_STEP * 1j
+    rate = sign * moving
+    motion = Motion(np.zeros_like(rate), rate, np.zeros_like(rate), np.zeros_like(rate))
+    level = _sum(law, motion, Role.DRY) + sign * _sum(law, motion, Role.SLIDING)
+    return np.asarray(np.real(level)), np.asarray(np.imag(level) / COMPLEX_STEP)
 
 
 def angle_factor(law: FrictionLaw, opening: ArrayLike) -> Array:
     """The factor by which friction changes with the opening; 1 at the law's centre."""
     away = np.asarray(opening, dtype=np.float64) - law.angle_center
-    return np.asarray(1.0 + away * (law.angle_slope + law.angle_curvature * away))
+    return np.asarray(1.0 + 0.0 * away + sum(c * away**power for c, power in _place(law)))
+
+
+def angle_slope(law: FrictionLaw, opening: ArrayLike) -> Array:
+    """Derivative of :func:`angle_factor` by the opening."""
+    away = np.asarray(opening, dtype=np.float64) - law.angle_center
+    return np.asarray(0.0 * away + sum(k * c * away ** (k - 1) for c, k in _place(law)))
 
 
 def presliding_state(opening: Array, length: float) -> Array:
@@ -116,21 +144,31 @@ def presliding_state(opening: Array, length: float) -> Array:
     return state
 
 
-def _adopted(
-    law: FrictionLaw, opening: ArrayLike, rate: Array, load: Array, *, of_rate_only: bool
-) -> Array:
-    """Sum of the law's named terms of one sort; those of the rate alone are 0 at rest."""
+def _place(law: FrictionLaw) -> list[tuple[float | Array, int]]:
+    return [(law[term.name], term.power) for term in law.terms if term.role is Role.PLACE]
+
+
+def _sum(law: FrictionLaw, motion: Motion, role: Role) -> Array:
+    """Sum over the law's rows of one role: magnitudes of DRY ones, SLIDING ones are 0 at rest."""
     total = np.zeros(())
-    named = [
-        (TERMS[name], coefficient)
-        for name, coefficient in zip(law.terms, law.coefficients, strict=True)
-        if TERMS[name].of_rate_only == of_rate_only
-    ]
-    if not named:
-        return total
-    places = np.asarray(opening, dtype=np.float64)
-    place, moving, still, borne = np.broadcast_arrays(places, rate, 0.0, load)
-    motion = Motion(place, moving, still, borne)
-    for term, coefficient in named:
-        total = total + coefficient * term.value(motion)
-    return np.where(rate == 0.0, 0.0, total) if of_rate_only else total
+    for term in law.terms:
+        if term.role is not role or term.value is None:
+            continue
+        coefficient = law[term.name]
+        if term.sided:
+            forward = motion.direction > 0
+            coefficient = np.where(forward, law[f"{term.name}_pos"], law[f"{term.name}_neg"])
+        if not np.any(coefficient):
+            continue
+        scale = (law[term.scale],) if term.scale else ()
+        total = total + coefficient * term.value(motion, *scale)
+    if role is Role.SLIDING:
+        return np.where(motion.direction == 0.0, 0.0, total)
+    return total
+
+
+def _row(name: str) -> Term | None:
+    """The row of friction that a parameter belongs to, None for the drive's and unknown ones."""
+    found = side_of(name, PARAMETERS)
+    row = PARAMETERS[found] if found is not None else TERMS.get(name)
+    return None if row is None or row.role is Role.DRIVE else row

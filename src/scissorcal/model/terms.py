@@ -1,124 +1,178 @@
-"""Terms by name that a law of friction may lack: the critic proposes them, a recipe adopts them."""
+"""What a row of the table of friction terms is: a parameter, its unit, prior, role and value.
+
+The rows stand in :mod:`scissorcal.model.friction_terms`. numpy is imported where it is used, so
+that reading a recipe does not load it.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from scissorcal.model.transforms import IDENTITY, Transform
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+JointKind = Literal["rotary", "linear"]
+
+
+class Role(Enum):
+    """How a parameter enters the drive (see :class:`scissorcal.model.FrictionLaw`)."""
+
+    DRIVE = "drive"
+    """Added to the drive, and no friction: inertia, offset, cogging, delay, noise."""
+    DRY = "dry"
+    """A level of friction that the place changes and that builds up after a reversal."""
+    SLIDING = "sliding"
+    """Friction that the place changes and that is there at once."""
+    PLAIN = "plain"
+    """Added as it is: neither place nor reversals change it."""
+    PLACE = "place"
+    """Factor of a power of the distance from the law's centre, in the factor A of the place."""
+    SCALE = "scale"
+    """The scale of another row's shape: Stribeck's speed, Dahl's length."""
+    BUILD_UP = "build-up"
+    """Share of dry friction that builds up after a reversal."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What a term is evaluated on, all arrays (n,).
+    """What terms are evaluated on, arrays (n,) or shapes that broadcast.
 
     ``opening`` in rad (m for a linear joint), ``rate`` and ``acceleration`` its derivatives,
-    ``load`` the effort that the joint bears (N m or N), None where it was not measured.
+    ``load`` the effort that the joint bears (N m or N), None where it was not measured. The rate
+    may be complex: a slope by a complex step then keeps its sign (doi:10.1137/S003614459631241X).
     """
 
-    opening: Array
-    rate: Array
-    acceleration: Array
-    load: Array | None = None
+    opening: Any
+    rate: Any
+    acceleration: Any
+    load: Any = None
+
+    @property
+    def direction(self) -> Array:
+        """Sign of the rate."""
+        import numpy as np
+
+        return np.asarray(np.sign(np.real(self.rate)))
+
+    @property
+    def speed(self) -> Array:
+        """Magnitude of the rate."""
+        import numpy as np
+
+        return np.asarray(self.rate * self.direction)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Default priors of one parameter by kind of joint, each (centre, width, why).
+
+    By the row's transform: (median, factor_90) of a logarithm, (mean, sd) of the identity, (median,
+    odds_factor_90) of a logit. ``key`` is the recipe's name without its unit, by default that of
+    the parameter. ``in_ticks`` priors are stated in samples of the recording.
+    """
+
+    rotary: tuple[float, float, str]
+    linear: tuple[float, float, str]
+    key: str = ""
+    in_ticks: bool = False
+
+    def of(self, kind: JointKind) -> tuple[float, float, str]:
+        """The default for one kind of joint."""
+        return self.rotary if kind == "rotary" else self.linear
 
 
 @dataclass(frozen=True)
 class Term:
-    """One term: coefficient times ``value`` (motion) is an effort that the drive must overcome.
+    """One parameter of a law, or one term that a recipe may adopt by name.
 
-    ``position``, ``seconds`` and ``effort`` are the powers of the joint's units that ``value``
-    has. ``of_rate_only`` terms change with speed alone, so that a package's tables can carry them;
-    ``rotary`` ones mean something for an angle only.
+    ``powers`` are those of the joint's units in the parameter: effort, position, seconds.
+    ``value`` (motion), or (motion, scale) where ``scale`` names a row, is what the parameter
+    multiplies; a DRY row's is a magnitude. ``part`` is the word of a law's name that brings the
+    row; without one a term is adopted by its name, or belongs to the drive. ``sided`` rows have one
+    parameter for each direction, ``name_pos`` and ``name_neg``, in an asymmetric law. ``rotary``
+    terms mean something for an angle only. ``nuisance`` rows are fitted and not reported.
+    ``covers`` are terms that a law with this row need not adopt. ``remedy`` is what to do where the
+    data want the level below zero.
     """
 
     name: str
     meaning: str
-    position: int
-    seconds: int
-    value: Callable[[Motion], Array]
-    effort: int = 0
-    of_rate_only: bool = False
+    role: Role
+    powers: tuple[int, int, int]
+    value: Callable[..., Any] | None = None
+    part: str = ""
+    transform: Transform = IDENTITY
+    prior: Prior | None = None
+    scale: str = ""
+    sided: bool = False
+    needs_load: bool = False
     rotary: bool = False
+    nuisance: bool = False
+    covers: tuple[str, ...] = ()
+    units: tuple[str, str] = ("", "")
+    remedy: str = ""
 
     @property
     def adoptable(self) -> bool:
-        """Whether a friction law can have it: what belongs to the acceleration is no friction."""
-        return not self.name.startswith("acceleration")
+        """Whether a recipe may adopt it: what belongs to the acceleration is no friction."""
+        return not self.part and self.role is not Role.DRIVE
 
     @property
-    def needs_load(self) -> bool:
-        return self.effort != 0
+    def power(self) -> int:
+        """Power of the distance from the centre that a PLACE row multiplies."""
+        return -self.powers[1]
 
     def unit(self, position_unit: str, effort_unit: str) -> str:
-        """Unit of the term's coefficient.
+        """Unit of the parameter, for a joint's units.
 
-        >>> TERMS["rate^2"].unit("rad", "N m")
+        >>> Term("rate^2", "drag", Role.SLIDING, (1, -2, 2)).unit("rad", "N m")
         'N m s^2/rad^2'
         """
-        above = [] if self.effort else [effort_unit]
-        if self.seconds:
-            above.append(_power("s", -self.seconds))
-        below = f"/{_power(position_unit, self.position)}" if self.position else ""
-        return (" ".join(above) or "1") + below
+        named = self.units[0 if position_unit == "rad" else 1]
+        if named:
+            return named
+        units = (effort_unit, position_unit, "s")
+        above = [_power(u, p) for u, p in zip(units, self.powers, strict=True) if p > 0]
+        below = [_power(u, -p) for u, p in zip(units, self.powers, strict=True) if p < 0]
+        return " ".join(above or ["1"]) + ("/" + " ".join(below) if below else "")
 
+    def column(self, motion: Motion, *scale: Any) -> Array:
+        """What the parameter multiplies, of the shape of the motion's rate."""
+        import numpy as np
 
-def evaluate(names: tuple[str, ...], motion: Motion) -> Array:
-    """Columns of the named terms over a motion, shape (n, len(names)).
+        if self.value is None:
+            raise ValueError(f"{self.name} multiplies nothing by itself")
+        return np.asarray(np.broadcast_to(self.value(motion, *scale), np.shape(motion.rate)))
 
-    KeyError for a name that is not in :data:`TERMS`; ValueError for a term of the load where none
-    was measured.
+    def names(self, symmetric: bool) -> tuple[str, ...]:
+        """Names of the parameters that the row brings."""
+        if self.sided and not symmetric:
+            return (f"{self.name}_pos", f"{self.name}_neg")
+        return (self.name,)
 
-    >>> motion = Motion(np.array([0.3]), np.array([-2.0]), np.array([0.0]))
-    >>> evaluate(("rate^2", "sign"), motion)
-    array([[ 4., -1.]])
-    """
-    if not names:
-        return np.zeros((len(motion.rate), 0))
-    for name in names:
-        if TERMS[name].needs_load and motion.load is None:
-            raise ValueError(f'the term "{name}" needs a load, and none was measured')
-    return np.stack([TERMS[name].value(motion) for name in names], axis=1)
+    def prior_key(self, kind: JointKind) -> str:
+        """The recipe's name of the prior, with its unit.
+
+        >>> Term("viscous", "viscous friction", Role.SLIDING, (1, -1, 1)).prior_key("rotary")
+        'viscous_Nm_s_per_rad'
+        """
+        if self.prior and self.prior.in_ticks:
+            return f"{self.name}_ticks"
+        position, effort = ("rad", "N m") if kind == "rotary" else ("m", "N")
+        unit = self.unit(position, effort).replace("N m", "Nm").replace("^", "")
+        above, _, below = unit.partition("/")
+        stem = (self.prior.key if self.prior else "") or self.name
+        above = "" if above == "1" else "_" + above.replace(" ", "_")
+        return stem + above + ("_per_" + below.replace(" ", "_per_") if below else "")
 
 
 def _power(unit: str, power: int) -> str:
     return unit if power == 1 else f"{unit}^{power}"
-
-
-def _load(motion: Motion) -> Array:
-    if motion.load is None:
-        raise ValueError("no load was measured")
-    return motion.load
-
-
-_ALL = (
-    Term("1", "constant", 0, 0, lambda m: np.ones_like(m.rate), of_rate_only=True),
-    Term("sign", "Coulomb friction", 0, 0, lambda m: np.sign(m.rate), of_rate_only=True),
-    Term("rate", "viscous friction", 1, -1, lambda m: m.rate, of_rate_only=True),
-    Term("|rate|", "viscous, unequal", 1, -1, lambda m: np.abs(m.rate), of_rate_only=True),
-    Term("rate^2", "quadratic, unequal", 2, -2, lambda m: m.rate**2, of_rate_only=True),
-    Term("rate*|rate|", "drag", 2, -2, lambda m: m.rate * np.abs(m.rate), of_rate_only=True),
-    Term("rate^3", "cubic in the rate", 3, -3, lambda m: m.rate**3, of_rate_only=True),
-    Term("opening", "spring", 1, 0, lambda m: m.opening),
-    Term("opening^2", "spring, quadratic", 2, 0, lambda m: m.opening**2),
-    Term("sin(opening)", "weight", 0, 0, lambda m: np.sin(m.opening), rotary=True),
-    Term("cos(opening)", "weight", 0, 0, lambda m: np.cos(m.opening), rotary=True),
-    Term("sign*opening", "Coulomb by place", 1, 0, lambda m: np.sign(m.rate) * m.opening),
-    Term(
-        "sign*opening^2",
-        "Coulomb by place, quadratic",
-        2,
-        0,
-        lambda m: np.sign(m.rate) * m.opening**2,
-    ),
-    Term("rate*opening", "viscous by place", 2, -1, lambda m: m.rate * m.opening),
-    Term("rate^2*opening", "quadratic by place", 3, -2, lambda m: m.rate**2 * m.opening),
-    Term("acceleration", "inertia", 1, -2, lambda m: m.acceleration),
-    Term("acceleration*opening", "inertia by place", 2, -2, lambda m: m.acceleration * m.opening),
-    Term("load", "transmission", 0, 0, _load, effort=1),
-    Term("load*sign", "friction by load", 0, 0, lambda m: _load(m) * np.sign(m.rate), effort=1),
-    Term("load*rate", "viscous by load", 1, -1, lambda m: _load(m) * m.rate, effort=1),
-)
-
-TERMS = {term.name: term for term in _ALL}
-"""Every term by its name, simple ones first."""

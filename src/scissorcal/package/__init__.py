@@ -1,21 +1,33 @@
-"""From fits to a package that a 1 kHz loop can trust: tables with a bound, checked and hashed."""
+"""From fits to a package for a 1 kHz loop: tables with an error bound, checked and hashed."""
 
-from scissorcal.package.build import (
-    PackageSummary,
-    build_package,
-    package_inputs_hash,
-    put_review,
-)
-from scissorcal.package.check import REVIEW_CHECK, check_package
-from scissorcal.package.manifest import Manifest, manifest_schema_text
-from scissorcal.package.model_package import ModelPackage, open_package
-from scissorcal.package.review import REVIEW_FORMAT, Review, stamp
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scissorcal.package.archive import read_manifest
+    from scissorcal.package.build import (
+        PackageSummary,
+        build_package,
+        package_inputs_hash,
+        put_review,
+    )
+    from scissorcal.package.check import REVIEW_CHECK, check_package
+    from scissorcal.package.manifest import Manifest, manifest_schema_text
+    from scissorcal.package.model_package import (
+        FailedFitsWarning,
+        ModelPackage,
+        OutsideCoverageWarning,
+        open_package,
+    )
+    from scissorcal.package.review import REVIEW_FORMAT, Review, stamp
 
 __all__ = [
     "REVIEW_CHECK",
     "REVIEW_FORMAT",
+    "FailedFitsWarning",
     "Manifest",
     "ModelPackage",
+    "OutsideCoverageWarning",
     "PackageSummary",
     "Review",
     "build_package",
@@ -24,5 +36,27 @@ __all__ = [
     "open_package",
     "package_inputs_hash",
     "put_review",
+    "read_manifest",
     "stamp",
 ]
+
+_HOMES = {
+    "archive": ("read_manifest",),
+    "build": ("PackageSummary", "build_package", "package_inputs_hash", "put_review"),
+    "check": ("REVIEW_CHECK", "check_package"),
+    "manifest": ("Manifest", "manifest_schema_text"),
+    "model_package": (
+        "FailedFitsWarning",
+        "ModelPackage",
+        "OutsideCoverageWarning",
+        "open_package",
+    ),
+    "review": ("REVIEW_FORMAT", "Review", "stamp"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

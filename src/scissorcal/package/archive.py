@@ -1,7 +1,7 @@
-"""The package file: one zip whose bytes follow from its content, read with suspicion.
+"""The package file: one reproducible zip, checked before use.
 
 Nothing in a package is executed, unpickled or unpacked to disk. What its manifest does not name,
-or states otherwise, is refused before it is used.
+or names with another content, is refused before use.
 """
 
 import hashlib
@@ -11,7 +11,8 @@ import math
 import stat
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -34,7 +35,7 @@ LARGEST_MANIFEST = 1_000_000
 MOST_MEMBERS = 32
 LARGEST_HEADER = 1_000
 
-MEND = "Build it again with 'scissorcal package build', or fetch an unchanged copy."
+REMEDY = "Build it again with 'scissorcal package build', or fetch an unchanged copy."
 
 _DAMAGE = (
     zipfile.BadZipFile,
@@ -46,7 +47,7 @@ _DAMAGE = (
     ValueError,
     OverflowError,
 )
-"""What the standard library raises on a damaged or foreign archive."""
+"""What the standard library raises for a damaged archive or another file."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -81,25 +82,28 @@ def archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:
 def read_archive(path: Path) -> tuple[Manifest, dict[str, NDArray[Any]]]:
     """Read and check a package: its manifest, and its arrays by file name.
 
-    Raises MissingError where there is no file, and InputError naming file, member and mend where
+    Raises MissingError where there is no file, and InputError naming file, member and remedy where
     it is no package, or anything in it is not as its manifest states.
     """
-    _check_file(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            infos = _entries(path, archive)
-            manifest = _read_manifest(path, archive, infos)
-            _check_members(path, manifest, infos)
-            arrays = {
-                member.file: _read_member(path, archive, infos[member.file], member)
-                for member in manifest.members
-            }
-    except _DAMAGE as error:
-        reason = str(error) or type(error).__name__
-        raise InputError(
-            f"{path} is not a readable package, or it is damaged ({reason}). {MEND}"
-        ) from error
+    with _opened(path) as archive:
+        infos = _entries(path, archive)
+        manifest = _read_manifest(path, archive, infos)
+        _check_members(path, manifest, infos)
+        arrays = {
+            member.file: _read_member(path, archive, infos[member.file], member)
+            for member in manifest.members
+        }
     return manifest, arrays
+
+
+def read_manifest(path: Path | str) -> Manifest:
+    """Read and check a package's manifest alone, which is quick; its arrays are not looked at.
+
+    Raises as `read_archive` does.
+    """
+    path = Path(path)
+    with _opened(path) as archive:
+        return _read_manifest(path, archive, _entries(path, archive))
 
 
 def array_bytes(array: NDArray[Any]) -> bytes:
@@ -129,6 +133,20 @@ def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     archive.writestr(info, data, zipfile.ZIP_STORED)
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open the zip; what the standard library says of a damaged one becomes an InputError."""
+    _check_file(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            yield archive
+    except _DAMAGE as error:
+        reason = str(error) or type(error).__name__
+        raise InputError(
+            f"{path} is not a readable package, or it is damaged ({reason}). {REMEDY}"
+        ) from error
+
+
 def _check_file(path: Path) -> None:
     try:
         facts = path.stat()
@@ -143,28 +161,28 @@ def _check_file(path: Path) -> None:
     if facts.st_size > LARGEST_ARCHIVE:
         raise InputError(
             f"{path} has {facts.st_size} bytes; a package has at most {LARGEST_ARCHIVE}, so this "
-            f"is another file. {MEND}"
+            f"is another file. {REMEDY}"
         )
 
 
 def _entries(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     infos = archive.infolist()
     if len(infos) > MOST_MEMBERS:
-        raise InputError(f"{path} holds {len(infos)} files, too many for a package. {MEND}")
+        raise InputError(f"{path} holds {len(infos)} files, too many for a package. {REMEDY}")
     found: dict[str, zipfile.ZipInfo] = {}
     for info in infos:
         name, shown = info.filename, info.filename[:80]
         where = f"{path}, member {shown!r}"
         if _leaves_archive(info.orig_filename) or _leaves_archive(name):
-            raise InputError(f"{where}: its path leaves the archive. {MEND}")
+            raise InputError(f"{where}: its path leaves the archive. {REMEDY}")
         if stat.S_ISLNK(info.external_attr >> 16):
-            raise InputError(f"{where} is a symbolic link, which no package has. {MEND}")
+            raise InputError(f"{where} is a symbolic link, which no package has. {REMEDY}")
         if name in found:
-            raise InputError(f"{where} is there twice. {MEND}")
+            raise InputError(f"{where} is there twice. {REMEDY}")
         if info.flag_bits & 1:
-            raise InputError(f"{where} is encrypted, which no package is. {MEND}")
+            raise InputError(f"{where} is encrypted, which no package is. {REMEDY}")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise InputError(f"{where} is compressed by a method that no package uses. {MEND}")
+            raise InputError(f"{where} is compressed by a method that no package uses. {REMEDY}")
         found[name] = info
     return found
 
@@ -182,13 +200,13 @@ def _read_manifest(
 
     where = f"{path}, member {MANIFEST_FILE!r}"
     if MANIFEST_FILE not in infos:
-        raise InputError(f"{path} has no {MANIFEST_FILE}, so it is not a package. {MEND}")
+        raise InputError(f"{path} has no {MANIFEST_FILE}, so it is not a package. {REMEDY}")
     data = _read_bounded(where, archive, infos[MANIFEST_FILE], LARGEST_MANIFEST)
     try:
         facts = json.loads(data.decode("utf-8"))
         plain = canonical(facts)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where} is not JSON ({error}). {MEND}") from None
+        raise InputError(f"{where} is not JSON ({error}). {REMEDY}") from None
     stated = facts.get("format") if isinstance(facts, dict) else None
     if stated != FORMAT:
         raise InputError(
@@ -200,18 +218,18 @@ def _read_manifest(
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "its content"
-        raise InputError(f"{where}: {place} is not valid: {first['msg']}. {MEND}") from None
+        raise InputError(f"{where}: {place} is not valid: {first['msg']}. {REMEDY}") from None
     if content_hash(facts) != manifest.content_hash:
-        raise InputError(f"{where} was changed: it does not have the hash it states. {MEND}")
+        raise InputError(f"{where} was changed: it does not have the hash it states. {REMEDY}")
     return manifest
 
 
 def _check_members(path: Path, manifest: Manifest, infos: dict[str, zipfile.ZipInfo]) -> None:
     stated = {member.file for member in manifest.members} | {MANIFEST_FILE}
     for name in sorted(set(infos) - stated):
-        raise InputError(f"{path}, member {name[:80]!r} is not in the manifest. {MEND}")
+        raise InputError(f"{path}, member {name[:80]!r} is not in the manifest. {REMEDY}")
     for name in sorted(stated - set(infos)):
-        raise InputError(f"{path}: member {name!r} is missing. {MEND}")
+        raise InputError(f"{path}: member {name!r} is missing. {REMEDY}")
 
 
 def _read_member(
@@ -220,19 +238,20 @@ def _read_member(
     where = f"{path}, member {member.file!r}"
     if info.file_size != member.bytes:
         raise InputError(
-            f"{where} claims {info.file_size} bytes, and the manifest states {member.bytes}. {MEND}"
+            f"{where} claims {info.file_size} bytes, and the manifest states {member.bytes}. "
+            f"{REMEDY}"
         )
     data = _read_bounded(where, archive, info, member.bytes)
     if len(data) != member.bytes or hashlib.sha256(data).hexdigest() != member.sha256:
-        raise InputError(f"{where} was changed: it does not have the hash that is stated. {MEND}")
+        raise InputError(f"{where} was changed: it does not have the hash that is stated. {REMEDY}")
     try:
         array = _parse_array(data, member)
     except (ValueError, SyntaxError, TypeError, KeyError) as error:
         raise InputError(
-            f"{where} is not an array as the manifest states: {error}. {MEND}"
+            f"{where} is not an array as the manifest states: {error}. {REMEDY}"
         ) from None
     if not np.isfinite(array).all():
-        raise InputError(f"{where} holds a number that is not finite. {MEND}")
+        raise InputError(f"{where} holds a number that is not finite. {REMEDY}")
     return array
 
 
@@ -241,7 +260,7 @@ def _read_bounded(where: str, archive: zipfile.ZipFile, info: zipfile.ZipInfo, m
     with archive.open(info) as stream:
         data = stream.read(min(most, LARGEST_MEMBER) + 1)
     if len(data) > most:
-        raise InputError(f"{where} unpacks to more than the {most} bytes it may have. {MEND}")
+        raise InputError(f"{where} unpacks to more than the {most} bytes it may have. {REMEDY}")
     return data
 
 

@@ -1,4 +1,4 @@
-"""The torque felt on average, from the kernel's tables, whether fracture ripples or not."""
+"""The mean torque from the kernel's tables, with fracture's ripple averaged out."""
 
 import numpy as np
 from numpy.typing import NDArray

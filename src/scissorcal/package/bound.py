@@ -1,4 +1,4 @@
-"""How far the kernel may be from the exact model: measured where no table has a knot."""
+"""The error bound of the kernel against the exact model, measured between the tables' knots."""
 
 from dataclasses import dataclass, replace
 
@@ -9,12 +9,13 @@ from scissorcal.model import edge_height, settled_contact
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import STRONGEST_N
 from scissorcal.package.exact import ExactModel
-from scissorcal.package.grid import Box, Points, nearby_points, spread_points
+from scissorcal.package.grid import Points, nearby_points, spread_points
+from scissorcal.package.manifest import Ranges
 
 Array = NDArray[np.float64]
 
 STATED_OVER_SEEN = 2.0
-"""The bound that is stated, over the largest error that was found."""
+"""The stated bound over the largest error found."""
 
 SHARE_OF_TOLERANCE = 0.1
 """Tables may use up this share of the scene's tolerance."""
@@ -32,7 +33,7 @@ TOUCH_N = 1e-30
 WORST = 100
 NEIGHBOURS = 40
 ROUNDS = 3
-"""Around the worst points it is looked again, in ever smaller neighbourhoods."""
+"""The search is repeated around the worst points, in ever smaller neighbourhoods."""
 
 
 @dataclass(frozen=True)
@@ -50,20 +51,25 @@ class Deviation:
 
 
 def deviation(
-    model: ExactModel, average: AverageTorque, box: Box, limit: float, count: int, slowest: float
+    model: ExactModel,
+    average: AverageTorque,
+    scene: Ranges,
+    limit: float,
+    count: int,
+    slowest: float,
 ) -> Deviation:
     """Compare kernel and exact model as they are rendered: both within the torque limit.
 
-    First on ``count`` points and more spread through the box, none of them slower than
+    First on ``count`` points and more spread over the scene, none of them slower than
     ``slowest``, and beside the seams of the model; then in shrinking neighbourhoods of the worst.
     """
-    points = spread_points(box, count, slowest).joined(_seams(model, box, count, slowest))
+    points = spread_points(scene, count, slowest).joined(_seams(model, scene, count, slowest))
     away, torque = _away(model, average, points, limit)
     scene_torque, total = float(np.max(np.abs(torque))), len(away)
     reach = count ** (-1.0 / 3.0)
     for _ in range(ROUNDS):
         worst = np.argsort(-away, kind="stable")[:WORST]
-        near = nearby_points(box, points.at(worst), NEIGHBOURS, reach, slowest)
+        near = nearby_points(scene, points.at(worst), NEIGHBOURS, reach, slowest)
         points = points.at(worst).joined(near)
         away, _ = _away(model, average, points, limit)
         total += len(near.opening)
@@ -77,14 +83,14 @@ def deviation(
     return Deviation(float(away[first]), where, scene_torque, total)
 
 
-def _seams(model: ExactModel, box: Box, count: int, slowest: float) -> Points:
+def _seams(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Points:
     """Points close beside where the edge begins to touch, and where the crack begins to run.
 
     There the torque bends or, for a power below one, rises infinitely steeply, in regions so thin
     that points spread evenly would miss them.
     """
     shift = (count % 97) / 97.0
-    low, high = box.opening
+    low, high = scene.opening_rad
     opening = low + (high - low) * (np.arange(SEAM_OPENINGS) + shift) / SEAM_OPENINGS
     cutting = model.cutting
     seams = [settled_contact(replace(cutting, fracture_energy=TOUCH_N, kappa=1.0), opening)]
@@ -92,8 +98,8 @@ def _seams(model: ExactModel, box: Box, count: int, slowest: float) -> Points:
         seams.append(settled_contact(cutting, opening))
     contact = (np.concatenate(seams)[:, None] + SEAM_OFFSETS_m).ravel()
     opening = np.repeat(np.tile(opening, len(seams)), len(SEAM_OFFSETS_m))
-    inside = (contact >= box.contact[0]) & (contact <= box.contact[1])
-    rate = np.full(contact.shape, -max(box.opening_rate[0], slowest))
+    inside = (contact >= scene.contact_m[0]) & (contact <= scene.contact_m[1])
+    rate = np.full(contact.shape, -max(scene.opening_rate_rad_per_s[0], slowest))
     return Points(opening[inside], rate[inside], contact[inside])
 
 
@@ -111,6 +117,7 @@ def _away(
         strongest = STRONGEST_N * model.cutting.moving_blades
         parallel = np.maximum(PARALLEL, 2.0 * model.cutting.fracture_energy / strongest)
         clear &= (view.slope > parallel) | (view.slope < -PARALLEL)
-    exact = np.where(clear, np.clip(model.torque(*where), -limit, limit), 0.0)
+    torque = model.torque_settled(points.opening, points.opening_rate, place)
+    exact = np.where(clear, np.clip(torque, -limit, limit), 0.0)
     table = np.where(clear, np.clip(average.torque(*where), -limit, limit), 0.0)
     return np.abs(table - exact), exact

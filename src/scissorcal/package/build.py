@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import scissorcal
-from scissorcal.calibration import FitResult
 from scissorcal.calibration.plate.result import PlateFit
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.package.archive import archive_bytes, member_of, write_archive
+from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
-from scissorcal.package.check import package_verdicts
+from scissorcal.package.check import FITS_CHECK, package_verdicts
 from scissorcal.package.compile import (
     TOLERANCE,
     Compiled,
     compile_model,
-    scene_box,
+    scene_ranges,
 )
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.friction_tables import cut_left_out, left_out
@@ -56,15 +56,10 @@ UNHASHED = "0" * 64
 
 @dataclass(frozen=True)
 class PackageSummary:
-    """What was built: where, how large, its manifest, and the verdicts on it.
-
-    ``table_knots`` counts the knots of each table, ``warnings`` are sentences for the user.
-    """
+    """A package that was built: its file and manifest, the verdicts on it, and warnings."""
 
     path: Path
     manifest: Manifest
-    size_bytes: int
-    table_knots: dict[str, int]
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
 
@@ -79,29 +74,33 @@ def build_package(
     tolerance: float = TOLERANCE,
     review: Review | None = None,
     plate: PlateFit | None = None,
+    inputs_hash: str = "",
+    allow_failed: bool = False,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
     The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
-    ``rng`` picks which posterior draws travel along for the band, at most 200; the same fits,
-    recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its value.
-    ``review`` is the signature under the fits' report; it changes nothing else in the package.
-    ``plate`` is where the plate stands, which travels along as a pose with its covariance.
+    ``rng`` picks the posterior draws that the package keeps for the band, at most 200; the same
+    fits, recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its
+    value. ``review`` is the signature under the fits' report; it changes nothing else in the
+    package. ``plate`` is where the plate stands, stored as a pose with its covariance.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
-    belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where the
-    tables are further from the model than the scene bears.
+    belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
+    failed a check or the tables are further from the model than the scene allows. With
+    ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
+    the package says so (docs/decisions/109-packages-from-failed-fits.md).
     """
     cut, friction = _wanted(recipe, friction, cut)
+    if not allow_failed:
+        _refuse_failed_fits(path, cut, friction, plate)
     record = _provenance(recipe, cut, friction, plate)
+    if inputs_hash:
+        record = record.model_copy(update={"inputs_hash": inputs_hash})
     draws = pick_draws(cut, friction, rng)
     model = central_model(_centre(cut), _centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)
-    ranges = Ranges(
-        opening_rad=recipe.scene.opening_rad,
-        opening_rate_rad_per_s=recipe.scene.opening_rate_rad_per_s,
-        contact_m=recipe.scene.contact_m,
-    )
+    ranges = scene_ranges(recipe)
     bound = _bound(model, compiled, ranges, recipe, tolerance)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
     record = _with_left_out(record, cut, model, bound)
@@ -111,7 +110,7 @@ def build_package(
             name=recipe.name,
             units=units_of(compiled.mechanics),
             ranges=ranges,
-            limits=_limits(recipe),
+            limits=Limits.model_validate(recipe.limits.model_dump()),
             mechanics=compiled.mechanics,
             bound=bound,
             provenance=record,
@@ -128,8 +127,6 @@ def build_package(
     return PackageSummary(
         path=path,
         manifest=manifest,
-        size_bytes=len(archive_bytes(manifest, arrays)),
-        table_knots={name: len(array[0]) for name, array in compiled.arrays.items()},
         verdicts=verdicts,
         warnings=package.warnings,
     )
@@ -151,7 +148,7 @@ def package_inputs_hash(
     cut: FitResult | None,
     plate: PlateFit | None = None,
 ) -> str:
-    """Hash of all that a package depends on: equal to its manifest's, there is nothing to build."""
+    """Hash of all that a package depends on; if its manifest has the same, it is up to date."""
     if not recipe.scene.render_friction:
         friction = None
     facts = {
@@ -166,7 +163,7 @@ def package_inputs_hash(
 
 
 def _fingerprint(fit: FitResult) -> str:
-    """Tells a fit from another of the same inputs, as a new seed gives one."""
+    """Distinguishes fits of the same inputs with different seeds."""
     numbers = np.concatenate([fit.map_point, fit.draws.ravel()])
     return fit.inputs_hash + hashlib.sha256(np.ascontiguousarray(numbers).tobytes()).hexdigest()
 
@@ -174,7 +171,7 @@ def _fingerprint(fit: FitResult) -> str:
 def _wanted(
     recipe: Recipe, friction: FitResult | None, cut: FitResult | None
 ) -> tuple[FitResult, FitResult | None]:
-    """The fits that the scene needs, no more, made sure that they belong to it."""
+    """The fits that the scene needs, after checking that they match the recipe."""
     if recipe.rig.joint == "linear":
         raise InputError(
             f'The recipe "{recipe.name}" has rig.joint = "linear": a linear joint carries no '
@@ -211,7 +208,7 @@ def _wanted(
 
 
 def _stated_edge(fitted: Mapping[str, Any], edge: Edge) -> dict[str, tuple[Any, Any]]:
-    """The edge of a fit against the recipe's, which says nothing of one that was photographed."""
+    """The edge of a fit and the recipe's, which does not describe a photographed one."""
     if edge.source == "photographs":
         return {}
     return {
@@ -224,12 +221,11 @@ def _stated_edge(fitted: Mapping[str, Any], edge: Edge) -> dict[str, tuple[Any, 
 
 
 def _plate_record(plate: PlateFit) -> PlateRecord:
-    """The plate's pose in the rig's frame, or before the camera where that is all there is."""
+    """The plate's pose in the rig's frame, or in the camera's if that is all that was fitted."""
     pose = plate.rig_plate or plate.camera_plate
     if pose.covariance is None:
         raise InputError(
-            "The plate's fit does not say how well its pose is known: run 'scissorcal fit plate "
-            "--force'."
+            "The plate's fit has no covariance of its pose: run 'scissorcal fit plate --force'."
         )
     return PlateRecord(
         frame="rig" if plate.rig_plate else "camera",
@@ -266,17 +262,17 @@ def _provenance(
 def _with_left_out(
     record: Provenance, cut: FitResult, model: ExactModel, bound: Bound
 ) -> Provenance:
-    """The record with what of both laws the tables do not render."""
+    """The record with the parts of both laws that the tables do not render."""
     said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
     update: dict[str, Any] = {"cut": record.cut.model_copy(update={"left_out": said})}
     if record.friction and model.friction:
-        said = (*record.friction.warnings, *left_out(model.friction, bound.scene_torque_Nm))
-        update["friction"] = record.friction.model_copy(update={"warnings": said})
+        said = left_out(model.friction, bound.scene_torque_Nm)
+        update["friction"] = record.friction.model_copy(update={"left_out": said})
     return record.model_copy(update=update)
 
 
 def _known(structure: Mapping[str, Any], kind: type[CutStructure | FrictionStructure]) -> Any:
-    """The part of a fit's structure that a manifest has a place for."""
+    """The part of a fit's structure that a manifest stores."""
     return {key: structure[key] for key in kind.model_fields if key in structure}
 
 
@@ -286,11 +282,10 @@ def _record(fit: FitResult) -> dict[str, Any]:
             name=parameter.name,
             unit=parameter.unit,
             value=float(value),
-            mean=float(parameter.mean),
-            sd=float(parameter.sd),
-            q05=float(parameter.q05),
-            q50=float(parameter.q50),
-            q95=float(parameter.q95),
+            **{
+                name: float(getattr(parameter, name))
+                for name in ("mean", "sd", "q05", "q50", "q95")
+            },
         )
         for parameter, value in zip(fit.parameters, fit.map_point, strict=True)
     )
@@ -316,11 +311,11 @@ def _centre(fit: FitResult) -> FitDraws:
 def pick_draws(
     cut: FitResult, friction: FitResult | None, rng: np.random.Generator
 ) -> dict[str, NDArray[Any]]:
-    """As many draws of each fit as the smaller one has, at most 200.
+    """Equally many draws of each fit, at most 200.
 
-    A cut's fit draws friction's parameters together with its own, and those travel with it: torque
-    that the one takes for material the other does not take for friction. What it does not draw
-    (the inertia), and everything where it drew none, is paired at random.
+    A cut's fit draws friction's parameters jointly with its own, so those draws are used: torque
+    that a draw attributes to the material is then not attributed to friction too. Parameters that
+    it did not draw (the inertia, or all of them) are paired at random.
     """
     count = min(MOST_DRAWS, len(cut.draws), *([len(friction.draws)] if friction else []))
     rows = rng.permutation(len(cut.draws))[:count]
@@ -341,8 +336,7 @@ def _bound(
 ) -> Bound:
     eps = compiled.mechanics.friction.rate_eps_rad_per_s if compiled.mechanics.friction else 0.0
     average = AverageTorque(compiled.mechanics, ranges, compiled.arrays)
-    box = scene_box(recipe)
-    found = deviation(model, average, box, recipe.limits.torque_Nm, GRID_POINTS, eps)
+    found = deviation(model, average, ranges, recipe.limits.torque_Nm, GRID_POINTS, eps)
     stated = STATED_OVER_SEEN * found.largest
     return Bound(
         largest_seen_Nm=found.largest,
@@ -356,24 +350,30 @@ def _bound(
     )
 
 
-def _limits(recipe: Recipe) -> Limits:
-    limits = recipe.limits
-    return Limits(
-        torque_Nm=limits.torque_Nm,
-        torque_slew_Nm_per_s=limits.torque_slew_Nm_per_s,
-        force_N=limits.force_N,
-        force_slew_N_per_s=limits.force_slew_N_per_s,
-        engagement_ramp_s=limits.engagement_ramp_s,
-    )
-
-
 def _hashed(manifest: Manifest) -> Manifest:
     facts = json.loads(manifest.model_dump_json())
     return manifest.model_copy(update={"content_hash": content_hash(facts)})
 
 
+def _refuse_failed_fits(
+    path: Path, cut: FitResult, friction: FitResult | None, plate: PlateFit | None
+) -> None:
+    fits = (("friction", friction), ("cut", cut), ("plate", plate))
+    wrong = {what: reasons for what, fit in fits if fit and (reasons := _warnings(fit.verdicts))}
+    if not wrong:
+        return
+    sentences = " ".join(reason for reasons in wrong.values() for reason in reasons)
+    again = " and ".join(f"'scissorcal fit {what}'" for what in wrong)
+    count = sum(map(len, wrong.values()))
+    raise VerdictError(
+        f"{path} was not written: its fits failed {count} check{'s' if count > 1 else ''}. "
+        f"{sentences} Correct that and run {again} again, or build it all the same with "
+        "'scissorcal package build --allow-failed': the package then says so on every use."
+    )
+
+
 def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
-    own = [verdict for verdict in failed(verdicts) if verdict.check not in ("fits", "review")]
+    own = [verdict for verdict in failed(verdicts) if verdict.check not in (FITS_CHECK, "review")]
     if own:
         reasons = " ".join(verdict.why for verdict in own)
         raise VerdictError(f"{path} was not written: {reasons}")

@@ -1,18 +1,19 @@
-"""Check a package as a stranger would: open it, and hold it to what it states."""
+"""Check a package by itself: open it, and test what it states."""
 
 from pathlib import Path
 
 import numpy as np
 
 from scissorcal.package.bound import deviation
-from scissorcal.package.grid import Box, spread_points
+from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
 from scissorcal.verdicts import Status, Verdict
 
 SCOPE = "package"
 REVIEW_CHECK = "review"
+FITS_CHECK = "failed fits"
 GRID_POINTS = 13_337
-"""Another count, so other points than those that the bound was measured on."""
+"""Differs from the count of the bound's points, so that the points differ."""
 
 CENTRE_POINTS = 300
 IN_BAND = 0.9
@@ -20,15 +21,15 @@ EXTREME_STEPS = 4_000
 
 
 def check_package(path: Path | str) -> tuple[Verdict, ...]:
-    """Open a package and judge it: the stated bound, the extremes, the centre, the fits.
+    """Open a package and judge it: error bound, extremes, centre, fits, review.
 
     Raises MissingError or InputError where the file cannot even be opened as a package.
     """
-    return package_verdicts(open_package(path))
+    return package_verdicts(open_package(path, warn=False))
 
 
 def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
-    """Judge a package in memory; each verdict says what was asked and why it came out so."""
+    """Judge a package in memory; each verdict gives the check and the reason."""
     return (
         *_bound(package),
         _extremes(package),
@@ -40,12 +41,10 @@ def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
 
 def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
     manifest, stated = package.manifest, package.manifest.bound
-    ranges = manifest.ranges
-    box = Box(ranges.opening_rad, ranges.opening_rate_rad_per_s, ranges.contact_m)
     found = deviation(
         package.exact,
         package.average,
-        box,
+        manifest.ranges,
         manifest.limits.torque_Nm,
         GRID_POINTS,
         stated.from_rate_rad_per_s,
@@ -53,9 +52,9 @@ def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
     holds = found.largest <= stated.stated_Nm
     opening, rate, contact = found.where
     why = (
-        f"On {found.points} places of its own the kernel is at most {found.largest:.2g} N m from "
-        f"the exact model (opening {np.degrees(opening):.1f} deg, rate {rate:.2g} rad/s, contact "
-        f"{contact * 1e3:.1f} mm); the package states {stated.stated_Nm:.2g} N m."
+        f"At {found.points} independent test points the kernel is within {found.largest:.2g} N m "
+        f"of the model (limit {stated.stated_Nm:.2g} N m; worst at opening "
+        f"{np.degrees(opening):.1f} deg, rate {rate:.2g} rad/s, contact {contact * 1e3:.1f} mm)."
     )
     kept = Verdict(
         SCOPE, "bound", "pass" if holds else "fail", found.largest, stated.stated_Nm, why
@@ -74,7 +73,7 @@ def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
 
 
 def _extremes(package: ModelPackage) -> Verdict:
-    """Step the kernel through what a broken rig might send, and count what is not a number."""
+    """Step the kernel with inputs as of a broken rig; count outputs that are not finite."""
     kernel = package.kernel()
     rng = np.random.default_rng(1)
     size = rng.choice([0.0, 1e-30, 1e-6, 1e-3, 0.03, 0.5, 3.0, 1e3, 1e30], (3, EXTREME_STEPS))
@@ -84,16 +83,16 @@ def _extremes(package: ModelPackage) -> Verdict:
     out = kernel.step_many(*inputs)
     bad = int(np.sum(~np.isfinite(out["torque"]) | ~np.isfinite(out["force"])))
     status: Status = "pass" if bad == 0 else "fail"
-    why = f"{bad} of {EXTREME_STEPS} steps through absurd inputs gave something not finite."
+    why = f"{bad} of {EXTREME_STEPS} steps with extreme inputs gave an output that is not finite."
     return Verdict(SCOPE, "extremes", status, float(bad), 0.0, why)
 
 
 def _centre(package: ModelPackage) -> Verdict:
-    """Whether what is rendered lies inside what the posterior holds."""
+    """Whether the rendered torque lies within the posterior's band."""
     manifest = package.manifest
-    ranges = manifest.ranges
-    box = Box(ranges.opening_rad, ranges.opening_rate_rad_per_s, ranges.contact_m)
-    points = spread_points(box, CENTRE_POINTS, slowest=manifest.bound.from_rate_rad_per_s)
+    points = spread_points(
+        manifest.ranges, CENTRE_POINTS, slowest=manifest.bound.from_rate_rad_per_s
+    )
     where = (points.opening, points.opening_rate, points.contact)
     limit = manifest.limits.torque_Nm
     torque = np.clip(package.exact.torque(*where), -limit, limit)
@@ -102,20 +101,23 @@ def _centre(package: ModelPackage) -> Verdict:
     inside = float(np.mean((torque >= low - slack) & (torque <= high + slack)))
     status: Status = "pass" if inside >= IN_BAND else "fail"
     why = (
-        f"The torque that the tables stand for lies within the posterior's 98 % band on "
-        f"{inside:.0%} of the scene ({package.draws} draws)."
+        f"The rendered torque lies within the posterior's 98 % band at {inside:.0%} of the scene's "
+        f"points ({package.draws} draws)."
     )
     if status == "fail":
-        why += " The fit's best point is not typical of its posterior: fit with more effort."
+        why += (
+            " The fit's best point is not typical of its posterior: run 'scissorcal fit --effort "
+            "thorough'."
+        )
     return Verdict(SCOPE, "centre", status, inside, IN_BAND, why)
 
 
 def _fits(package: ModelPackage) -> Verdict:
-    reasons = package.fit_warnings
-    if not reasons:
-        return Verdict(SCOPE, "fits", "pass", 0.0, 0.0, "No fit in it failed a verdict.")
-    why = f"{len(reasons)} verdicts on its fits failed: " + " ".join(reasons)
-    return Verdict(SCOPE, "fits", "fail", float(len(reasons)), 0.0, why)
+    count = len(package.manifest.failed_checks)
+    if not count:
+        why = "Every fit in the package passed its checks."
+        return Verdict(SCOPE, FITS_CHECK, "pass", 0.0, 0.0, why)
+    return Verdict(SCOPE, FITS_CHECK, "fail", float(count), 0.0, " ".join(package.fit_warnings))
 
 
 def _review(package: ModelPackage) -> Verdict:

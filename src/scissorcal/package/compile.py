@@ -1,4 +1,4 @@
-"""From the fits' central law to the arrays and scalars that a kernel evaluates."""
+"""Compile the model to the arrays and scalars that a kernel evaluates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import damped, edge_height, ripple_moments, settled_contact
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_tables
-from scissorcal.package.grid import Box, Points, spread_points
+from scissorcal.package.grid import Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import fit_table
 from scissorcal.recipe.schema import Recipe
@@ -20,7 +20,7 @@ from scissorcal.recipe.schema import Recipe
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Of each table, as a share of its value; what that makes in torque is measured, see bound.py."""
+"""Of each table, as a share of its value; bound.py measures the resulting error in torque."""
 
 SCOUTS = 8_000
 BEYOND_LIMIT = 1.25
@@ -42,20 +42,19 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Compiled:
-    """Tables by file name, each (3, knots) of float32, and the scalars that go with them.
-
-    ``errors`` gives each table's largest deviation as a share of its tolerance.
-    """
+    """Tables by file name, each (3, knots) of float32, and the scalars that go with them."""
 
     arrays: dict[str, NDArray[np.float32]]
     mechanics: Mechanics
-    errors: dict[str, float]
 
 
-def scene_box(recipe: Recipe) -> Box:
+def scene_ranges(recipe: Recipe) -> Ranges:
     """The ranges of a recipe's scene, in SI."""
-    return Box(
-        recipe.scene.opening_rad, recipe.scene.opening_rate_rad_per_s, recipe.scene.contact_m
+    scene = recipe.scene
+    return Ranges(
+        opening_rad=scene.opening_rad,
+        opening_rate_rad_per_s=scene.opening_rate_rad_per_s,
+        contact_m=scene.contact_m,
     )
 
 
@@ -66,7 +65,7 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
     never touches the material, where friction would drive the motion, or where a law cannot be
     held by a table.
     """
-    points = spread_points(scene_box(recipe), SCOUTS)
+    points = spread_points(scene_ranges(recipe), SCOUTS)
     reach = _reach(model, points, recipe.limits.torque_Nm)
     cutting = model.cutting
     edge, response = cutting.edge, cutting.response
@@ -98,18 +97,15 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
     if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
         laws["mean_energy"] = _mean_energy_law(model, recipe)
     arrays: dict[str, NDArray[np.float32]] = {}
-    errors: dict[str, float] = {}
     for name, arguments in laws.items():
         try:
-            fitted = fit_table(tolerance=tolerance, **arguments)
+            table = fit_table(tolerance=tolerance, **arguments).table
         except ValueError as error:
             raise InputError(
                 f"The fitted {name.replace('_', ' ')} cannot be made into a table: {error}. "
                 "Narrow the scene's ranges in the recipe to what was captured, or fit again."
             ) from error
-        table = fitted.table
         arrays[f"tables/{name}.npy"] = np.stack([table.x, table.y, table.slope])
-        errors[name] = fitted.error
     scene = recipe.scene
     mechanics = Mechanics(
         moving_blades=2 if cutting.moving_blades == 2 else 1,
@@ -123,7 +119,7 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
         fracture=fracture,
         friction=friction,
     )
-    return Compiled(arrays, mechanics, errors)
+    return Compiled(arrays, mechanics)
 
 
 def kernel_tables(
@@ -181,7 +177,7 @@ def table_of(array: NDArray[Any]) -> Table:
 
 
 _NOTHING = Table(*np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]], dtype=np.float32))
-"""What the kernel is given for friction where a package has none."""
+"""The friction table of a package without friction."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +185,7 @@ class _Reach:
     """How much of the edge and of the response a scene uses.
 
     Stations and indentation in metres; ``force_N`` makes the scene's largest torque at its longest
-    lever, and so says which forces matter.
+    lever, and so sets the scale of relevant forces.
     """
 
     lowest_station: float
@@ -219,8 +215,8 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
     touching = indentation > 0
     if not np.any(touching):
         raise InputError(
-            "Nowhere in the scene do the blades touch the material, so there is nothing to "
-            "render: check scene.opening_deg and scene.contact_mm against rig.edge in the recipe."
+            "Nowhere in the scene do the blades touch the material, so nothing can be rendered: "
+            "check scene.opening_deg and scene.contact_mm against rig.edge in the recipe."
         )
     lever = np.abs(view.lever)
     if cutting.closure == "eq4":
@@ -241,7 +237,7 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
 
 
 def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
-    """What the crack costs on average over its ripple, against the opening, in J/m.
+    """Mean energy of the crack over its ripple, against the opening, in J/m.
 
     Its share of the energy that starts the crack depends on the peak force there (not at all for
     a power law), and that on how the edge is inclined where the crack settles.

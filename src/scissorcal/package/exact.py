@@ -1,4 +1,4 @@
-"""The exact law that a package's tables stand for: float64, no tables, any number of draws."""
+"""The exact model that a package's tables approximate: float64, no tables, any number of draws."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.calibration import cutting_from, friction_law
+from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.model import (
     Cutting,
     FrictionLaw,
@@ -20,7 +20,7 @@ from scissorcal.model.cutting import torque_at
 Array = NDArray[np.float64]
 
 MOST_AT_ONCE = 500_000
-"""Draws times points evaluated in one sweep, so that a large grid does not fill the memory."""
+"""Draws times points evaluated in one sweep, to limit the memory of a large grid."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,10 @@ class ExactModel:
         Arguments (rad, rad/s, m) broadcast; shape (draws, points) with draws and flat arguments.
         Material beyond the blade's tip is out of reach and gives no torque.
         """
-        place = self.settled(opening, contact)
+        return self.torque_settled(opening, opening_rate, self.settled(opening, contact))
+
+    def torque_settled(self, opening: ArrayLike, opening_rate: ArrayLike, place: Array) -> Array:
+        """The torque of `torque` where the crack stands at ``place`` (m), as `settled` gives it."""
         view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
         reached = view.station < self.cutting.edge.length_m
         felt = np.where(reached, torque_at(self.cutting, opening, place, opening_rate), 0.0)
@@ -48,7 +51,7 @@ class ExactModel:
         return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))
 
     def settled(self, opening: ArrayLike, contact: ArrayLike) -> Array:
-        """Contact x_c after the crack has run outwards as far as it must, in metres."""
+        """Contact x_c (m) after the crack has run outwards until it rests."""
         place = np.asarray(contact, dtype=np.float64)
         if self.cutting.fracture_energy is None:
             return place
@@ -61,7 +64,7 @@ class ExactModel:
 
 @dataclass(frozen=True)
 class FitDraws:
-    """What of one fit defines its law: discrete choices, and parameter draws (draws, names)."""
+    """What defines the law of one fit: discrete choices, and parameter draws (draws, names)."""
 
     structure: Mapping[str, Any]
     names: tuple[str, ...]
@@ -118,5 +121,5 @@ def _join(
         cutting_from(dict(cut.structure), cut_values),
         None
         if friction is None
-        else friction_law(friction_values, float(friction.structure["angle_center"])),
+        else FrictionLaw.of_fit(friction_values, float(friction.structure["angle_center"])),
     )

@@ -9,25 +9,24 @@ from numpy.typing import NDArray
 from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
-from scissorcal.model.friction import angle_factor
-from scissorcal.model.terms import TERMS, Motion
+from scissorcal.model.friction import angle_factor, angle_slope, friction_level
+from scissorcal.model.terms import Role
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
 PLACES = 201
-STEP = 1e-4
-"""Half a difference, as a share of the fastest rate, by which terms are differentiated."""
 
 
 def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any]]:
     """Level of friction against speed for both directions, and the factor over the opening.
 
-    Adopted terms of the rate alone go into the levels. Raises InputError where friction would
-    drive the motion, or where an adopted term depends on the place: the tables are a product of
-    rate and place, which no such term is.
+    Rows of the table of terms that depend on the rate alone go into the levels, those of the place
+    into the factor; :func:`left_out` names the rest. Raises InputError where friction would drive
+    the motion, or where an adopted term depends on the place: the tables are a product of rate and
+    place, which no such term is.
     """
-    unfit = [name for name in law.terms if not TERMS[name].of_rate_only]
+    unfit = [term.name for term in law.terms if term.adoptable and term.role is Role.PLAIN]
     if unfit:
         raise InputError(
             f'The friction fit adopted "{unfit[0]}", which a package cannot carry: its friction is '
@@ -43,22 +42,20 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
             "The friction fit says that friction drives the motion at "
             f"{np.degrees(places[int(np.argmin(factors))]):.0f} degrees of "
             "opening, which no friction does: capture friction over the whole of "
-            "scene.opening_deg, or choose a rung without angle in fit.friction.rung."
+            "scene.opening_deg, or choose a law without angle in fit.friction.rung."
         )
     laws: dict[str, dict[str, Any]] = {}
     for name, sign in (("friction_opening", 1.0), ("friction_closing", -1.0)):
         _refuse_driving(law, sign, fastest)
         laws[name] = {
-            "law": lambda speed, sign=sign: _level(law, sign, speed),
-            "derivative": lambda speed, sign=sign: _level_slope(law, sign, speed, fastest),
+            "law": lambda speed, sign=sign: friction_level(law, sign, speed)[0],
+            "derivative": lambda speed, sign=sign: friction_level(law, sign, speed)[1],
             "low": 0.0,
             "high": fastest,
         }
     laws["friction_angle"] = {
         "law": lambda opening: angle_factor(law, opening),
-        "derivative": lambda opening: (
-            law.angle_slope + 2.0 * law.angle_curvature * (opening - law.angle_center)
-        ),
+        "derivative": lambda opening: angle_slope(law, opening),
         "low": low,
         "high": high,
     }
@@ -72,18 +69,25 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     left out without a word: the friction fit's notes tell of it.
     """
     said = []
-    share = float(np.asarray(law.load_share))
-    if share:
+    loaded = [term for term in law.terms if term.needs_load and term.role is not Role.PLAIN]
+    if loaded:
+        without = {n: v for n, v in law.values.items() if n not in {t.name for t in loaded}}
+        empty = FrictionLaw(without, law.angle_center)
+        by_load = [
+            friction_torque(one, law.angle_center, [-1.0, 1.0], [[-scene_torque], [scene_torque]])
+            for one in (law, empty)
+        ]
+        most = float(np.abs(by_load[0] - by_load[1]).max())
         said.append(
-            f"fit.friction, load: friction grows by {share:.2g} of the load, and the package "
-            f"renders that of an empty joint: up to {share * scene_torque:.2g} N m less than there "
-            f"is, at the scene's {scene_torque:.2g} N m."
+            f"fit.friction, load: friction grows by {most / scene_torque:.2g} of the load, and the "
+            f"package renders that of an empty joint: up to {most:.2g} N m less than there is, at "
+            f"the scene's {scene_torque:.2g} N m."
         )
-    sudden = float(np.asarray(law.presliding_share))
+    sudden = float(np.asarray(law["presliding_share"]))
     if sudden:
-        length = float(np.asarray(law.presliding_length))
-        dry = float(max(np.asarray(law.coulomb_pos), np.asarray(law.coulomb_neg)))
-        dry += float(np.asarray(law.stribeck))
+        length = float(np.asarray(law["presliding_length"]))
+        dry = float(max(np.asarray(law["coulomb_pos"]), np.asarray(law["coulomb_neg"])))
+        dry += float(np.asarray(law["stribeck"]))
         said.append(
             f"fit.friction, presliding: after a reversal friction builds up over {length:.2g} rad, "
             f"and the package renders it built up at once: {2 * sudden * dry:.2g} N m too much "
@@ -113,40 +117,15 @@ def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[s
     )
 
 
-def _level(law: FrictionLaw, sign: float, speed: Array) -> Array:
-    """Friction's magnitude at the law's centre; at rest its limit from that side."""
-    moving = np.maximum(speed, np.finfo(np.float64).tiny)
-    return np.asarray(sign * friction_torque(law, law.angle_center, sign * moving))
-
-
-def _level_slope(law: FrictionLaw, sign: float, speed: Array, fastest: float) -> Array:
-    viscous = law.viscous_pos if sign > 0 else law.viscous_neg
-    relative = speed / law.stribeck_rate
-    fall = 2.0 * law.stribeck * relative / law.stribeck_rate * np.exp(-(relative**2))
-    return np.asarray(viscous - fall + _term_slope(law, sign, np.asarray(speed), STEP * fastest))
-
-
-def _term_slope(law: FrictionLaw, sign: float, speed: Array, step: float) -> Array:
-    """Slope of the adopted terms' level by central differences."""
-    middle = np.maximum(speed, step)
-    total = np.zeros_like(middle)
-    for name, coefficient in zip(law.terms, law.coefficients, strict=True):
-        above, below = (
-            TERMS[name].value(Motion(np.zeros_like(w), sign * w, np.zeros_like(w)))
-            for w in (middle + step, middle - step)
-        )
-        total = total + sign * coefficient * (above - below) / (2.0 * step)
-    return total
-
-
 def _refuse_driving(law: FrictionLaw, sign: float, fastest: float) -> None:
     speeds = np.linspace(0.0, fastest, PLACES)
-    levels = _level(law, sign, speeds)
+    levels = friction_level(law, sign, speeds)[0]
     if levels.min() < 0:
         where = speeds[int(np.argmin(levels))]
+        adopted = ", ".join(term.name for term in law.terms if term.adoptable)
         raise InputError(
             f"The friction fit says that friction drives the motion at {sign * where:.2g} rad/s, "
             "which no friction does: capture friction over the whole of "
             "scene.opening_rate_rad_per_s, or remove the term "
-            f"{', '.join(law.terms) or 'that falls with the speed'} from the fit."
+            f"{adopted or 'that falls with the speed'} from the fit."
         )

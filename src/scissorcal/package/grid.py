@@ -1,24 +1,17 @@
-"""The scene as a box of opening, rate and contact, and points spread evenly through it."""
+"""Points spread evenly over the opening, rate and contact of a scene."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.package.manifest import Ranges
+
 Array = NDArray[np.float64]
 
 _GOLDEN = 1.2207440846057596
 """Root of x^4 = x + 1: its inverse powers spread points evenly in three dimensions (the R3
 sequence of Roberts 2018, a generalised golden ratio)."""
-
-
-@dataclass(frozen=True)
-class Box:
-    """The ranges over which a package promises anything: rad, rad/s (magnitude), m."""
-
-    opening: tuple[float, float]
-    opening_rate: tuple[float, float]
-    contact: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -42,8 +35,8 @@ class Points:
         )
 
 
-def spread_points(box: Box, count: int, slowest: float = 0.0) -> Points:
-    """Spread ``count`` points through a box, and a quarter as many over its faces and corners.
+def spread_points(scene: Ranges, count: int, slowest: float = 0.0) -> Points:
+    """Spread ``count`` points over a scene, and a quarter as many over its faces and corners.
 
     Half of the rates close (negative), half open. No rate is slower than ``slowest``. The points
     follow from ``count`` alone, and share no coordinate with any table's knots but by accident.
@@ -55,16 +48,23 @@ def spread_points(box: Box, count: int, slowest: float = 0.0) -> Points:
     outer[rows, face] = np.round(outer[rows, face])
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     unit = np.concatenate([inner, outer, corners])
-    low, high = max(box.opening_rate[0], slowest), max(box.opening_rate[1], slowest)
+    low, high = (
+        max(scene.opening_rate_rad_per_s[0], slowest),
+        max(scene.opening_rate_rad_per_s[1], slowest),
+    )
     speed = low + unit[:, 1] * (high - low)
     sign = np.where(np.arange(len(unit)) % 2 == 0, -1.0, 1.0)
-    return Points(_scaled(box.opening, unit[:, 0]), sign * speed, _scaled(box.contact, unit[:, 2]))
+    return Points(
+        _scaled(scene.opening_rad, unit[:, 0]), sign * speed, _scaled(scene.contact_m, unit[:, 2])
+    )
 
 
-def nearby_points(box: Box, centres: Points, count: int, reach: float, slowest: float) -> Points:
+def nearby_points(
+    scene: Ranges, centres: Points, count: int, reach: float, slowest: float
+) -> Points:
     """Spread ``count`` points around each centre, up to ``reach`` of each range away from it.
 
-    All stay within the box and no slower than ``slowest``; directions of motion are kept.
+    All stay within the scene and no slower than ``slowest``; directions of motion are kept.
     """
     steps = np.tile(reach * (2.0 * _sequence(count) - 1.0), (len(centres.opening), 1))
     wide = Points(
@@ -73,12 +73,20 @@ def nearby_points(box: Box, centres: Points, count: int, reach: float, slowest: 
             for values in (centres.opening, centres.opening_rate, centres.contact)
         )
     )
-    low, high = max(box.opening_rate[0], slowest), max(box.opening_rate[1], slowest)
+    low, high = (
+        max(scene.opening_rate_rad_per_s[0], slowest),
+        max(scene.opening_rate_rad_per_s[1], slowest),
+    )
     speed = np.abs(wide.opening_rate) + steps[:, 1] * (high - low)
     return Points(
-        np.clip(wide.opening + steps[:, 0] * (box.opening[1] - box.opening[0]), *box.opening),
+        np.clip(
+            wide.opening + steps[:, 0] * (scene.opening_rad[1] - scene.opening_rad[0]),
+            *scene.opening_rad,
+        ),
         np.sign(wide.opening_rate) * np.clip(speed, low, high),
-        np.clip(wide.contact + steps[:, 2] * (box.contact[1] - box.contact[0]), *box.contact),
+        np.clip(
+            wide.contact + steps[:, 2] * (scene.contact_m[1] - scene.contact_m[0]), *scene.contact_m
+        ),
     )
 
 

@@ -1,4 +1,4 @@
-"""The manifest: everything a package states about itself, and nothing it does not know."""
+"""The manifest: everything a package states about itself."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ Range = tuple[Finite, Finite]
 class Section(BaseModel):
     """Base of every object in the manifest: frozen, no unknown keys, no conversions, no NaN."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 class Member(Section):
@@ -64,7 +66,7 @@ class Ranges(Section):
 
 
 class Limits(Section):
-    """What the loop never exceeds, whatever the model says."""
+    """What the loop never exceeds, whatever the model's output."""
 
     torque_Nm: Positive
     torque_slew_Nm_per_s: Positive
@@ -112,14 +114,14 @@ class Mechanics(Section):
 class Bound(Section):
     """How far the kernel's float32 tables may be from the exact model in float64.
 
-    ``largest_seen_Nm`` was found on ``points`` places of the scene that share nothing with the
-    tables' knots; ``stated_Nm`` is twice that and is what the package promises. ``share`` is the
-    stated bound over ``scene_torque_Nm``, the largest torque in the scene; ``allowed_share`` is
-    the part of the scene's tolerance that tables may use up. Torques are compared as they are
-    rendered, within the torque limit, and at rates of at least ``from_rate_rad_per_s``, below
-    which friction is smoothed on purpose. Left out is where the model itself jumps: within 0.1 mm
-    of the blade's tip, and where the edges are so nearly parallel that no force advances the crack;
-    and where the response would exceed 1e5 N.
+    ``largest_seen_Nm`` was found on ``points`` places of the scene independent of the tables'
+    knots; ``stated_Nm`` is twice that and is what the package promises. ``share`` is the stated
+    bound over ``scene_torque_Nm``, the largest torque in the scene; ``allowed_share`` is the part
+    of the scene's tolerance that tables may use up. Torques are compared as they are rendered,
+    within the torque limit, and at rates of at least ``from_rate_rad_per_s``, below which friction
+    is smoothed deliberately. Points where the model itself jumps are left out: within 0.1 mm of the
+    blade's tip, and where the edges are so nearly parallel that no force advances the crack; and
+    where the response would exceed 1e5 N.
     """
 
     largest_seen_Nm: NonNegative
@@ -133,7 +135,7 @@ class Bound(Section):
 
 
 class EdgeStructure(Section):
-    """The edge that a cut was fitted with, as the recipe or photographs gave it.
+    """The edge that a cut was fitted with, from the recipe or photographs.
 
     Parameters of the fit that begin with ``edge_`` take the place of what stands here.
     """
@@ -202,7 +204,7 @@ class FitRecord(Section):
     """A fit that went into the package; its draws stand in ``draws/<what>.npy``.
 
     ``parameters`` are in the order of the draws' columns. ``warnings`` are the fit's failed
-    verdicts, word for word, ``left_out`` what of its law the tables do not render.
+    verdicts, word for word, ``left_out`` the parts of its law that the tables do not render.
     """
 
     rung: Text
@@ -301,21 +303,21 @@ class Manifest(Section):
         return self
 
     @property
+    def failed_checks(self) -> tuple[str, ...]:
+        """The checks that the fits in the package failed, each as "scope, check: reason"."""
+        record = self.provenance
+        parts = (record.cut, record.friction, self.plate)
+        return tuple(reason for part in parts if part for reason in part.warnings)
+
+    @property
     def fit_hashes(self) -> dict[str, str]:
         """Inputs hash of each fit in the package."""
         cut, friction = self.provenance.cut, self.provenance.friction
         return {"cut": cut.inputs_hash} | ({"friction": friction.inputs_hash} if friction else {})
 
-    def member(self, file: str) -> Member:
-        """Return the entry of one file; KeyError if there is none."""
-        for member in self.members:
-            if member.file == file:
-                return member
-        raise KeyError(file)
-
 
 def units_of(mechanics: Mechanics) -> dict[str, str]:
-    """Units of the quantities that a package speaks of."""
+    """Units of the quantities in a package."""
     units = {
         "opening": "rad",
         "opening_rate": "rad/s",
@@ -351,7 +353,7 @@ def content_hash(facts: dict[str, Any]) -> str:
 
 
 def canonical(facts: Any) -> bytes:
-    """One byte string for one JSON value: keys sorted, no spaces, UTF-8, no NaN."""
+    """The canonical bytes of a JSON value: keys sorted, no spaces, UTF-8, no NaN."""
     text = json.dumps(
         facts, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
     )

@@ -1,5 +1,6 @@
-"""A package in memory: torque, its band, and the step that the loop runs."""
+"""A package in memory: torque, its band, and the kernel that the loop steps."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, ModelTables
-from scissorcal.package.archive import MEND, read_archive
+from scissorcal.package.archive import REMEDY, read_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import kernel_tables
 from scissorcal.package.exact import (
@@ -26,6 +27,17 @@ from scissorcal.package.review import against
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9
+"""Share of a range's end by which a place may lie beyond it and still count as inside."""
+
+
+class OutsideCoverageWarning(UserWarning):
+    """A torque was asked for outside the ranges for which the package was built and checked."""
+
+
+class FailedFitsWarning(UserWarning):
+    """A package that was built from fits that failed checks is in use."""
+
 
 @dataclass(frozen=True)
 class ModelPackage:
@@ -39,6 +51,17 @@ class ModelPackage:
     arrays: Mapping[str, NDArray[Any]]
     source: str
 
+    def __repr__(self) -> str:
+        """One line: name, what it covers, error bound and source."""
+        ranges, degrees = self.manifest.ranges, np.degrees(self.manifest.ranges.opening_rad)
+        return (
+            f"<package {self.manifest.name}: opening {degrees[0]:.3g} to {degrees[1]:.3g} deg, "
+            f"rate {ranges.opening_rate_rad_per_s[0]:.3g} to "
+            f"{ranges.opening_rate_rad_per_s[1]:.3g} rad/s, "
+            f"contact {1e3 * ranges.contact_m[0]:.3g} to {1e3 * ranges.contact_m[1]:.3g} mm, "
+            f"error bound {self.manifest.bound.stated_Nm:.2g} N m, {self.source}>"
+        )
+
     def torque(self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike) -> Array:
         """Torque in N m as felt on average, positive where it opens the blades.
 
@@ -46,11 +69,14 @@ class ModelPackage:
         what the loop renders, ripple averaged out; ``manifest.bound`` says how far it may be from
         the exact model. Arguments (rad, rad/s, m) broadcast, and so does the result's shape. The
         crack settles first: at a contact where the material would not hold, the torque is that of
-        the place where it does. See `covers` for where this is meant to be used. Raises ValueError
-        for arguments that are not finite.
+        the place where it does. Outside what the package `covers` the result has no stated error,
+        and an OutsideCoverageWarning says by how much. Raises ValueError for arguments that are
+        not finite.
         """
         opening, rate, contact = _broadcast(opening, opening_rate, contact)
-        return self._limited(self.average.torque(opening, rate, contact))
+        torque = self._limited(self.average.torque(opening, rate, contact))
+        self._warn_outside(opening, rate, contact)
+        return torque
 
     def band(
         self,
@@ -62,8 +88,8 @@ class ModelPackage:
         """Equal-tailed interval that holds the torque with ``probability``: (low, high) in N m.
 
         Each posterior draw in the package is evaluated with the exact model, without tables, and
-        held to the torque limit as in `torque`. Arguments broadcast. Raises ValueError unless
-        0 < probability < 1.
+        held to the torque limit as in `torque`. Arguments broadcast. Warns as `torque` does.
+        Raises ValueError unless 0 < probability < 1.
         """
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability must lie between 0 and 1, not {probability:g}")
@@ -71,6 +97,7 @@ class ModelPackage:
         low, high = torque_quantiles(
             self._drawn, opening, opening_rate, contact, (tail, 1.0 - tail)
         )
+        self._warn_outside(*_broadcast(opening, opening_rate, contact))
         return self._limited(low), self._limited(high)
 
     def kernel(self) -> Kernel:
@@ -81,16 +108,43 @@ class ModelPackage:
         self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike
     ) -> NDArray[np.bool_]:
         """Whether places lie within the ranges for which the package was made and checked."""
-        ranges = self.manifest.ranges
         opening, rate, contact = _broadcast(opening, opening_rate, contact)
         inside = np.ones(opening.shape, dtype=np.bool_)
-        for values, (low, high) in (
-            (opening, ranges.opening_rad),
-            (np.abs(rate), ranges.opening_rate_rad_per_s),
-            (contact, ranges.contact_m),
-        ):
-            inside &= (low <= values) & (values <= high)
+        for _, values, (low, high), _, _ in self._coordinates(opening, rate, contact):
+            inside &= (low * (1.0 - ROUNDING) <= values) & (values <= high * (1.0 + ROUNDING))
         return inside
+
+    def _coordinates(
+        self, opening: Array, rate: Array, contact: Array
+    ) -> tuple[tuple[str, Array, tuple[float, float], float, str], ...]:
+        """Name, values, range, and what turns both into the unit that people read."""
+        ranges = self.manifest.ranges
+        return (
+            ("opening", opening, ranges.opening_rad, float(np.degrees(1.0)), "deg"),
+            ("rate", np.abs(rate), ranges.opening_rate_rad_per_s, 1.0, "rad/s"),
+            ("contact", contact, ranges.contact_m, 1e3, "mm"),
+        )
+
+    def _warn_outside(self, opening: Array, rate: Array, contact: Array) -> None:
+        inside = self.covers(opening, rate, contact)
+        if inside.all():
+            return
+        parts = []
+        for name, values, (low, high), scale, unit in self._coordinates(opening, rate, contact):
+            beyond = np.maximum(low - values, values - high)
+            worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+            if beyond[worst] > ROUNDING * high:
+                parts.append(
+                    f"{name} {scale * values[worst]:.3g} {unit} is {scale * beyond[worst]:.2g} "
+                    f"{unit} outside {scale * low:.3g} to {scale * high:.3g} {unit}"
+                )
+        warnings.warn(
+            f"{int(np.sum(~inside))} of {inside.size} places lie outside what the package "
+            f"{self.manifest.name} covers ({'; '.join(parts)}). The torque there has no stated "
+            "error: widen the scene in the recipe and build the package again.",
+            OutsideCoverageWarning,
+            stacklevel=3,
+        )
 
     @cached_property
     def tables(self) -> ModelTables:
@@ -107,25 +161,32 @@ class ModelPackage:
 
     @property
     def fit_warnings(self) -> tuple[str, ...]:
-        """What the fits' own verdicts hold against them, as sentences."""
-        record, plate = self.manifest.provenance, self.manifest.plate
-        rig = record.cut.warnings + (record.friction.warnings if record.friction else ())
-        return rig + (plate.warnings if plate else ())
+        """One sentence where the package was built from fits that failed checks, else none."""
+        reasons = self.manifest.failed_checks
+        if not reasons:
+            return ()
+        checks = "1 check" if len(reasons) == 1 else f"{len(reasons)} checks"
+        return (
+            f"The package {self.manifest.name} was built from fits that failed {checks}, so its "
+            f"torque and its band may be wrong. {' '.join(reasons)}",
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What whoever renders this package should know beforehand, as sentences."""
-        return self.review_warnings + self.fit_warnings + self.manifest.provenance.cut.left_out
+        """What to know before rendering this package, as sentences."""
+        record = self.manifest.provenance
+        left_out = record.cut.left_out + (record.friction.left_out if record.friction else ())
+        return self.review_warnings + self.fit_warnings + left_out
 
     @property
     def review_warnings(self) -> tuple[str, ...]:
-        """What is wrong with its review: missing, of other fits, or a rejection."""
+        """Why its review is not valid: missing, of other fits, or a rejection."""
         why = against(self.manifest.review, self.manifest.fit_hashes)
         return (f"The package {self.manifest.name} {why}.",) if why else ()
 
     @property
     def draws(self) -> int:
-        """How many posterior draws the band is made of."""
+        """Number of posterior draws in the band."""
         return len(self.arrays["draws/cut.npy"])
 
     @cached_property
@@ -148,11 +209,13 @@ class ModelPackage:
         )
 
 
-def open_package(path: Path | str) -> ModelPackage:
+def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
     """Open a package file, checking everything in it before anything is used.
 
-    Raises MissingError where there is no file, InputError where it is no package, was changed, or
-    states what cannot be. Nothing in a package is executed or unpacked to disk.
+    A package that was built from fits that failed checks gives a FailedFitsWarning with the
+    checks' names; ``warn=False`` is for callers who show ``warnings`` themselves. Raises
+    MissingError where there is no file, InputError where it is no package, was changed, or states
+    what cannot be. Nothing in a package is executed or unpacked to disk.
 
     >>> package = open_package("package/paper-80gsm.zip")  # doctest: +SKIP
     >>> package.torque(opening=0.5, opening_rate=-0.2, contact=0.03)  # doctest: +SKIP
@@ -166,12 +229,16 @@ def open_package(path: Path | str) -> ModelPackage:
         if record and arrays[f"draws/{what}.npy"].shape[1] != len(record.parameters):
             raise InputError(
                 f"{path}, member 'draws/{what}.npy' has another number of columns than the {what} "
-                f"fit has parameters. {MEND}"
+                f"fit has parameters. {REMEDY}"
             )
     try:
         _ = package.tables, package.exact, package.average
     except (ValueError, KeyError) as error:
-        raise InputError(f"{path}: its parts make no model ({error}). {MEND}") from error
+        raise InputError(
+            f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
+        ) from error
+    for sentence in package.fit_warnings if warn else ():
+        warnings.warn(sentence, FailedFitsWarning, stacklevel=2)
     return package
 
 

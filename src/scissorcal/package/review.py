@@ -1,4 +1,4 @@
-"""The review: who looked at a report, what they decided, and of which fits it was."""
+"""The review: who signed a report, the decision, and the fits that it covers."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -17,10 +17,10 @@ class Review(BaseModel):
     """A signature under a report, as in report/signature.json and in a package's manifest.
 
     ``report_sha256`` is of report.json as it was reviewed, ``fit_hashes`` the inputs hash of each
-    fit that it shows. It says what was reviewed, not who is who: nothing here is encrypted.
+    fit that it shows. It states what was reviewed; it does not prove who signed.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     format: ReviewFormat
     name: Annotated[str, Field(min_length=1, max_length=200)]
@@ -52,15 +52,15 @@ def stamp(now: datetime) -> str:
 
 
 def against(review: Review | None, fits: Mapping[str, str]) -> str:
-    """What speaks against rendering a package of these fits (inputs hash by fit).
+    """Why a package of these fits (inputs hash by fit) should not be rendered.
 
-    Empty where nothing does, else the rest of a sentence that begins with the package.
+    Empty if its review is valid, else the rest of a sentence that begins with the package.
     """
     if review is None:
-        return "is not signed: nobody has reviewed its report"
+        return "is not signed: its report has not been reviewed"
     if any(review.fit_hashes.get(what) != digest for what, digest in fits.items()):
         return (
-            f"carries a review of other fits ({review.words}): run 'scissorcal report', review and "
+            f"has a review of other fits ({review.words}): run 'scissorcal report', review and "
             "sign it, then 'scissorcal package build'"
         )
     if review.decision == "reject":

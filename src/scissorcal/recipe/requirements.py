@@ -7,9 +7,7 @@ from typing import Literal
 from scissorcal.recipe.schema import Recipe
 
 CaptureKind = Literal["friction", "cut"]
-FitKind = Literal["friction", "cut"]
 GeometryKind = Literal["camera", "blade", "plate"]
-TableKind = Literal["edge", "response", "fracture", "friction"]
 
 
 @dataclass(frozen=True)
@@ -39,14 +37,8 @@ class Requirements:
     def needs_capture(self, name: CaptureKind) -> bool:
         return any(item.name == name for item in self.captures)
 
-    def needs_fit(self, name: FitKind) -> bool:
-        return any(item.name == name for item in self.fits)
-
     def needs_geometry(self, name: GeometryKind) -> bool:
         return any(item.name == name for item in self.geometry)
-
-    def needs_table(self, name: TableKind) -> bool:
-        return any(item.name == name for item in self.tables)
 
 
 def requirements(recipe: Recipe) -> Requirements:

@@ -8,11 +8,28 @@ are refused.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import Field, GetCoreSchemaHandler, Strict, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from scissorcal.model.friction_terms import TERMS, law_names
+from scissorcal.recipe.priors import CutPriors, JointPriors, LogNormalPrior, Section
 
 FORMAT = "scissorcal-recipe/1"
+
+
+class OneOf:
+    """One of some names: a literal whose names come from a table."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.literal_schema(list(self.names))
+
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -26,73 +43,9 @@ Length_mm = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Thickness_mm = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed_rad_per_s = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speeds = Annotated[tuple[Speed_rad_per_s, ...], Strict(False), Field(min_length=1, max_length=100)]
-FrictionRung = Literal[
-    "coulomb",
-    "coulomb+angle",
-    "coulomb+load",
-    "coulomb+presliding",
-    "coulomb+angle+load",
-    "coulomb+angle+presliding",
-    "coulomb+load+presliding",
-    "coulomb+angle+load+presliding",
-    "coulomb+viscous",
-    "coulomb+viscous+angle",
-    "coulomb+viscous+load",
-    "coulomb+viscous+presliding",
-    "coulomb+viscous+angle+load",
-    "coulomb+viscous+angle+presliding",
-    "coulomb+viscous+load+presliding",
-    "coulomb+viscous+angle+load+presliding",
-    "stribeck",
-    "stribeck+angle",
-    "stribeck+load",
-    "stribeck+presliding",
-    "stribeck+angle+load",
-    "stribeck+angle+presliding",
-    "stribeck+load+presliding",
-    "stribeck+angle+load+presliding",
-]
-FrictionTerm = Literal[
-    "1",
-    "sign",
-    "rate",
-    "|rate|",
-    "rate^2",
-    "rate*|rate|",
-    "rate^3",
-    "opening",
-    "opening^2",
-    "sin(opening)",
-    "cos(opening)",
-    "sign*opening",
-    "sign*opening^2",
-    "rate*opening",
-    "rate^2*opening",
-    "load",
-    "load*sign",
-    "load*rate",
-]
+FrictionRung = Annotated[str, OneOf(*law_names())]
+FrictionTerm = Annotated[str, OneOf(*(term.name for term in TERMS.values() if term.adoptable))]
 Rendered = Literal["torque", "handle_force", "translation_force"]
-
-
-class Section(BaseModel):
-    """Base of every table of the recipe: frozen, strict about keys, types and numbers."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class LogNormalPrior(Section):
-    """A positive quantity, log-normal: ``median``, and the factor that holds 90 % of the belief.
-
-    ``{ median = 3000, factor_90 = 10 }`` says: between 300 and 30000 with 90 % probability.
-    """
-
-    median: Annotated[float, Field(ge=1e-9, le=1e9, allow_inf_nan=False)]
-    factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
-
-    @property
-    def log_sd(self) -> float:
-        return math.log(self.factor_90) / 1.6448536269514722
 
 
 class Edge(Section):
@@ -255,19 +208,20 @@ class Capture(Section):
 
 
 class FitFriction(Section):
-    """``rung = "auto"`` climbs the ladder; ``symmetry = "auto"`` compares both.
+    """``rung = "auto"`` compares the candidate laws; ``symmetry = "auto"`` compares both.
 
     ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
     the windows, over which data and law are averaged alike, pass half; they are longer where the
     encoder is too coarse for that.
-    ``critic`` searches what the law leaves for terms that it lacks (not at draft effort).
+    ``critic`` searches the residuals for terms that the law lacks (not at draft effort).
     """
 
-    rung: Literal["auto"] | FrictionRung = "auto"
+    rung: Annotated[str, OneOf("auto", *law_names())] = "auto"
     symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
     adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
     cutoff_Hz: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 75.0
     critic: bool = True
+    priors: JointPriors = JointPriors()
 
 
 class FitCut(Section):
@@ -293,6 +247,7 @@ class FitCut(Section):
     rate_damping_s_per_m: LogNormalPrior = LogNormalPrior(median=3.0, factor_90=20.0)
     toughness_J_per_m2: LogNormalPrior | None = None
     critic: bool = True
+    priors: CutPriors = CutPriors()
 
 
 class Fit(Section):

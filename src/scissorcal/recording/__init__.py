@@ -5,16 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.recording.exporting import export_table
-    from scissorcal.recording.importing import import_table
-    from scissorcal.recording.reader import content_hash, read_attachments, read_recording
-    from scissorcal.recording.recording import (
-        SAMPLE_DTYPE,
+    from scissorcal.recording.header import (
         Joint,
         Kind,
-        Recording,
+        RecordingHeader,
         Stroke,
         StrokeKind,
+        read_header,
     )
+    from scissorcal.recording.importing import import_table
+    from scissorcal.recording.layout import SAMPLE_DTYPE
+    from scissorcal.recording.reader import content_hash, read_attachments, read_recording
+    from scissorcal.recording.recording import Recording
     from scissorcal.recording.recovering import Recovered, recover
     from scissorcal.recording.scan import Attachment
     from scissorcal.recording.schema import recording_schema
@@ -28,6 +30,7 @@ __all__ = [
     "Joint",
     "Kind",
     "Recording",
+    "RecordingHeader",
     "RecordingSummary",
     "RecordingWriter",
     "Recovered",
@@ -39,6 +42,7 @@ __all__ = [
     "import_table",
     "label_strokes",
     "read_attachments",
+    "read_header",
     "read_recording",
     "recording_schema",
     "recover",
@@ -48,9 +52,11 @@ __all__ = [
 
 _HOMES = {
     "exporting": ("export_table",),
+    "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind", "read_header"),
     "importing": ("import_table",),
+    "layout": ("SAMPLE_DTYPE",),
     "reader": ("content_hash", "read_attachments", "read_recording"),
-    "recording": ("SAMPLE_DTYPE", "Joint", "Kind", "Recording", "Stroke", "StrokeKind"),
+    "recording": ("Recording",),
     "recovering": ("Recovered", "recover"),
     "scan": ("Attachment",),
     "schema": ("recording_schema",),

@@ -1,22 +1,20 @@
-"""Hand a recording to other programs: Parquet and CSV, with the units in the columns' names."""
+"""Export a recording to Parquet or CSV, with units in the columns' names."""
 
+import csv
+import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, file_error
 from scissorcal.recording import layout
+from scissorcal.recording.header import METADATA_NAME
+from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-SUFFIXES = (".parquet", ".csv")
-
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write the samples as a table; the ending of ``path`` (.parquet or .csv) says which.
+    """Write the samples as a table; the extension of ``path`` (.parquet or .csv) says which.
 
     One row a sample, one column a field of SAMPLE_DTYPE, named with its unit (``opening_rad``,
     or ``opening_m`` for a linear joint), and ``time_s``, the device clock from the first sample.
@@ -24,50 +22,46 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     (the metadata of ``data_schemas/recording.schema.json``) and notes, under the keys
     ``scissorcal.recording`` and ``scissorcal.notes``.
 
-    The file appears whole or not at all. Raises InputError for another ending, a missing folder,
-    or a file that stands already, unless ``overwrite``.
+    The file is written whole or not at all. Raises InputError for another extension, a missing
+    folder, an existing file, unless ``overwrite``, or Parquet without pyarrow.
     """
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in _WRITERS:
         raise InputError(
-            f"{path}: tables are written as {' or '.join(SUFFIXES)}. Give the name such an ending."
+            f"{path}: tables are written as {' or '.join(_WRITERS)}. Choose one of these "
+            "extensions."
         )
     if path.exists() and not overwrite:
-        raise InputError(f"{path} stands already. Choose another name, or allow overwriting.")
+        raise InputError(f"{path} exists. Choose another name, or allow overwriting.")
     if not path.parent.is_dir():
-        raise InputError(f"{path.parent} is no folder. Make it first, or choose another.")
+        raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
     draft = path.with_name(path.name + layout.PART_SUFFIX)
     try:
-        _write(_as_table(recording), draft, path.suffix.lower())
+        _WRITERS[path.suffix.lower()](recording, draft)
         draft.replace(path)
     except OSError as error:
         draft.unlink(missing_ok=True)
-        raise ScissorcalError(
-            f"{path} could not be written: {error.strerror or error}. The recording itself is "
-            "untouched; free some space or choose another folder."
-        ) from error
+        raise file_error(error, path, "The recording is unchanged.") or error from None
     return path
 
 
-def _as_table(recording: Recording) -> "pa.Table":
-    import json
+def _write_csv(recording: Recording, path: Path) -> None:
+    columns = layout.columns(recording)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
-    import numpy as np
-    import pyarrow as pa
 
-    columns = {}
-    for field in layout.fields():
-        name = layout.column_name(field, recording.joint)
-        columns[name] = np.ascontiguousarray(recording.samples[field])
-        if field == "device_time_us":
-            columns["time_s"] = recording.device_time_s
-    table = pa.table(columns)
-    return table.replace_schema_metadata(
+def _write_parquet(recording: Recording, path: Path) -> None:
+    pa, pq = require_pyarrow()
+    table = pa.table(layout.columns(recording)).replace_schema_metadata(
         {
-            layout.METADATA_NAME: _description(recording).model_dump_json(),
+            METADATA_NAME: _description(recording).model_dump_json(),
             "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
         }
     )
+    pq.write_table(table, path, compression="zstd")
 
 
 def _description(recording: Recording) -> RecordingMetadata:
@@ -83,12 +77,4 @@ def _description(recording: Recording) -> RecordingMetadata:
     )
 
 
-def _write(table: "pa.Table", path: Path, suffix: str) -> None:
-    if suffix == ".parquet":
-        import pyarrow.parquet as pq
-
-        pq.write_table(table, path, compression="zstd")
-    else:
-        from pyarrow import csv
-
-        csv.write_csv(table, path)
+_WRITERS = {".parquet": _write_parquet, ".csv": _write_csv}

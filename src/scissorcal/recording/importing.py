@@ -1,4 +1,4 @@
-"""Bring in what others logged: CSV, Parquet and MATLAB files become recordings."""
+"""Import logs of other programs: CSV, Parquet and MATLAB files become recordings."""
 
 import difflib
 import math
@@ -9,21 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import CHANNELS, gap_note
-from scissorcal.recording.table import Table
-from scissorcal.recording.tables import read_table
+from scissorcal.recording.summarising import gap_note
+from scissorcal.recording.table import Table, read_table
 
 GAP_FACTOR = 1.5
 """A step longer than this many usual ones is a gap: a sample is missing."""
 
 TRAVEL_SHARE = 0.05
 LEAST_TRAVEL = {"rotary": 5e-3, "linear": 5e-4}
-"""Where ``min_travel`` is not given, a stroke covers 5 % of the range, and 5 mrad or 0.5 mm."""
+"""Least travel of a stroke by default: 5 % of the range, and 5 mrad or 0.5 mm."""
 
 
 def import_table(
@@ -47,8 +46,8 @@ def import_table(
     ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
     number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
     needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``), unless
-    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. What is not
-    named is 0 throughout, which a note says.
+    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. Channels that
+    are not named are 0, which a note says.
 
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
@@ -57,8 +56,8 @@ def import_table(
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
     it and notes it. Both clocks begin at 0 and are rounded to 1 us.
 
-    Raises InputError, naming the line (or row), the column and the mend: text, empty cells, NaN,
-    time that stands still or goes back, gaps, unknown columns and units.
+    Raises InputError, naming the line (or row), the column and the remedy: text, empty cells, NaN,
+    time that repeats or decreases, gaps, unknown columns and units.
 
     >>> recording = import_table(  # doctest: +SKIP
     ...     "DATA_EMPS.mat",
@@ -108,33 +107,34 @@ def _check_request(
     min_travel: float | None,
     wanted: tuple[str, ...],
 ) -> None:
-    """Refuse what cannot be read; of the channels ``wanted`` one must be named, if any."""
-    known = ("time", *CHANNELS)
+    """Check the arguments; of the channels ``wanted``, if any, one must be named."""
+    known = ("time", *MEASURED)
     for name in (*columns, *units, *scale):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"Did you mean {near[0]!r}? " if near else ""
-            raise InputError(f"{name!r} is no channel. {hint}Channels are {', '.join(known)}.")
+            raise InputError(f"{name!r} is not a channel. {hint}Channels are {', '.join(known)}.")
         if name not in columns:
             raise InputError(
                 f"A unit or scale is given for {name}, but no column. Name its column."
             )
     if "opening" not in columns:
-        raise InputError(f"{path}: no column is named for opening. Say which one holds it.")
+        raise InputError(f"{path}: no column is given for opening. Name it with -c opening=COLUMN.")
     if wanted and not set(wanted) & set(columns):
         raise InputError(
-            f"{path}: no column is named for {' or '.join(wanted)}. Say which one holds it."
+            f"{path}: no column is given for {' or '.join(wanted)}. Name one of them with "
+            "-c CHANNEL=COLUMN."
         )
     if "handle_force" in columns and not handle_radius_m > 0:
         raise InputError(
-            f"{path}: handle_force acts at a radius that is not known. Give the handle radius."
+            f"{path}: handle_force needs the handle radius, which is not known. Give it."
         )
     if ("time" in columns) == (rate_Hz is not None):
-        raise InputError(f"{path}: name the column for time, or give the rate; one of them.")
+        raise InputError(f"{path}: name the column for time, or give the rate, but not both.")
     if rate_Hz is not None and not 0 < rate_Hz <= 1e6:
         raise InputError(f"A rate of {rate_Hz} Hz is not possible; give 1 MHz or less.")
     if min_travel is not None and not 0 < min_travel < math.inf:
-        raise InputError(f"A least travel of {min_travel} is not possible; give a positive one.")
+        raise InputError(f"A least travel of {min_travel} is not possible; give a positive number.")
 
 
 def _set_regular_clock(samples: NDArray[np.void], rate_Hz: float) -> None:
@@ -144,7 +144,7 @@ def _set_regular_clock(samples: NDArray[np.void], rate_Hz: float) -> None:
 
 
 def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_gaps: bool) -> None:
-    """Set clocks and sequence from the time column; refuse what is no clock."""
+    """Set clocks and sequence from the time column; InputError if it repeats, falls or has gaps."""
     values = table.columns["time"].values
     seconds = (values - values[0]) * factor
     if not np.abs(seconds).max() < 1e9:
@@ -162,10 +162,10 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
     if len(gaps) and not allow_gaps:
         row = int(gaps[0]) + 1
         raise InputError(
-            f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s pass since the row "
+            f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s since the row "
             f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
-            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep it as it is, "
-            "with a note, or export the log without losses."
+            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep them, "
+            "with a note, or export the log without gaps."
         )
     counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
     samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
@@ -176,12 +176,12 @@ def _not_a_clock(table: Table, seconds: NDArray[np.float64], row: int) -> str:
     before, here = seconds[row - 1], seconds[row]
     if here < before:
         return (
-            f"{table.place(row, 'time')}: time goes back from {before:.9g} s to {here:.9g} s. "
-            "Sort the rows by time, or cut the table there."
+            f"{table.place(row, 'time')}: time decreases from {before:.9g} s to {here:.9g} s. "
+            "Sort the rows by time, or split the table there."
         )
     return (
-        f"{table.place(row, 'time')}: {here:.9g} s stands there a second time. Remove the "
-        "repeated row; if time has too few digits (1 us is needed), give the rate instead."
+        f"{table.place(row, 'time')}: the time {here:.9g} s is repeated. Remove the repeated "
+        "row; if time has too few digits (1 us is needed), give the rate instead."
     )
 
 
@@ -205,10 +205,10 @@ def _notes(
     quantities: Mapping[str, Quantity],
     samples: NDArray[np.void],
 ) -> tuple[str, ...]:
-    missing = [channel for channel in CHANNELS if channel not in columns]
+    missing = [channel for channel in MEASURED if channel not in columns]
     notes = [f"Imported from {source}: {describe(quantities)}."]
-    notes += [f"Not in that file, and 0 throughout: {', '.join(missing)}."] if missing else []
+    notes += [f"Not in the file, and set to 0: {', '.join(missing)}."] if missing else []
     notes += [entry.note for entry in quantities.values() if entry.note]
     if samples["stroke"].max() < 0:
-        notes.append("No stroke was found: the joint does not move enough.")
+        notes.append("No stroke was found: the joint moves less than the least travel.")
     return (*notes, *gap_note(samples))

@@ -1,17 +1,20 @@
-"""How one sample stands in the file and in a table: bytes, units and names, all in one place.
+"""The layout of a sample in a file and in a table: bytes, units and names.
 
 A sample is one MCAP message in the CDR encoding (little-endian, four bytes of encapsulation
 header, then the 80 bytes of SAMPLE_DTYPE unchanged: its fields are naturally aligned, so CDR adds
-no padding). The schema is a plain message definition, so viewers that know CDR plot a recording
-without a plug-in and without ROS being installed.
+no padding). The schema is a plain message definition, so viewers of CDR plot a recording without
+a plug-in and without ROS.
 """
 
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint
+from scissorcal.recording.header import Joint
+
+if TYPE_CHECKING:
+    from scissorcal.recording.recording import Recording
 
 FORMAT: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"
 PROFILE = "scissorcal"
@@ -21,12 +24,62 @@ SCHEMA_ENCODING = "ros2msg"
 MESSAGE_ENCODING = "cdr"
 CDR_HEADER = b"\x00\x01\x00\x00"
 
-METADATA_NAME = "scissorcal.recording"
-NOTE_NAME = "scissorcal.note"
 SHEET_NAME = "scissorcal.sheet"
 
 PART_SUFFIX = ".part"
 """A capture in progress is called ``<name>.mcap.part`` until it is closed."""
+
+
+class Channel(NamedTuple):
+    """One field of a sample: name, type, unit ("position" and "effort" follow the joint), meaning.
+
+    ``measured`` channels are numbers that an imported table may have, and whose range is shown.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    meaning: str
+    measured: bool = False
+
+
+SAMPLE = (
+    Channel("sequence", "<u4", "", "counts the device's frames; a jump is a lost frame"),
+    Channel("flags", "<u4", "", "state flags of the device"),
+    Channel("host_time_ns", "<i8", "ns", "clock of the computer at arrival"),
+    Channel("device_time_us", "<i8", "us", "clock of the device, unwrapped"),
+    Channel("opening", "<f8", "position", "joint position; grows when the blades open", True),
+    Channel("advance", "<f8", "m", "position of the pivot along the cut", True),
+    Channel(
+        "motor_torque",
+        "<f8",
+        "effort",
+        "effort of the motor; positive when it opens the blades",
+        True,
+    ),
+    Channel("handle_force", "<f8", "N", "positive when the hand closes the handles", True),
+    Channel("torque_command", "<f8", "effort", "effort asked of the motor", True),
+    Channel("force_command", "<f8", "N", "force asked of the advance motor", True),
+    Channel("stroke", "<i4", "", "index into the strokes, -1 between them"),
+    Channel(
+        "latency_ns", "<u4", "ns", "frame's arrival to command's departure, 0 without a command"
+    ),
+)
+"""The one table of what a sample holds, in the order of its bytes: a new channel is a row here.
+
+The servo loop writes the same bytes (``sc_sample`` in kernel/c/sc_servo.h), which a test compares.
+"""
+
+SAMPLE_DTYPE = np.dtype([(channel.name, channel.dtype) for channel in SAMPLE])
+"""One sample as in a recording and in the servo loop's ring: 80 bytes, little-endian.
+
+``device_time_us`` is unwrapped (it does not fall back after 2**32 us); ``stroke`` is the index into
+the recording's strokes, -1 between them; ``latency_ns`` runs from the state frame's arrival to the
+command's departure, 0 where no command was sent.
+"""
+
+MEASURED = tuple(channel.name for channel in SAMPLE if channel.measured)
+"""Channels with a measured or commanded number."""
 
 MESSAGE_DTYPE = np.dtype(
     [
@@ -43,28 +96,7 @@ MESSAGE_DTYPE = np.dtype(
 """A whole message record inside a chunk, so that NumPy reads a run of them in one sweep."""
 
 _CDR_TYPES = {"<u4": "uint32", "<i4": "int32", "<i8": "int64", "<f8": "float64"}
-_FIXED_UNITS = {
-    "host_time_ns": "ns",
-    "device_time_us": "us",
-    "advance": "m",
-    "handle_force": "N",
-    "force_command": "N",
-    "latency_ns": "ns",
-}
-_MEANINGS = {
-    "sequence": "counts the device's frames; a jump is a lost frame",
-    "flags": "state flags of the device",
-    "host_time_ns": "clock of the computer at arrival",
-    "device_time_us": "clock of the device, unwrapped",
-    "opening": "joint position; grows when the blades open",
-    "advance": "position of the pivot along the cut",
-    "motor_torque": "effort of the motor; positive when it opens the blades",
-    "handle_force": "positive when the hand closes the handles",
-    "torque_command": "effort asked of the motor",
-    "force_command": "force asked of the advance motor",
-    "stroke": "index into the strokes, -1 between them",
-    "latency_ns": "frame's arrival to command's departure, 0 without a command",
-}
+_CHANNELS = {channel.name: channel for channel in SAMPLE}
 
 
 def unit_of(field: str, joint: Joint) -> str:
@@ -73,11 +105,8 @@ def unit_of(field: str, joint: Joint) -> str:
     >>> unit_of("motor_torque", Joint("linear"))
     'N'
     """
-    if field == "opening":
-        return joint.position_unit
-    if field in ("motor_torque", "torque_command"):
-        return joint.effort_unit
-    return _FIXED_UNITS.get(field, "")
+    unit = _CHANNELS[field].unit
+    return {"position": joint.position_unit, "effort": joint.effort_unit}.get(unit, unit)
 
 
 def column_name(field: str, joint: Joint) -> str:
@@ -92,21 +121,34 @@ def column_name(field: str, joint: Joint) -> str:
     return f"{field}_{unit}"
 
 
+def columns(recording: "Recording") -> dict[str, NDArray[Any]]:
+    """Return the samples by column, each (N,): the fields by :func:`column_name`, and ``time_s``.
+
+    >>> from scissorcal.recording import Recording
+    >>> list(columns(Recording("cut", empty_samples(2))))[3:6]
+    ['device_time_us', 'time_s', 'opening_rad']
+    """
+    found: dict[str, NDArray[Any]] = {}
+    for field in fields():
+        name = column_name(field, recording.joint)
+        found[name] = np.ascontiguousarray(recording.samples[field])
+        if field == "device_time_us":
+            found["time_s"] = recording.device_time_s
+    return found
+
+
 def message_definition(joint: Joint) -> str:
     """Return the schema's text: one line per field with its type, unit and meaning."""
-    lines = []
-    for field in fields():
-        unit = unit_of(field, joint) or "-"
-        kind = _CDR_TYPES[SAMPLE_DTYPE[field].str]
-        lines.append(f"{kind} {field}  # [{unit}] {_MEANINGS[field]}")
-    return "\n".join(lines) + "\n"
+    return "".join(
+        f"{_CDR_TYPES[channel.dtype]} {channel.name}  "
+        f"# [{unit_of(channel.name, joint) or '-'}] {channel.meaning}\n"
+        for channel in SAMPLE
+    )
 
 
 def fields() -> tuple[str, ...]:
     """Return the names of SAMPLE_DTYPE's fields, in order."""
-    names = SAMPLE_DTYPE.names
-    assert names is not None
-    return names
+    return tuple(_CHANNELS)
 
 
 def empty_samples(count: int = 0) -> NDArray[np.void]:

@@ -49,7 +49,7 @@ def _column(path: Path, variables: Mapping[str, Any], name: str | int, channel: 
 
 
 def _flat(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the real numeric arrays, those within structures under dotted names."""
+    """Yield the real numeric arrays, those in structures under dotted names."""
     for name, value in variables.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
@@ -83,7 +83,7 @@ def _load(path: Path) -> Mapping[str, Any]:
         struct.error,
     ) as error:
         raise InputError(
-            f"{path} cannot be read as a MATLAB file: {error}. Save it anew in MATLAB "
+            f"{path} cannot be read as a MATLAB file: {error}. Save it again in MATLAB "
             "(save -v7), or export it as CSV."
         ) from error
     return variables
@@ -109,7 +109,7 @@ def _load_hdf5(path: Path) -> Mapping[str, Any]:
             return read(file)
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise InputError(
-            f"{path} cannot be read as a MATLAB 7.3 file: {error}. Save it anew in MATLAB "
+            f"{path} cannot be read as a MATLAB 7.3 file: {error}. Save it again in MATLAB "
             "(save -v7), or export it as CSV."
         ) from error
 

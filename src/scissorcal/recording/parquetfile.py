@@ -1,6 +1,7 @@
-"""Read the wanted columns of a Parquet file."""
+"""Read the wanted columns of a Parquet file, with pyarrow of the extra ``parquet``."""
 
 from pathlib import Path
+from typing import Any
 
 from scissorcal.errors import InputError
 from scissorcal.recording.table import Column, Table, Wanted, find_column
@@ -8,9 +9,7 @@ from scissorcal.recording.table import Column, Table, Wanted, find_column
 
 def read_parquet(path: Path, wanted: Wanted) -> Table:
     """Read the columns. Raises InputError where the file or a column cannot be used."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+    pa, pq = require_pyarrow()
     try:
         file = pq.ParquetFile(path)
         headings = file.schema_arrow.names
@@ -21,7 +20,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
         data = file.read(columns=sorted({headings[number] for number in chosen.values()}))
     except (pa.ArrowException, OSError) as error:
         raise InputError(
-            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it anew, or "
+            f"{path} cannot be read as Parquet: {str(error).rstrip('. ')}. Write it again, or "
             "export it as CSV."
         ) from error
     columns = {}
@@ -38,3 +37,16 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
             )
         columns[channel] = Column(heading, column.cast(pa.float64(), safe=False).to_numpy())
     return Table(path, columns)
+
+
+def require_pyarrow() -> tuple[Any, Any]:
+    """Import pyarrow and pyarrow.parquet. Raises InputError where they are not installed."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise InputError(
+            "Parquet needs pyarrow, which is not installed: pip install 'scissorcal[parquet]', or "
+            "use CSV."
+        ) from None
+    return pa, pq

@@ -1,4 +1,4 @@
-"""Half-written files: their creation under a lock, their sealing, and what a full disk means."""
+"""Unfinished files: created under a lock, renamed when complete, and what a full disk means."""
 
 import contextlib
 import fcntl
@@ -7,24 +7,24 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, file_error
 
 
 def create_locked(path: Path, part: Path) -> IO[bytes]:
     """Create ``part``, which will become ``path``, and hold its lock until it is closed.
 
-    The lock goes with the process, however it ends. Raises InputError if either name is taken
+    The lock ends with the process. Raises InputError if either name is taken
     or the folder cannot be written.
     """
     while True:
         if path.exists():
-            raise InputError(f"{path} stands already and is not overwritten. Choose another name.")
+            raise InputError(f"{path} exists and is not overwritten. Choose another name.")
         try:
             stream = part.open("xb")
         except FileExistsError:
             raise InputError(
-                f"{part} is in the way: a capture of that name is running or was interrupted. "
-                "Wait for it, or recover it first."
+                f"{part} exists: a capture of that name is running or was interrupted. Wait "
+                "until it ends; the next command recovers an interrupted one."
             ) from None
         except OSError as error:
             raise InputError(
@@ -32,14 +32,14 @@ def create_locked(path: Path, part: Path) -> IO[bytes]:
                 "first, or choose one that you may write to."
             ) from error
         fcntl.flock(stream.fileno(), fcntl.LOCK_EX)
-        # A recovery may have taken the empty file away between its creation and the lock.
+        # A recovery may have renamed the empty file between its creation and the lock.
         if is_same_file(part, stream):
             return stream
         stream.close()
 
 
 def try_lock(stream: IO[bytes]) -> bool:
-    """Take the writer's lock on an open file; False if a live process holds it."""
+    """Lock an open file as its writer does; False if a running process holds the lock."""
     try:
         fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -48,7 +48,7 @@ def try_lock(stream: IO[bytes]) -> bool:
 
 
 def is_same_file(path: Path, stream: IO[bytes]) -> bool:
-    """Tell whether ``path`` still names the open file."""
+    """Whether ``path`` still names the open file."""
     try:
         return os.path.samestat(path.stat(), os.fstat(stream.fileno()))
     except FileNotFoundError:
@@ -56,11 +56,11 @@ def is_same_file(path: Path, stream: IO[bytes]) -> bool:
 
 
 def seal(stream: IO[bytes], part: Path, path: Path) -> None:
-    """Force the file to disk, give it its final name, and only then let go of the lock."""
+    """Flush the file to disk, rename it, and only then release the lock."""
     if path.exists():
         raise InputError(
-            f"{path} appeared while its capture ran and is not overwritten: the capture is kept "
-            f"as {part.name}. The next command recovers it under another name."
+            f"{path} was created by another program during the capture and is not overwritten: "
+            f"the capture is kept as {part.name}. The next command recovers it under another name."
         )
     stream.flush()
     os.fsync(stream.fileno())
@@ -75,11 +75,9 @@ def seal(stream: IO[bytes], part: Path, path: Path) -> None:
 
 @contextlib.contextmanager
 def explained(part: Path) -> Iterator[None]:
-    """Turn a refusal of the disk into a sentence that says what is kept."""
+    """Turn a write error into one that says what is kept."""
     try:
         yield
     except OSError as error:
-        raise ScissorcalError(
-            f"{part} could not be written: {error.strerror or error}. What was recorded until "
-            "then is kept in it; free some space, and the next command recovers it."
-        ) from error
+        kept = f"Samples until then are kept in {part}; the next command recovers them."
+        raise file_error(error, part, kept) or error from None

@@ -1,4 +1,4 @@
-"""From a column's numbers to SI: units, and scales such as a motor's newtons per volt."""
+"""Conversion of a column's numbers to SI: units, and scales such as newtons per volt."""
 
 import math
 import re
@@ -16,7 +16,7 @@ COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
 
 @dataclass(frozen=True)
 class Quantity:
-    """How one channel's column becomes SI: multiply by ``factor``; ``sentence`` says why."""
+    """How one channel's column becomes SI: multiply by ``factor``; ``sentence`` describes it."""
 
     factor: float
     sentence: str
@@ -29,9 +29,9 @@ def quantity(
     """Find the factor from a column's numbers to the channel's SI unit.
 
     ``unit`` is the unit of the column, also once it is multiplied by ``scale``; without it the
-    heading's unit counts ("angle [deg]", "angle_deg"). Volts, amperes and counts measure no
-    motion or force, so they need a scale, which then leads to SI, as does a scale where no unit
-    is known. Raises InputError if no unit is known, or one of another kind than the channel.
+    heading's unit counts ("angle [deg]", "angle_deg"). Volts, amperes and counts need
+    a scale, which then converts to SI, as does a scale where no unit is known. Raises InputError if
+    no unit is known, or one of another kind than the channel.
     """
     column = table.columns[channel]
     target = "s" if channel == "time" else unit_of(channel, joint)
@@ -43,7 +43,7 @@ def quantity(
         by += f" times {factor:.9g}" if _is_number(scale) else f" times {scale} = {factor:.9g}"
     if stated is None and scale is None:
         raise InputError(
-            f"{table.path}, column {column.heading!r}: its unit is not known. Say it, for "
+            f"{table.path}, column {column.heading!r}: its unit is not known. State it, for "
             f"example {channel}={_plain(target)}."
         )
     if stated is None or _is_raw(stated):
@@ -89,9 +89,9 @@ def _factor(table: Table, channel: str, part: str) -> float:
             return table.scalars[part]
     listed = ", ".join(table.scalars) or "none"
     raise InputError(
-        f"{table.path}: the scale of {channel} names {part!r}, which is no number and no single "
-        f"number in the file (those are: {listed}). Give a number, or join names and numbers by "
-        "* and /."
+        f"{table.path}: the scale of {channel} names {part!r}, which is neither a number nor a "
+        f"single number in the file (these are: {listed}). Give a number, or join names and "
+        "numbers by * and /."
     )
 
 
@@ -100,7 +100,7 @@ def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joi
     heading = table.columns[channel].heading
     if unit is None or si is None:
         raise InputError(
-            f"{table.path}, column {heading!r}: {stated!r} is not a unit that is known here. "
+            f"{table.path}, column {heading!r}: {stated!r} is not a known unit. "
             f"{channel} takes {target} and its parts and multiples (m, k, ...)."
         )
     factor = conversion(unit, si)
@@ -108,23 +108,23 @@ def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joi
         other = Joint("linear" if joint.kind == "rotary" else "rotary")
         turned = parse_unit(_plain(unit_of(channel, other)))
         fits = turned is not None and conversion(unit, turned) is not None
-        mend = f"Say that the joint is {other.kind}" if fits else f"Give a unit such as {target}"
+        remedy = f"Set the joint to {other.kind}" if fits else f"Give a unit such as {target}"
         raise InputError(
-            f"{table.path}, column {heading!r}: {stated} is no unit for {channel} of a "
-            f"{joint.kind} joint, which is in {target}. {mend}, or name another column."
+            f"{table.path}, column {heading!r}: {stated} is not a unit for {channel} of a "
+            f"{joint.kind} joint, which is in {target}. {remedy}, or name another column."
         )
     return factor
 
 
 def _contradiction(table: Table, channel: str, heading: str | None, stated: str | None) -> str:
-    """Say where the heading names another unit than was stated (the stated one counts)."""
+    """A sentence where the heading has another unit than was stated (the stated one is used)."""
     if heading is None or stated is None or parse_unit(_plain(heading)) is None:
         return ""
     if parse_unit(_plain(heading)) == parse_unit(_plain(stated)):
         return ""
     return (
-        f"Column {table.columns[channel].heading!r} was taken in {stated}, as stated, although "
-        f"its heading says {heading}."
+        f"Column {table.columns[channel].heading!r} was read in {stated}, as stated, although "
+        f"its heading has {heading}."
     )
 
 
@@ -154,11 +154,11 @@ def _is_raw(unit: str) -> bool:
 
 
 def _plain(unit: str) -> str:
-    """Spell a unit as names do: ``mN m`` and ``mN*m`` are ``mNm``, micro is ``u``."""
+    """Normalise a unit as in names: ``mN m`` and ``mN*m`` are ``mNm``, micro is ``u``."""
     text = re.sub(r"[\s*·⋅.]", "", unit).replace("µ", "u").replace("μ", "u")
     return {"°": "deg", "sec": "s", "msec": "ms"}.get(text, text)
 
 
 def describe(quantities: Mapping[str, Quantity]) -> str:
-    """Say in one sentence what each channel was made of."""
+    """One sentence on how each channel was converted."""
     return "; ".join(entry.sentence for entry in quantities.values())

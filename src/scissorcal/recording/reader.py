@@ -1,4 +1,4 @@
-"""Read a recording back, also one that was cut off or damaged."""
+"""Read a recording, also one that is cut off or damaged."""
 
 import hashlib
 import math
@@ -18,11 +18,10 @@ def read_recording(path: str | Path) -> Recording:
     """Read a recording, finished or not.
 
     A file that was cut off gives all samples of its complete chunks; a damaged chunk is left out
-    and the rest kept. Whatever had to be left out stands in ``notes`` with its place in the
-    file. Strokes that nobody planned are found from the motion. ``content_hash`` is the SHA-256
-    of the very bytes that were read.
+    and the rest kept. ``notes`` say what was left out, and where in the file. Strokes that were not
+    planned are found from the motion. ``content_hash`` is the SHA-256 of the bytes that were read.
 
-    Raises InputError, naming the file and the mend, if it is missing, empty, of another format
+    Raises InputError, naming the file and the remedy, if it is missing, empty, of another format
     or program, or cut off before its description is complete.
     """
     scan = scan_file(Path(path))
@@ -54,7 +53,7 @@ def read_attachments(path: str | Path) -> tuple[Attachment, ...]:
 
 
 def content_hash(path: str | Path) -> str:
-    """Return the SHA-256 of a file's bytes in hexadecimal, read piece by piece.
+    """Return the SHA-256 of a file's bytes in hexadecimal, read in pieces.
 
     Raises InputError if the file cannot be read.
     """
@@ -85,4 +84,4 @@ def _label(samples: NDArray[np.void], min_travel: float, scan: Scan) -> tuple[St
 def _condition(scan: Scan, count: int) -> list[str]:
     if scan.finished:
         return scan.damage
-    return [f"The recording was never finished; {count} complete samples are kept.", *scan.damage]
+    return [f"The recording is not finished; it has {count} complete samples.", *scan.damage]

@@ -1,76 +1,20 @@
-"""What a recording is, once it is in memory: arrays with time first, strokes, and provenance."""
+"""A recording in memory: arrays with time first, strokes, and provenance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Kind = Literal["friction", "cut", "render"]
-StrokeKind = Literal["closing", "opening", "excitation", "press"]
+from scissorcal.errors import MissingError
+from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
+from scissorcal.recording.layout import SAMPLE_DTYPE
 
-SAMPLE_DTYPE = np.dtype(
-    [
-        ("sequence", "<u4"),
-        ("flags", "<u4"),
-        ("host_time_ns", "<i8"),
-        ("device_time_us", "<i8"),
-        ("opening", "<f8"),
-        ("advance", "<f8"),
-        ("motor_torque", "<f8"),
-        ("handle_force", "<f8"),
-        ("torque_command", "<f8"),
-        ("force_command", "<f8"),
-        ("stroke", "<i4"),
-        ("latency_ns", "<u4"),
-    ]
-)
-"""One sample as it stands in a recording and in the servo loop's ring: 80 bytes, little-endian.
+if TYPE_CHECKING:
+    import pandas as pd
 
-``device_time_us`` is unwrapped (it does not fall back after 2**32 us); ``stroke`` is the index into
-the recording's strokes, -1 between them; ``latency_ns`` runs from the state frame's arrival to the
-command's departure, 0 where no command was sent.
-"""
-
-
-@dataclass(frozen=True)
-class Joint:
-    """Whether the moving joint turns or slides, which fixes the units of its channels.
-
-    A rotary joint has radians and N m; a linear one metres and newtons.
-
-    >>> Joint("linear").effort_unit
-    'N'
-    """
-
-    kind: Literal["rotary", "linear"] = "rotary"
-
-    @property
-    def position_unit(self) -> str:
-        return "rad" if self.kind == "rotary" else "m"
-
-    @property
-    def effort_unit(self) -> str:
-        return "N m" if self.kind == "rotary" else "N"
-
-    @property
-    def inertia_unit(self) -> str:
-        return "kg m^2" if self.kind == "rotary" else "kg"
-
-
-@dataclass(frozen=True)
-class Stroke:
-    """One planned movement within a recording: its kind, nominal speed and sheet of material.
-
-    ``speed`` is the magnitude of the nominal rate (rad/s or m/s), NaN where the movement has no
-    single speed; ``sheet`` counts fresh pieces of material from 0, -1 where none is loaded.
-    """
-
-    index: int
-    kind: StrokeKind
-    speed: float = float("nan")
-    sheet: int = -1
+__all__ = ["SAMPLE_DTYPE", "Joint", "Kind", "Recording", "Stroke", "StrokeKind"]
 
 
 @dataclass(frozen=True)
@@ -80,20 +24,45 @@ class Recording:
     ``samples`` has SAMPLE_DTYPE, shape (N,). For a linear joint ``opening`` holds metres and
     ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
-    SHA-256 of the file it was read from. ``notes`` are sentences about what reading had to do
-    (recovered tail, garbled frames, gaps), for the report.
+    SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
+    it found (recovered end, garbled frames, gaps), for the report.
     """
 
     kind: Kind
     samples: NDArray[np.void]
     strokes: tuple[Stroke, ...] = ()
-    joint: Joint = Joint()
+    joint: Joint = field(default_factory=Joint)
     handle_radius_m: float = float("nan")
     device: Mapping[str, Any] = field(default_factory=dict)
     recipe_toml: str = ""
     source: str = ""
     content_hash: str = ""
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: kind, length, strokes and source."""
+        return (
+            f"<{self.kind} recording: {len(self.samples)} samples, {self.duration_s:.1f} s, "
+            f"{len(self.strokes)} strokes, {self.joint.kind} joint, {self.source or 'in memory'}>"
+        )
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return the samples as a table, one row per sample, the unit in each column's name.
+
+        The columns are those of ``scissorcal export``: ``opening_rad`` (``opening_m`` for a linear
+        joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
+        Raises MissingError where pandas is not installed.
+        """
+        from scissorcal.recording.layout import columns
+
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingError(
+                "to_pandas() needs pandas, which is not installed. Run 'pip install pandas', or "
+                "use recording.samples, a NumPy array with the same fields."
+            ) from None
+        return pd.DataFrame(columns(self))
 
     @property
     def device_time_s(self) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Finish captures that were interrupted, without ever deleting a byte of them."""
+"""Recover interrupted captures, without deleting anything."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +17,11 @@ KEPT_SUFFIX = ".interrupted"
 
 @dataclass(frozen=True)
 class Recovered:
-    """What became of one half-written capture.
+    """The result for one unfinished capture.
 
-    ``recovered``: ``recording`` is the proper file. ``empty``: it held no whole sample. ``busy``:
-    a live process still writes it, so it was left alone. ``kept`` is where the original stands.
+    ``recovered``: ``recording`` is the finished file. ``empty``: it had no complete sample.
+    ``busy``: a running process still writes it, so it was not touched. ``kept`` is the path of the
+    original.
     """
 
     status: Literal["recovered", "empty", "busy"]
@@ -31,13 +32,13 @@ class Recovered:
 
 
 def recover(folder: str | Path) -> tuple[Recovered, ...]:
-    """Turn every ``*.mcap.part`` of a folder into a proper recording, and say what was done.
+    """Turn every ``*.mcap.part`` of a folder into a finished recording, and report on each.
 
     The complete samples, notes and attachments go into ``<name>.mcap`` with a note about the
-    interruption; the original is kept as ``<name>.mcap.interrupted``. Captures that a live
-    process still writes are left alone. Safe to call at any time, by any number of processes,
-    and to be killed itself: the next call finishes the work, and a call with nothing to do
-    returns an empty tuple. A folder that does not exist holds nothing.
+    interruption; the original is kept as ``<name>.mcap.interrupted``. Captures that a running
+    process still writes are not touched. It may be called at any time, by several processes, and
+    may be killed: the next call finishes the work. A call with nothing to do, or for a folder that
+    does not exist, returns an empty tuple.
     """
     parts = sorted(Path(folder).glob("*.mcap" + layout.PART_SUFFIX))
     return tuple(result for part in parts if (result := _recover_one(part)) is not None)
@@ -54,7 +55,7 @@ def _recover_one(part: Path) -> Recovered | None:
         ) from error
     with stream, explained(part):
         if not try_lock(stream):
-            sentence = f"{part.name} is still being written, so it was left alone."
+            sentence = f"{part.name} is still being written, so it was not touched."
             return Recovered("busy", part, None, 0, sentence)
         if not is_same_file(part, stream):
             return None
@@ -79,7 +80,7 @@ def _recover_one(part: Path) -> Recovered | None:
 
 
 def _rewrite(part: Path, scan: Scan) -> Path:
-    """Write the proper recording beside the original and return its path."""
+    """Write the finished recording beside the original and return its path."""
     path = _free(part.with_name(part.name.removesuffix(layout.PART_SUFFIX)))
     draft = part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + ".recovery")
     metadata = scan.metadata.model_copy(update={"recovered_from": scan.content_hash})
@@ -104,7 +105,7 @@ def _rewrite(part: Path, scan: Scan) -> Path:
 
 
 def _already_recovered(part: Path, scan: Scan) -> Path | None:
-    """Find the recording that an earlier, itself interrupted call made of these bytes."""
+    """Find the recording that an earlier, interrupted call made of these bytes."""
     name = part.name.removesuffix(".mcap" + layout.PART_SUFFIX)
     for candidate in sorted(part.parent.glob(f"{name}*.mcap")):
         try:
@@ -116,7 +117,7 @@ def _already_recovered(part: Path, scan: Scan) -> Path | None:
 
 
 def _keep(part: Path) -> Path:
-    """Rename the original out of the way; it is never deleted."""
+    """Rename the original; it is never deleted."""
     kept = _free(part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + KEPT_SUFFIX))
     return part.rename(kept)
 

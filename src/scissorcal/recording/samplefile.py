@@ -1,4 +1,4 @@
-"""The MCAP side of writing: samples, notes and attachments into one open file, in small chunks."""
+"""MCAP encoding: samples, notes and attachments into one open file, in small chunks."""
 
 from typing import IO, Any
 
@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recording import layout
-from scissorcal.recording.recording import SAMPLE_DTYPE
+from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, to_entries
 
 FLUSH_SPAN_NS = 125_000_000
-"""Host time that samples may wait in memory for their chunk: half of what is promised (0.25 s),
-so that the promise holds for a caller who appends eight times a second or oftener."""
+"""Host time that samples wait in memory for their chunk: half of the promised 0.25 s, so that the
+promise holds for callers that append at least eight times a second."""
 
 CHUNK_BYTES = 64 * 1024
-"""A chunk is closed at this size even where the samples' clock stands still (imports)."""
+"""A chunk is closed at this size even if the samples' clock does not advance (imports)."""
 
 
 class SampleFile:
-    """An MCAP file being written; knows the encoding, not names, locks or renaming.
+    """An MCAP file being written: the encoding only, not names, locks or renaming.
 
     The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it.
     """
@@ -45,7 +45,7 @@ class SampleFile:
 
     def append(self, samples: NDArray[np.void]) -> None:
         """Add samples, shape (n,) with SAMPLE_DTYPE; close the chunk once it is 0.125 s old."""
-        if samples.dtype != SAMPLE_DTYPE or samples.ndim != 1:
+        if samples.dtype != layout.SAMPLE_DTYPE or samples.ndim != 1:
             raise ValueError(
                 f"samples must have SAMPLE_DTYPE and one dimension, not {samples.dtype} "
                 f"with shape {samples.shape}"
@@ -53,7 +53,7 @@ class SampleFile:
         if not len(samples):
             return
         data = samples.tobytes()
-        size = SAMPLE_DTYPE.itemsize
+        size = layout.SAMPLE_DTYPE.itemsize
         times = np.maximum(samples["host_time_ns"], 0).tolist()
         for index, (time, number) in enumerate(
             zip(times, samples["sequence"].tolist(), strict=True)
@@ -68,7 +68,7 @@ class SampleFile:
         self.flush_if_due(times[-1])
 
     def flush_if_due(self, host_time_ns: int) -> None:
-        """Write the chunk out if its oldest sample has waited long enough by this clock."""
+        """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""
         if self._flushed_at is None:
             return
         if abs(host_time_ns - self._flushed_at) >= FLUSH_SPAN_NS:
@@ -89,16 +89,16 @@ class SampleFile:
 
     def note(self, sentence: str) -> None:
         """Add a sentence for the report, in its place among the samples."""
-        self._mark(layout.NOTE_NAME, {"note": sentence})
+        self._mark(NOTE_NAME, {"note": sentence})
 
     def mark_sheet(self, sheet: int) -> None:
-        """Say that from the next sample on this sheet of material is loaded (-1: none)."""
+        """Record that this sheet of material is loaded from the next sample on (-1: none)."""
         self._mark(layout.SHEET_NAME, {"sheet": str(sheet)})
 
     def finish(self) -> None:
         """Write what is left, the metadata again, the index and the footer; leave the file open."""
         self._flush(self._newest_host_time)
-        self._mcap.add_metadata(layout.METADATA_NAME, self._entries)
+        self._mcap.add_metadata(METADATA_NAME, self._entries)
         self._mcap.finish()
 
     def _mark(self, name: str, entries: dict[str, str]) -> None:
@@ -119,5 +119,5 @@ def _start(stream: IO[bytes], entries: dict[str, str]) -> Any:
 
     writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(profile=layout.PROFILE, library=f"scissorcal {__version__}")
-    writer.add_metadata(layout.METADATA_NAME, entries)
+    writer.add_metadata(METADATA_NAME, entries)
     return writer

@@ -1,4 +1,4 @@
-"""Walk through a recording's bytes and keep all that is whole, whatever happened to the rest."""
+"""Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
 import hashlib
 import struct
@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording import layout
+from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
 
-MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK = 64 * 1024 * 1024
-HEAD = struct.Struct("<BQ")
 _ZSTD_FIELD = b"\x04\x00\x00\x00zstd"
 _ZSTD_FIELD_AT = HEAD.size + 28
 _MESSAGE_BODY = layout.MESSAGE_DTYPE.itemsize - HEAD.size
@@ -41,7 +40,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Sheet:
-    """From here on this sheet of material is loaded."""
+    """This sheet of material is loaded from here on."""
 
     number: int
 
@@ -51,7 +50,7 @@ Event = NDArray[np.void] | Note | Sheet | Attachment
 
 @dataclass
 class Scan:
-    """What a file holds: ``events`` in the order they were written, and what was wrong with it."""
+    """What a file holds: ``events`` in the order they were written, and what is damaged."""
 
     path: Path
     content_hash: str
@@ -109,12 +108,12 @@ def read_bytes(path: Path) -> bytes:
             f"{path} cannot be read: {error.strerror}. Name a file that you may read."
         ) from error
     if not data:
-        raise InputError(f"{path} is empty (0 bytes): nothing was recorded. Capture again.")
+        raise InputError(f"{path} is empty (0 bytes). Capture again.")
     return data
 
 
 class _DamageError(Exception):
-    """One record is damaged; the words say how."""
+    """One record is damaged; the message says how."""
 
 
 @dataclass
@@ -149,14 +148,14 @@ class _Walk:
         from mcap.records import Metadata
 
         record = _parse(Metadata, body)
-        if record.name == layout.NOTE_NAME:
+        if record.name == NOTE_NAME:
             self.events.append(Note(record.metadata.get("note", "")))
         elif record.name == layout.SHEET_NAME:
             try:
                 self.events.append(Sheet(int(record.metadata["sheet"])))
             except (KeyError, ValueError):
                 raise _DamageError("a sheet mark without a number") from None
-        elif record.name == layout.METADATA_NAME:
+        elif record.name == METADATA_NAME:
             try:
                 metadata = from_entries(record.metadata)
             except ValueError as error:
@@ -195,7 +194,7 @@ class _Walk:
 
 
 def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
-    """Yield (offset, opcode, body) of the whole records; go round damage, note where it is."""
+    """Yield (offset, opcode, body) of the whole records; skip damage and note where it is."""
     offset = len(MAGIC)
     while offset < len(data):
         if walk.finished and data[offset:] == MAGIC:
@@ -291,17 +290,17 @@ def _refuse_other_formats(path: Path, data: bytes) -> None:
         b"\x89PNG": "a PNG image",
         b"\xff\xd8\xff": "a JPEG image",
         b"PK\x03\x04": "a zip archive",
-        b"PAR1": "a Parquet table (bring it in with import)",
-        b"MATLAB": "a MATLAB file (bring it in with import)",
+        b"PAR1": "a Parquet table (use 'scissorcal import')",
+        b"MATLAB": "a MATLAB file (use 'scissorcal import')",
         b"\x89HDF": "an HDF5 file",
     }
     looks = next((words for start, words in known.items() if data.startswith(start)), "")
     if not looks:
         printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in data[:1000])
         text = printable > 0.9 * len(data[:1000])
-        looks = "text (a table is brought in with import)" if text else "not in the MCAP format"
+        looks = "text (for a table use 'scissorcal import')" if text else "an unknown format"
     raise InputError(
-        f"{path} is no recording: from its first bytes it is {looks}. Name an .mcap file that "
+        f"{path} is not a recording: its first bytes are those of {looks}. Name an .mcap file that "
         "scissorcal wrote."
     )
 
@@ -314,12 +313,12 @@ def _why_no_recording(path: Path, walk: _Walk) -> str:
         listed = ", ".join(others[:5])
         return (
             f"{path} is an MCAP file of another program (topics: {listed}), not a recording. "
-            "Export it to CSV there and bring it in with import."
+            "Export it to CSV there and use 'scissorcal import'."
         )
     if walk.damage:
         return (
             f"{path} is not readable: its description is missing. {walk.damage[0]} "
-            "Restore it from a copy, or capture again."
+            "Restore it from a backup, or capture again."
         )
     return (
         f"{path} is an MCAP file without a recording's description. Name a file that "

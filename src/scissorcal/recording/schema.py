@@ -1,15 +1,14 @@
-"""What a recording says about itself: the metadata record, its validation and its JSON Schema."""
+"""The metadata of a recording: its validation and its JSON Schema."""
 
 import json
 import math
 import platform
-import zlib
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from scissorcal.recording.recording import Joint, Kind, Stroke, StrokeKind
+from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind, checksum
 
 
 class StrokeRecord(BaseModel):
@@ -61,8 +60,8 @@ class RecordingMetadata(BaseModel):
 def recording_schema() -> dict[str, Any]:
     """Return the JSON Schema of a recording's metadata, as ``data_schemas`` has it.
 
-    The schema describes the object that the entries of the metadata record spell: text stands
-    there as it is, everything else as JSON.
+    It describes the object that the entries of the metadata record encode: text as it is,
+    everything else as JSON.
     """
     schema = RecordingMetadata.model_json_schema()
     dialect = "https://json-schema.org/draft/2020-12/schema"
@@ -83,7 +82,7 @@ def stroke_records(strokes: tuple[Stroke, ...]) -> tuple[StrokeRecord, ...]:
 
 
 def to_entries(metadata: RecordingMetadata) -> dict[str, str]:
-    """Spell the metadata as the text entries of an MCAP metadata record, with a checksum.
+    """Encode the metadata as the text entries of an MCAP metadata record, with a checksum.
 
     MCAP protects chunks by a checksum but not metadata; ``crc32`` over the other entries lets a
     reader prefer an intact copy (a finished file holds two).
@@ -101,7 +100,7 @@ def from_entries(entries: Mapping[str, str]) -> RecordingMetadata:
     body = {key: value for key, value in entries.items() if key != "crc32"}
     stated = body.get("format", "")
     if entries.get("crc32") != checksum(body):
-        raise ValueError("its description does not match its checksum; restore it from a copy")
+        raise ValueError("its description does not match its checksum; restore it from a backup")
     if stated != RecordingMetadata.model_fields["format"].default:
         raise ValueError(
             f"its format is {stated!r}, and this version reads 'scissorcal-recording/1'; use the "
@@ -117,7 +116,9 @@ def from_entries(entries: Mapping[str, str]) -> RecordingMetadata:
     except (ValidationError, json.JSONDecodeError) as error:
         lines = [line.strip() for line in str(error).splitlines()]
         what = " ".join(lines[1:3] or lines)
-        raise ValueError(f"its description is not valid ({what}); restore it from a copy") from None
+        raise ValueError(
+            f"its description is not valid ({what}); restore it from a backup"
+        ) from None
 
 
 def versions() -> dict[str, str]:
@@ -140,9 +141,3 @@ def _is_text(annotation: Any) -> bool:
         return True
     arguments = getattr(annotation, "__args__", ())
     return bool(arguments) and all(isinstance(argument, str) for argument in arguments)
-
-
-def checksum(entries: Mapping[str, str]) -> str:
-    """Return the CRC-32, in hexadecimal, of all entries but the checksum itself."""
-    text = json.dumps(dict(entries), sort_keys=True, ensure_ascii=False)
-    return f"{zlib.crc32(text.encode()):08x}"

@@ -1,4 +1,4 @@
-"""Strokes found from motion: the legs between turning points, for imports and hand captures."""
+"""Find strokes in a motion, between turning points: for imports and captures by hand."""
 
 import itertools
 import math
@@ -27,7 +27,7 @@ class StrokeLabels:
 def label_strokes(
     opening: ArrayLike, time: ArrayLike, min_travel: float, *, sheet: ArrayLike = -1
 ) -> StrokeLabels:
-    """Cut a motion into strokes at its turning points.
+    """Divide a motion into strokes at its turning points.
 
     A turning point is an extreme from which the opening returns by at least ``min_travel``, so
     noise and encoder steps smaller than that never split a stroke. Each leg between two turning

@@ -1,21 +1,12 @@
-"""What a recording holds, in numbers: duration, rate, gaps, strokes and ranges."""
+"""A recording in numbers: duration, rate, gaps, strokes and ranges."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recording.layout import unit_of
+from scissorcal.recording.layout import MEASURED, unit_of
 from scissorcal.recording.recording import Recording, Stroke
-
-CHANNELS = (
-    "opening",
-    "advance",
-    "motor_torque",
-    "handle_force",
-    "torque_command",
-    "force_command",
-)
 
 
 @dataclass(frozen=True)
@@ -83,7 +74,7 @@ def summary(recording: Recording) -> RecordingSummary:
         rate_Hz=1e6 / step_us if step_us > 0 else 0.0,
         gaps=find_gaps(samples),
         strokes=tuple(_stroke(recording, stroke) for stroke in recording.strokes),
-        ranges=tuple(_range(recording, channel) for channel in CHANNELS),
+        ranges=tuple(_range(recording, channel) for channel in MEASURED),
         notes=recording.notes,
     )
 
@@ -107,12 +98,13 @@ def find_gaps(samples: NDArray[np.void]) -> Gaps:
 
 
 def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
-    """Say in one sentence which frames are missing; nothing where none is."""
+    """One sentence on missing frames; none where no frame is missing."""
     gaps = find_gaps(samples)
     if not gaps.places:
         return ()
+    where = "1 gap" if gaps.places == 1 else f"{gaps.places} gaps"
     return (
-        f"{gaps.missing} frames are missing in {gaps.places} places, the longest gap "
+        f"{gaps.missing} frames are missing in {where}, the longest "
         f"({gaps.longest} frames) at {gaps.longest_at_s:.3f} s.",
     )
 

@@ -1,4 +1,4 @@
-"""A table of numbers from a file of any kind, and how its columns are named and found."""
+"""Tables of numbers: text, Parquet or MATLAB by the file's extension, and their columns by name."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -40,14 +40,73 @@ class Table:
         return max((len(column.values) for column in self.columns.values()), default=0)
 
     def place(self, row: int, channel: str | None = None) -> str:
-        """Name a row (from 0), and a channel's column, as a person finds them in the file."""
+        """Name a row (from 0), and a channel's column, as they are found in the file."""
         where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
         column = f", column {self.columns[channel].heading!r}" if channel else ""
         return f"{self.path}, {where}{column}"
 
 
+def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
+    """Read the wanted columns of a table; the file's extension says its format.
+
+    ``.mat`` is MATLAB, ``.parquet`` and ``.pq`` are Parquet, everything else is text with one
+    row a line. Every number is finite. Raises InputError naming file, place and remedy.
+    """
+    if not path.is_file():
+        raise InputError(f"{path} is not a file. Check the name and the folder.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes). Name a table with numbers in it.")
+    suffix = path.suffix.lower()
+    if suffix == ".mat":
+        from scissorcal.recording.matfile import read_mat
+
+        table = read_mat(path, wanted)
+    elif suffix in (".parquet", ".pq"):
+        from scissorcal.recording.parquetfile import read_parquet
+
+        table = read_parquet(path, wanted)
+    else:
+        from scissorcal.recording.textfile import read_text
+
+        table = read_text(path, wanted, delimiter)
+    _check_lengths(table)
+    _check_finite(table)
+    return table
+
+
+def _check_lengths(table: Table) -> None:
+    lengths = {column.heading: len(column.values) for column in table.columns.values()}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{heading!r} has {length}" for heading, length in lengths.items())
+        raise InputError(
+            f"{table.path}: its columns differ in length ({listed}). Name columns that were "
+            "recorded together."
+        )
+    if table.length < 2:
+        raise InputError(
+            f"{table.path} holds {table.length} rows of numbers; a motion needs at least two. "
+            "Check the names of file and columns."
+        )
+
+
+def _check_finite(table: Table) -> None:
+    bad = {
+        channel: int(np.argmin(np.isfinite(column.values)))
+        for channel, column in table.columns.items()
+        if not np.isfinite(column.values).all()
+    }
+    if bad:
+        channel = min(bad, key=lambda name: bad[name])
+        value = table.columns[channel].values[bad[channel]]
+        count = sum(int(np.sum(~np.isfinite(table.columns[name].values))) for name in bad)
+        raise InputError(
+            f"{table.place(bad[channel], channel)}: {value} is not a measurement ({count} such "
+            "cells in total). Remove those rows, or export the log again."
+        )
+
+
 def find_column(path: Path, headings: Sequence[str], column: str | int, channel: str) -> int:
-    """Return the number of the column that is meant: by heading, heading without unit, or number.
+    """Return the number of a column given by heading, heading without unit, or number.
 
     >>> find_column(Path("log.csv"), ["t [s]", "Torque [Nm]"], "torque", "motor_torque")
     1

@@ -1,4 +1,4 @@
-"""Tables in text: delimiter, comments and heading are found; every refusal names its line."""
+"""Tables in text: delimiter, comments and headings are detected; every error names its line."""
 
 import csv
 from collections import Counter
@@ -29,8 +29,8 @@ def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table
 
     Lines that begin with % or # are comments. The rows begin with the first line that is as wide
     as they are and holds a number; headings stand in the last such wide line before them (also
-    a commented one), and a line of units may follow those. Decimal commas are understood where
-    the comma does not part the cells.
+    a commented one), and a line of units may follow those. Decimal commas are read where
+    the comma does not separate the cells.
     """
     comments, lines = _lines(path)
     tail = [line.text for line in lines[-20:]]
@@ -40,7 +40,7 @@ def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table
     start = next((i for i, line in enumerate(lines) if _is_row(line.text, delimiter, width)), None)
     if start is None:
         raise InputError(
-            f"{path} holds no row of numbers. Name a table in text, Parquet or MATLAB format."
+            f"{path} has no row of numbers. Name a table in text, Parquet or MATLAB format."
         )
     rows = lines[start:]
     _check_width(path, rows, delimiter, width)
@@ -60,8 +60,8 @@ def _lines(path: Path) -> tuple[list[Line], list[Line]]:
     data = path.read_bytes()
     if b"\0" in data:
         raise InputError(
-            f"{path} is not a text table: it holds zero bytes. Save it as CSV in UTF-8, or give "
-            "it the ending of its format (.mat, .parquet)."
+            f"{path} is not a text table: it contains zero bytes. Save it as CSV in UTF-8, or give "
+            "it the extension of its format (.mat, .parquet)."
         )
     try:
         text = data.decode("utf-8-sig")
@@ -78,28 +78,28 @@ def _lines(path: Path) -> tuple[list[Line], list[Line]]:
 
 
 def _is_row(text: str, delimiter: str | None, width: int) -> bool:
-    """Tell a row of numbers from headings and remarks ("Rate, 1000").
+    """Whether a line is a row of numbers, not headings or remarks ("Rate, 1000").
 
-    A row has numbers only, or is as wide as the rows and has one at least: what is wrong with it
-    is then said, rather than passed over.
+    A row has numbers only, or is as wide as the rows and has at least one: then its error is
+    reported, not skipped.
     """
     numbers = [_is_number(cell) for cell in _cells(text, delimiter)]
     return all(numbers) or (len(numbers) == width and any(numbers))
 
 
 def _named(delimiter: str) -> str | None:
-    """Return the delimiter that a person means; "tab" and "space" have names."""
+    """Return the delimiter; "tab" and "space" are names."""
     meant = {"tab": "\t", "\\t": "\t", "space": None, " ": None}.get(delimiter, delimiter)
     if meant is not None and (len(meant) != 1 or meant.isalnum() or meant in "\"'+-.\n\r"):
         raise InputError(
-            f"{delimiter!r} cannot part the columns of a table. Give one character such as ; or "
-            "the words tab or space."
+            f"{delimiter!r} cannot separate the columns of a table. Give one character such as "
+            "; or the words tab or space."
         )
     return meant
 
 
 def _find_delimiter(rows: Sequence[str]) -> str | None:
-    """Return what parts most rows into numbers only, and into most numbers."""
+    """Return the delimiter that gives most rows of numbers only, and most numbers."""
 
     def score(delimiter: str | None) -> tuple[int, int]:
         numbers = [[_is_number(cell) for cell in _cells(row, delimiter)] for row in rows]
@@ -183,7 +183,7 @@ def _first_fault(
     chosen: dict[str, int],
     headings: list[str],
 ) -> str:
-    """Find the first cell that is no number; the slow way, once something is known to be wrong."""
+    """Find the first cell that is not a number; slow, so only called after an error."""
     for line, text in zip(rows, texts, strict=True):
         cells = _cells(text, delimiter)
         for number in chosen.values():

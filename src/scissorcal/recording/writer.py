@@ -1,4 +1,4 @@
-"""Write a recording so that a killed capture loses a quarter of a second at most."""
+"""Write a recording so that a killed capture loses at most 0.25 s."""
 
 import contextlib
 import math
@@ -21,17 +21,17 @@ from scissorcal.recording.schema import RecordingMetadata, stroke_records, versi
 class RecordingWriter:
     """Writes ``<path>.part`` while it runs, and renames it to ``path`` at ``close``.
 
-    A half-written capture is therefore known by its name; the lock held on it tells ``recover``
-    whether its writer still lives. Whatever was appended more than 0.25 s ago (by the samples'
-    host clock) is with the operating system, so that killing the process does not lose it.
+    An unfinished capture is recognised by its name, and by a lock whether its process still runs.
+    Samples appended more than 0.25 s ago (by their host clock) have been handed to the operating
+    system, so that killing the process does not lose them.
 
     ``kind``, ``joint``, ``handle_radius_m`` (NaN: not known) and ``strokes`` are as in Recording;
-    ``recipe_toml`` is the recipe's text, ``device`` what the rig says of itself (plain numbers
-    and strings). ``min_travel`` [rad, or m] is for motion that nobody planned: strokes are then
+    ``recipe_toml`` is the recipe's text, ``device`` the rig's identity (plain numbers
+    and strings). ``min_travel`` [rad, or m] is for motion that was not planned: strokes are then
     found from the motion (``label_strokes``) whenever the file is read.
 
-    Raises InputError if ``path`` or its ``.part`` stands already, or the folder is missing;
-    ScissorcalError if the disk refuses (what was written until then is kept).
+    Raises InputError if ``path`` or its ``.part`` exists, or the folder is missing;
+    ScissorcalError if writing fails (what was written until then is kept).
 
     >>> with RecordingWriter("captures/friction.mcap", "friction") as writer:  # doctest: +SKIP
     ...     writer.append(samples)
@@ -79,7 +79,7 @@ class RecordingWriter:
             self._file.append(samples)
 
     def poll(self, host_time_ns: int) -> None:
-        """Write out what waits, if due by this clock; for a loop in which no sample arrives."""
+        """Write out buffered samples if due by this clock, where no sample arrives."""
         with self._writing():
             self._file.flush_if_due(host_time_ns)
 
@@ -94,7 +94,7 @@ class RecordingWriter:
             self._file.note(sentence)
 
     def mark_sheet(self, sheet: int) -> None:
-        """Say that from the next sample on this sheet of material is loaded (-1: none).
+        """Record that this sheet of material is loaded from the next sample on (-1: none).
 
         Only strokes that are found from the motion (``min_travel``) read this; planned strokes
         carry their sheet themselves.
@@ -103,11 +103,11 @@ class RecordingWriter:
             self._file.mark_sheet(sheet)
 
     def close(self) -> Path:
-        """Finish the file, give it its name and return that; a second call does nothing."""
+        """Finish the file, rename it and return its path; a second call does nothing."""
         if self._failed:
             raise ScissorcalError(
-                f"{self.path} was not finished, because {self.part.name} could not be written. "
-                "The next command recovers what is in it."
+                f"{self.path} is not finished: {self.part.name} could not be written. The next "
+                "command recovers what is in it."
             )
         if not self._stream.closed:
             with self._writing():
@@ -138,7 +138,7 @@ class RecordingWriter:
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
-        """Let go of file and lock where the disk refuses, so that recovery finds it."""
+        """Release file and lock where writing fails, so that recovery finds the file."""
         try:
             with explained(self.part):
                 yield
@@ -150,7 +150,7 @@ class RecordingWriter:
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
-    """Write a recording that is in memory (an import, a made-up one) as one file; return its path.
+    """Write a recording in memory (an import, a simulation) as one file; return its path.
 
     Samples, strokes, joint, handle radius, device, recipe and notes come back from
     ``read_recording`` as they were. Raises as RecordingWriter does.

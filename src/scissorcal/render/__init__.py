@@ -1,8 +1,7 @@
-"""The loop on a rig: limits, ramp, watchdog, telemetry, and a verdict at the end."""
+"""The rendering loop on a rig: limits, ramp, watchdog, telemetry, and verdicts at the end."""
 
 from scissorcal.render.engine import VirtualStrokes, open_writer, render
-from scissorcal.render.latency import latency_of
-from scissorcal.render.result import AppliedLimits, RenderResult
+from scissorcal.render.result import AppliedLimits, RenderResult, latency_of
 
 __all__ = [
     "AppliedLimits",

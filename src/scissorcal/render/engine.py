@@ -1,4 +1,4 @@
-"""Render a package on a rig: hold the loop to its limits, watch it, record it, judge it."""
+"""Render a package on a rig within limits, record it, and judge it."""
 
 import time
 from collections.abc import Callable
@@ -18,19 +18,18 @@ from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter, label_strokes
-from scissorcal.render.latency import latency_of
-from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.result import AppliedLimits, RenderResult, latency_of, render_verdicts
 
 Progress = Callable[[float, str], None]
 
 SUPERVISOR_S = 0.2
-"""Silence of this process after which only damping is left; after five times as much, nothing."""
+"""Time without heartbeat after which only damping is left; after five times as much it stops."""
 
 RATE_CUTOFF_HZ = 100.0
 FALLBACK_DAMPING = 0.02
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 0.2
-"""So many faults of the device are cleared, each with a new ramp from zero; one more stops."""
+"""Faults that are cleared, each with a new ramp from zero; one more stops the loop."""
 
 TRAVEL_SHARE = 0.2
 THINNED_S = 0.01
@@ -39,14 +38,14 @@ AT_REST_S = 0.5
 LIMITED_WARNING = 0.01
 
 REQUEST = (
-    "Take everything out from between the blades, and hold the handles loosely: they will push "
-    "back as soon as you go on."
+    "Take everything out from between the blades, and hold the handles loosely: they push "
+    "back as soon as you continue."
 )
 
 
 @dataclass(frozen=True)
 class VirtualStrokes:
-    """What the hand of a simulator does: so many closing strokes, at this mean rate (rad/s)."""
+    """Strokes of a simulator's hand: number of closing strokes, and their mean rate (rad/s)."""
 
     count: int = 4
     rate_rad_per_s: float = 0.3
@@ -65,21 +64,25 @@ def render(
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
-    The loop runs in a process of its own, paced by the device's frames, or frame by frame in
-    virtual time on a LockstepLink. It never leaves the tightest of three limits: ``limits`` (a
+    The loop runs in a separate process, paced by the device's frames, or frame by frame in
+    virtual time on a LockstepLink. It keeps to the tightest of three limits: ``limits`` (a
     recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
     On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
     with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
-    ``writer`` records every sample; see `open_writer`.
+    ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
+    match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
-    Raises InputError, before anything moves, where package and device do not fit each other or
-    nobody can be asked; DeviceError where the rig fails, and what was recorded stays.
+    Raises InputError, before anything moves, where package and device do not match or
+    nobody can be asked; DeviceError where the rig fails, and what was recorded is kept.
     """
     identity = link.identity
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
     config = _servo_config(applied, identity, seconds)
+    if writer:
+        for sentence in warnings:
+            writer.note(sentence)
     watch = _Watch(package, writer, progress or _silent, seconds)
     with open_motion(link, config, package.tables) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
@@ -115,7 +118,8 @@ def render(
         verdicts=render_verdicts(report, latency, identity.tick_us),
         warnings=warnings + _limited_warning(limited, applied),
     )
-    _note(writer, result)
+    if writer:
+        _note(writer, result, result.warnings[len(warnings) :])
     return result
 
 
@@ -141,7 +145,7 @@ def open_writer(
 
 
 class _Watch:
-    """Records what is rendered, and knows when it is over."""
+    """Records what is rendered, and decides when it is finished."""
 
     def __init__(
         self, package: ModelPackage, writer: RecordingWriter | None, tell: Progress, seconds: float
@@ -161,7 +165,7 @@ class _Watch:
         self._looked_at = 0.0
 
     def take(self, samples: Samples) -> bool:
-        """Take a block of the rendering; whether all that was wanted has been done."""
+        """Take a block of the rendering; True once all strokes are done."""
         self.record(samples)
         if len(samples) == 0:
             return False
@@ -182,7 +186,7 @@ class _Watch:
         return self._look()
 
     def record(self, samples: Samples) -> None:
-        """Keep a block, whatever mode it comes from."""
+        """Record a block of any mode."""
         if self._writer is None:
             return
         if len(samples):
@@ -191,7 +195,7 @@ class _Watch:
             self._writer.poll(time.time_ns())
 
     def _look(self) -> bool:
-        """Count the strokes so far; whether the last one wanted is made and all is at rest."""
+        """Count the strokes so far; True once the last one is made and the blades rest."""
         at, opening = np.concatenate(self._time), np.concatenate(self._opening)
         found = label_strokes(opening, at, self._travel).strokes
         self.strokes = sum(stroke.kind == "closing" for stroke in found)
@@ -209,11 +213,13 @@ class _Watch:
 
 def _refuse_impossible(identity: Identity, seconds: float, confirm: Confirm | None) -> None:
     if not 0.0 < seconds < float("inf"):
-        raise InputError(f"Rendering for {seconds:g} s is not possible: give a time above 0.")
+        raise InputError(
+            f"Rendering for {seconds:g} s is not possible: give a finite time above 0."
+        )
     if not is_simulator(identity) and confirm is None:
         raise InputError(
-            "Rendering has to ask somebody to clear the blades first: give it a confirm callback "
-            "that shows a sentence and returns when that is done."
+            "Rendering must ask a person to clear the blades first: pass a confirm callback that "
+            "shows a sentence and returns when that is done."
         )
 
 
@@ -246,7 +252,7 @@ def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) ->
 
 
 def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
-    """What of the device differs from what the package was made for, as sentences.
+    """Sentences on how the device differs from what the package was built for.
 
     Raises InputError where the scene and the device have no opening in common.
     """
@@ -263,20 +269,21 @@ def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
     rate = 1e6 / identity.tick_us
     if abs(rate - manifest.mechanics.loop_rate_Hz) > 0.01 * rate:
         found.append(
-            f"The device runs at {rate:.0f} Hz and the package was made for "
+            f"The device runs at {rate:.0f} Hz and the package was built for "
             f"{manifest.mechanics.loop_rate_Hz:.0f} Hz."
         )
     radius = manifest.mechanics.handle_radius_m
     if abs(identity.handle_radius - radius) > 0.01 * radius:
         found.append(
             f"The device states a handle radius of {identity.handle_radius * 1e3:.1f} mm and the "
-            f"package was made for {radius * 1e3:.1f} mm: forces at the handles differ by that."
+            f"package was built for {radius * 1e3:.1f} mm: forces at the handles differ by this "
+            "ratio."
         )
     return tuple(found)
 
 
 def _prepare(motion: Motion, strokes: VirtualStrokes | None, confirm: Confirm | None) -> int | None:
-    """Clear the blades and wake the virtual hand; how many strokes it will make, if any."""
+    """Clear the blades and start the virtual hand; return how many strokes it will make, if any."""
     if not is_simulator(motion.identity):
         assert confirm is not None
         with motion.paused():
@@ -299,21 +306,20 @@ def _limited_warning(share: float, applied: AppliedLimits) -> tuple[str, ...]:
         return ()
     return (
         f"In {share:.0%} of the frames the model asked for more than the limits allow "
-        f"({applied.torque_Nm:g} N m): what was felt is weaker than the model.",
+        f"({applied.torque_Nm:g} N m): the rendered force was weaker than the model.",
     )
 
 
-def _note(writer: RecordingWriter | None, result: RenderResult) -> None:
-    if writer is None:
-        return
+def _note(writer: RecordingWriter, result: RenderResult, late: tuple[str, ...]) -> None:
+    """Note how it went, with the warnings that were not known (and noted) at the start."""
     writer.note(f"Rendered package {result.package_hash} for {result.seconds:.1f} s.")
-    for sentence in result.warnings:
+    for sentence in late:
         writer.note(sentence)
     for count, words in (
-        (result.misses, "frames never came."),
-        (result.garbled, "frames arrived garbled."),
+        (result.misses, "frames were lost."),
+        (result.garbled, "frames were garbled."),
         (result.faults, "times the device latched a fault."),
-        (result.overrun, "samples were fetched too late and lost."),
+        (result.overrun, "samples were read too late and lost."),
     ):
         if count:
             writer.note(f"{count} {words}")

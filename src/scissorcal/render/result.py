@@ -1,6 +1,9 @@
-"""What a rendering was: how fast, how complete, how much energy, and whether it may be trusted."""
+"""The result of a rendering: latency, losses, energy, and verdicts."""
 
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from scissorcal.device.motion import Latency, MotionReport
 from scissorcal.kernel import EnergyLedger
@@ -11,12 +14,12 @@ MOST_MISSED = 0.01
 MOST_CREATED = 0.1
 MOST_FAULTS_PER_S = 0.1
 NEGLIGIBLE_J = 5e-3
-"""What the ramp at engagement leaves unpaid: the model's books are full from the start."""
+"""Energy error that the ramp at engagement causes: the model's energies do not have it."""
 
 
 @dataclass(frozen=True)
 class AppliedLimits:
-    """The tightest of recipe's, package's and device's limits: what the loop was held to.
+    """The tightest of recipe's, package's and device's limits, which the loop kept to.
 
     ``force_N`` is 0 where the scene renders no translation force: the advance motor is off then.
     """
@@ -30,15 +33,15 @@ class AppliedLimits:
 
 @dataclass(frozen=True)
 class RenderResult:
-    """How a rendering went. Counts are frames, ``seconds`` the device's time spent rendering.
+    """Figures of a rendering. Counts are frames, ``seconds`` the device's time spent rendering.
 
     ``latency`` (us) runs from a frame's arrival to the command's departure, ``interval`` (us)
-    between frames by the host's clock; both None in virtual time, where they mean nothing.
-    ``misses`` are frames that never came, ``garbled`` those that came damaged, ``stalls`` pauses
-    of more than five ticks, ``unsent`` commands that the line did not take, ``overrun`` samples
-    that this process fetched too late. ``limited_share`` is the share of rendering frames in which
+    between frames by the host's clock; both None in virtual time.
+    ``misses`` are lost frames, ``garbled`` garbled ones, ``stalls`` pauses
+    of more than five ticks, ``unsent`` commands that the line did not accept, ``overrun`` samples
+    that this process read too late. ``limited_share`` is the share of rendering frames in which
     torque or force met its limit. ``strokes`` counts closings of the blades, ``package_hash`` is
-    the content hash of what was rendered. ``warnings`` are sentences for whoever stands at the
+    the content hash of what was rendered. ``warnings`` are sentences for the person at the
     rig.
     """
 
@@ -63,6 +66,25 @@ class RenderResult:
     warnings: tuple[str, ...]
 
 
+def latency_of(latency_ns: ArrayLike) -> Latency | None:
+    """Percentiles in microseconds of the times from a frame's arrival to the command's departure.
+
+    ``latency_ns`` is a recording's column: 0 where no command was sent, which does not count.
+    Each percentile is a latency that occurred: the smallest that the share of frames does not
+    exceed. None where no command has a latency, as in virtual time.
+
+    >>> latency_of([0, 20_000, 30_000, 40_000, 1_000_000])
+    Latency(p50=30.0, p99=1000.0, p999=1000.0, worst=1000.0)
+    """
+    sent = np.asarray(latency_ns, dtype=np.int64)
+    sent = sent[sent > 0]
+    if sent.size == 0:
+        return None
+    shares = (0.5, 0.99, 0.999, 1.0)
+    quantiles = np.quantile(sent, shares, method="inverted_cdf") / 1000
+    return Latency(*(float(value) for value in quantiles))
+
+
 def render_verdicts(
     report: MotionReport, latency: Latency | None, tick_us: int
 ) -> tuple[Verdict, ...]:
@@ -78,12 +100,12 @@ def render_verdicts(
 
 def _deadline(latency: Latency | None, tick_us: int) -> Verdict:
     if latency is None:
-        why = "In virtual time nothing can be late."
+        why = "Virtual time has no latency."
         return Verdict(SCOPE, "deadline", "not_evaluated", None, float(tick_us), why)
     status: Status = "pass" if latency.p99 < tick_us else "fail"
     why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
     if status == "fail":
-        why += " 'scissorcal device doctor' says what is slow."
+        why += " Run 'scissorcal device doctor' to find what is slow."
     return Verdict(SCOPE, "deadline", status, latency.p99, float(tick_us), why)
 
 
@@ -91,22 +113,22 @@ def _complete(report: MotionReport) -> Verdict:
     counters = report.counters
     share = counters.misses / max(1, counters.frames + counters.misses)
     status: Status = "pass" if share <= MOST_MISSED else "fail"
-    why = f"{counters.misses} of {counters.frames + counters.misses} frames never came."
+    why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
     if status == "fail":
         why += " Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
     return Verdict(SCOPE, "misses", status, share, MOST_MISSED, why)
 
 
 def _faultless(report: MotionReport, tick_us: int) -> Verdict:
-    """Whether the device braked by itself more than now and then."""
+    """Whether the device braked by itself too often."""
     counters = report.counters
     allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
     status: Status = "pass" if counters.faults <= allowed else "fail"
-    why = f"The device latched a fault {counters.faults} times, and each time force began anew."
+    why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
     if counters.faults:
         why += (
-            " Where nothing else caused it, commands came too late: 'scissorcal device doctor' "
-            "says why."
+            " After each the force was ramped up from zero. If nothing else caused them, commands "
+            "were too late: run 'scissorcal device doctor'."
         )
     return Verdict(SCOPE, "faults", status, float(counters.faults), allowed, why)
 
@@ -114,24 +136,24 @@ def _faultless(report: MotionReport, tick_us: int) -> Verdict:
 def _supervised(report: MotionReport) -> Verdict:
     count = report.counters.fallback_frames
     if count == 0:
-        why = "The supervising process was never silent for too long."
+        why = "The supervising process never missed its heartbeat."
         return Verdict(SCOPE, "supervision", "pass", 0.0, 0.0, why)
     why = (
-        f"For {count} frames only damping was rendered, because the supervising process was "
-        "silent: close what keeps the computer busy."
+        f"{count} frames had damping only, because the supervising process missed its "
+        "heartbeat: close programs that load the processor."
     )
     return Verdict(SCOPE, "supervision", "fail", float(count), 0.0, why)
 
 
 def _passive(ledger: EnergyLedger) -> Verdict:
-    """Whether more came out than went in: energy from nothing is felt as buzzing."""
+    """Whether more energy came out than the model allows, which is felt as buzzing."""
     taken = ledger.fracture_J + ledger.arrest_J + ledger.friction_J
     allowed = max(NEGLIGIBLE_J, MOST_CREATED * taken)
     status: Status = "pass" if ledger.created_J <= allowed else "fail"
     why = (
-        f"The motors put {ledger.delivered_J:.3g} J into the handles, and the model took up "
-        f"{taken:.3g} J: {max(ledger.created_J, 0.0):.2g} J came from nothing."
+        f"Energy error {max(ledger.created_J, 0.0):.2g} J (limit {allowed:.2g} J): the motors "
+        f"delivered {ledger.delivered_J:.3g} J, the model absorbed {taken:.3g} J."
     )
     if status == "fail":
-        why += " Limits, ramp or a slow loop distort the model: lower its stiffness or speed."
+        why += " Limits, the ramp or a slow loop distort the model: lower its stiffness or speed."
     return Verdict(SCOPE, "passivity", status, ledger.created_J, allowed, why)

@@ -3,12 +3,15 @@
 from scissorcal.report.build import (
     ReportFiles,
     build_report,
-    facts_of,
-    side_of_fit,
+    document_of,
+    document_of_fit,
+    sign_page,
     write_comparison,
 )
-from scissorcal.report.comparison import Comparison, Side, compare, side_of
+from scissorcal.report.comparison import Comparison, Side, compare
+from scissorcal.report.document import ReportDocument
 from scissorcal.report.inputs import (
+    Cell,
     Fact,
     FactSheet,
     Geometry,
@@ -16,25 +19,33 @@ from scissorcal.report.inputs import (
     sheet_from_mapping,
     summarise_recording,
 )
-from scissorcal.report.sections.provenance import posterior_sha256
+from scissorcal.report.panel import Panel
+from scissorcal.report.subjects.closing import posterior_sha256, trust_check_sha256
+from scissorcal.report.text import panel_text, panels_text
 from scissorcal.report.twin import read_twin
 
 __all__ = [
+    "Cell",
     "Comparison",
     "Fact",
     "FactSheet",
     "Geometry",
+    "Panel",
     "RecordingSummary",
+    "ReportDocument",
     "ReportFiles",
     "Side",
     "build_report",
     "compare",
-    "facts_of",
+    "document_of",
+    "document_of_fit",
+    "panel_text",
+    "panels_text",
     "posterior_sha256",
     "read_twin",
     "sheet_from_mapping",
-    "side_of",
-    "side_of_fit",
+    "sign_page",
     "summarise_recording",
+    "trust_check_sha256",
     "write_comparison",
 ]

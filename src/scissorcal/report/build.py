@@ -1,5 +1,8 @@
 """Build a report: one offline HTML file to review, and its JSON twin."""
 
+from __future__ import annotations
+
+import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -11,26 +14,29 @@ from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
+from scissorcal.package.review import Review
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.report.comparison import Comparison, Side
-from scissorcal.report.document import (
+from scissorcal.report.comparison import Comparison
+from scissorcal.report.document import ReportDocument, compose, compose_fit
+from scissorcal.report.inputs import (
+    Cell,
     Evidence,
-    ReportDocument,
-    compose,
-    compose_fit,
-    scene_facts,
+    FactSheet,
+    Geometry,
+    RecordingSummary,
+    summarise_recording,
 )
-from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary, summarise_recording
-from scissorcal.report.sections.verdicts import gather_verdicts
+from scissorcal.report.twin import twin_text
 
 
 @dataclass(frozen=True)
 class ReportFiles:
-    """Where a report was written."""
+    """Where a report was written, and what it says."""
 
     html: Path
     json: Path
+    document: ReportDocument | Comparison
 
 
 def build_report(
@@ -44,23 +50,27 @@ def build_report(
     sheets: Sequence[FactSheet] = (),
     checks: Mapping[str, VerifyResult] | None = None,
     geometry: Geometry | None = None,
+    inputs_hash: str = "",
+    completeness: Sequence[Cell] = (),
+    review: Review | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
 
-    The page needs nothing from outside itself; the twin holds the same facts. Recordings name the
+    The page needs nothing from outside itself; the twin holds the same panels. Recordings name the
     strokes and their speeds, and are matched to ``FitResult.sources`` by path, file name or hash;
     a fit can be reported without them, but only those with their samples give the work of each
     stroke. ``recipe_text`` is the recipe as it was written; without it the values are printed as
-    read. ``sheets`` are further sections, such as a package's promises or a run of the loop
-    (:func:`sheet_from_mapping`); ``checks`` are trust checks by fit, ``geometry`` what photographs
-    gave, whose pictures the page carries as far as they leave it small. ``created`` must carry its
-    time zone. The same input gives the same bytes; a report there that says just the same keeps
-    its time.
+    read. ``sheets`` are further parts, such as what a package states (:func:`sheet_from_mapping`);
+    ``checks`` are trust checks by fit, ``geometry`` what photographs gave, whose pictures the page
+    carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
+    used, cell by cell. The page shows ``review`` (by default the one in ``signature.json`` there)
+    where it was given to this very twin.
+    ``created`` must carry its time zone. The same input gives the same bytes; a report that says
+    the same as the one in ``output_dir`` keeps the time of that one.
 
     Raises MissingError where there is no fit, InputError where ``output_dir`` cannot be written.
     """
-    from scissorcal.report.page import draw_fit, draw_scene, whole_page
-    from scissorcal.report.twin import twin_text
+    from scissorcal.report.html import report_page
 
     if created.tzinfo is None:
         raise ValueError("created needs a time zone, for example datetime.now(timezone.utc)")
@@ -71,15 +81,13 @@ def build_report(
             "scissorcal report again."
         )
     evidence = Evidence(
-        tuple(
-            summarise_recording(recording) if isinstance(recording, Recording) else recording
-            for recording in recordings
-        ),
-        tuple(recording for recording in recordings if isinstance(recording, Recording)),
+        tuple(r if isinstance(r, RecordingSummary) else summarise_recording(r) for r in recordings),
+        tuple(r for r in recordings if isinstance(r, Recording)),
         checks or {},
         geometry,
+        tuple(completeness),
     )
-    document, materials = compose(
+    document = compose(
         recipe,
         fits,
         evidence,
@@ -88,61 +96,78 @@ def build_report(
         created=created,
         version=__version__,
     )
-    document = _with_earlier_time(document, Path(output_dir) / "report.json")
-    views = [draw_fit(material) for material in materials]
-    page = whole_page(document, views, draw_scene(document, recipe, fits), geometry)
-    files = ReportFiles(Path(output_dir) / "report.html", Path(output_dir) / "report.json")
-    _write_both(files, page, twin_text(document))
-    return files
-
-
-def facts_of(recipe: Recipe, fits: Sequence[FitResult]) -> ReportDocument:
-    """What a report of these fits would say, without recordings and figures."""
-    document, _ = compose(
-        recipe,
-        fits,
-        Evidence(),
-        (),
-        recipe_text="",
-        created=datetime.now(UTC),
-        version=__version__,
+    document = replace(document, inputs_hash=inputs_hash)
+    files = ReportFiles(
+        Path(output_dir) / "report.html", Path(output_dir) / "report.json", document
     )
-    return document
+    document, twin = _with_earlier_time(document, files.json)
+    page = report_page(document, geometry, _signed(review, twin, files.json.parent))
+    _write_both(files, page, twin)
+    return replace(files, document=document)
 
 
-def side_of_fit(fit: FitResult, source: str, recipe: Recipe | None) -> Side:
-    """A fit alone as one side of a comparison; ``recipe`` says what it is of, if that is known."""
-    section = compose_fit(fit, fit.what).section
-    verdicts = gather_verdicts(fit.verdicts).rows
-    if recipe is None:
-        return Side(source, "", None, verdicts, (section,), None)
-    return Side(source, recipe.material.name, scene_facts(recipe), verdicts, (section,), None)
+def document_of(recipe: Recipe, fits: Sequence[FitResult]) -> ReportDocument:
+    """What a report of these fits would say, without recordings."""
+    now = datetime.now(UTC)
+    return compose(recipe, fits, Evidence(), (), recipe_text="", created=now, version=__version__)
 
 
-def write_comparison(
-    found: Comparison, first: Side, second: Side, output_dir: str | os.PathLike[str]
-) -> ReportFiles:
+def document_of_fit(fit: FitResult, recipe: Recipe | None) -> ReportDocument:
+    """A fit alone, as one side of a comparison; ``recipe`` says what it is of, if known."""
+    return compose_fit(fit, recipe, created=datetime.now(UTC), version=__version__)
+
+
+def write_comparison(found: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
     """Write ``comparison.html`` and ``comparison.json``; InputError where that cannot be done."""
-    from scissorcal.report.comparison_page import comparison_text
-    from scissorcal.report.twin import twin_text
+    from scissorcal.report.html import comparison_page
 
     folder = Path(output_dir)
-    files = ReportFiles(folder / "comparison.html", folder / "comparison.json")
-    _write_both(files, comparison_text(found, first, second), twin_text(found))
+    files = ReportFiles(folder / "comparison.html", folder / "comparison.json", found)
+    _write_both(files, comparison_page(found), twin_text(found))
     return files
 
 
-def _with_earlier_time(document: ReportDocument, path: Path) -> ReportDocument:
-    """The document, with the time of the report there where that says just the same."""
-    from scissorcal.report.twin import twin_text
+def sign_page(html: Path, review: Review) -> None:
+    """Put a signature into a report's page; the twin stays as it was signed.
+
+    Raises InputError where the page is damaged or cannot be written.
+    """
+    from scissorcal.report.html import with_signature
 
     try:
+        page = with_signature(html.read_text(encoding="utf-8"), review)
+        part = html.with_name(html.name + ".part")
+        part.write_text(page, encoding="utf-8")
+        part.replace(html)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{html} cannot take the signature: {error}. Run 'scissorcal report --anew', then sign."
+        ) from error
+
+
+def _signed(review: Review | None, twin: str, folder: Path) -> Review | None:
+    """The review, or the one in the folder, if it is of this twin."""
+    if review is None:
+        try:
+            review = Review.model_validate_json((folder / "signature.json").read_bytes())
+        except (OSError, ValueError):
+            return None  # not signed, or damaged, which `plan` says
+    digest = hashlib.sha256(twin.encode("utf-8")).hexdigest()
+    return review if review.report_sha256 == digest else None
+
+
+def _with_earlier_time(document: ReportDocument, path: Path) -> tuple[ReportDocument, str]:
+    """The document with its twin, and the time of the report there where that says the same."""
+    twin = twin_text(document)
+    try:
         there = path.read_text(encoding="utf-8")
-        created = datetime.fromisoformat(json.loads(there)["created"])
+        stated = json.loads(there)["created"]
+        now = json.loads(twin)["created"]
+        created = datetime.fromisoformat(stated)
     except (OSError, ValueError, KeyError, TypeError):
-        return document
-    earlier = replace(document, created=created)
-    return earlier if twin_text(earlier) == there else document
+        return document, twin
+    same = twin.replace(f'"created":"{now}"', f'"created":"{stated}"', 1)
+    return (replace(document, created=created), same) if same == there else (document, twin)
 
 
 def _write_both(files: ReportFiles, page: str, twin: str) -> None:

@@ -1,106 +1,60 @@
-"""Two runs side by side: parameters, verdicts, held-out errors, torque over the scene."""
+"""Two runs side by side: their panels, row by row."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.report.document import FitSection, ReportDocument, SceneFacts
-from scissorcal.report.numbers import Number, finite, percent, short, significant
-from scissorcal.report.sections.scene_torque import SceneTorque, TorquePlace
-from scissorcal.report.sections.verdicts import VerdictRow
-from scissorcal.verdicts import Status
+from scissorcal.report.document import ReportDocument
+from scissorcal.report.numbers import Number, percent, short, significant
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Look,
+    Panel,
+    Row,
+    Series,
+    Style,
+    Value,
+    absent,
+    number,
+    points,
+    words,
+)
+from scissorcal.report.subjects.closing import FitOrigin
+from scissorcal.report.subjects.scene import PART as SCENE
+from scissorcal.report.subjects.scene import TITLE as SCENE_TITLE
 
-ComparisonFormat = Literal["scissorcal-comparison/1"]
+ComparisonFormat = Literal["scissorcal-comparison/2"]
 
-COMPARISON_FORMAT: ComparisonFormat = "scissorcal-comparison/1"
+COMPARISON_FORMAT: ComparisonFormat = "scissorcal-comparison/2"
 
 NOTABLE_SD = 3.0
-"""A parameter has changed where the two differ by more than this, in standard deviations."""
+"""A value has changed where two differ by more than this, in standard deviations."""
+NOTABLE_SHARE = 0.1
+"""Or, where no standard deviation is stated, by more than this share of the larger."""
+MOST_ROWS = 60
+FELT_SHARE = 0.05
+"""Torques below this share of the largest are not held to the tolerance."""
+SKIPPED = ("decision", "verdicts", "data", "provenance", "left-out")
 
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two: where it comes from, and what of it is known. ``scene`` None is unknown."""
+    """One of the two: where it comes from, and what it says."""
 
     source: str
-    material: str
-    scene: SceneFacts | None
-    verdicts: tuple[VerdictRow, ...]
-    fits: tuple[FitSection, ...]
-    scene_torque: SceneTorque | None
-
-
-@dataclass(frozen=True)
-class ParameterChange:
-    """One parameter of both; ``in_sd`` is second minus first over the sd of that difference.
-
-    The two are taken as independent: runs that share data differ by less than that lets expect.
-    """
-
-    name: str
-    unit: str
-    first: Number
-    first_sd: Number
-    second: Number
-    second_sd: Number
-    difference: Number
-    in_sd: Number
-    changed: bool
-
-
-@dataclass(frozen=True)
-class VerdictChange:
-    """One check of both; None where a side did not make it."""
-
-    scope: str
-    check: str
-    first: Status | None
-    second: Status | None
-    changed: bool
-
-
-@dataclass(frozen=True)
-class FitComparison:
-    """A fit that both have. ``same_inputs`` says that recordings, settings and effort are equal."""
-
-    what: str
-    rung: str
-    effort_unit: str
-    efforts: tuple[str, str]
-    same_inputs: bool
-    parameters: tuple[ParameterChange, ...]
-    held_out_median: tuple[Number, Number]
-    held_out_worst: tuple[Number, Number]
-
-
-@dataclass(frozen=True)
-class TorqueComparison:
-    """Rendered torque of the second minus the first, over the grid of the scene, in N m.
-
-    ``apart`` is the share of places that can be felt at which the two bands do not meet, ``felt``
-    the share at which the two differ by more than the scene's tolerance. ``missing`` says why there
-    is none.
-    """
-
-    missing: str
-    sentence: str
-    rms: Number
-    largest: TorquePlace | None
-    largest_difference: Number
-    apart: Number
-    felt: Number
-    difference: tuple[Number, ...]
+    document: ReportDocument
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs side by side. ``only_first`` and ``only_second`` name fits that one alone has."""
+    """Two runs side by side: the parameters, verdicts and torque, then all other panels' rows."""
 
     format: ComparisonFormat
     created: datetime
@@ -108,215 +62,287 @@ class Comparison:
     first: str
     second: str
     sentence: str
-    fits: tuple[FitComparison, ...]
-    verdicts: tuple[VerdictChange, ...]
-    torque: TorqueComparison
-    only_first: tuple[str, ...]
-    only_second: tuple[str, ...]
-
-
-def side_of(document: ReportDocument, source: str) -> Side:
-    """A report as one side of a comparison."""
-    return Side(
-        source,
-        document.material,
-        document.scene,
-        document.verdicts.rows,
-        document.fits,
-        document.scene_torque,
-    )
+    panels: tuple[Panel, ...]
 
 
 def compare(first: Side, second: Side, *, created: datetime, version: str) -> Comparison:
     """Put two runs side by side. Raises InputError naming all that makes them incomparable."""
-    differences = incomparable(first, second)
+    differences = incomparable(first.document, second.document)
     if differences:
         raise InputError(
             f"{first.source} and {second.source} cannot be compared: {'; '.join(differences)}. "
-            "Compare runs of one joint, material, scene and law; [fit] in the recipe fixes a rung."
+            "Compare runs of one joint, material, scene and law; [fit] in the recipe fixes a "
+            "candidate."
         )
-    pairs = [(a, b) for a in first.fits for b in second.fits if a.what == b.what]
-    fits = tuple(_compare_fits(a, b) for a, b in pairs)
-    torque = _compare_torque(first, second)
-    have = [{fit.what for fit in side.fits} for side in (first, second)]
+    torque = _torque(first, second)
+    pairs = [(one, two) for one in first.document.panels if (two := second.document.panel(one.id))]
+    rows = [compare_rows(a, b) for a, b in pairs if a.part not in SKIPPED and a.id != "scene-grid"]
+    found = [panel for panel in rows if panel is not None]
+    found.sort(key=lambda panel: not panel.id.endswith("-parameters"))
+    changed = [
+        row.name for panel in found if panel.id.endswith("-parameters") for row in panel.rows
+        if row.marked
+    ]  # fmt: skip
+    limit = f"{short(NOTABLE_SD)} standard deviations"
+    said = (
+        f"{', '.join(dict.fromkeys(changed))} differ by more than {limit}."
+        if changed
+        else f"No parameter differs by more than {limit}."
+    )
+    summary = torque.sentence or torque.notes[0]
     return Comparison(
         COMPARISON_FORMAT,
         created,
         version,
         first.source,
         second.source,
-        _sentence(fits, torque),
-        fits,
-        _compare_verdicts(first.verdicts, second.verdicts),
-        torque,
-        tuple(sorted(have[0] - have[1])),
-        tuple(sorted(have[1] - have[0])),
+        f"{said} {summary} {_alone(first, second)}".strip(),
+        (torque, _verdicts(first.document, second.document), *found),
     )
 
 
-def incomparable(first: Side, second: Side) -> list[str]:
+def incomparable(first: ReportDocument, second: ReportDocument) -> list[str]:
     """What the two must share and do not, each as a clause; empty where they can be compared."""
     found: list[str] = []
     a, b = first.scene, second.scene
     if a is not None and b is not None:
-        words = {True: "cuts", False: "only presses"}
+        kinds = {True: "cuts", False: "only presses"}
         for name, one, other in (
             ("the joint", a.joint, b.joint),
             ("the material", first.material, second.material),
             ("the thickness", f"{short(a.thickness_mm)} mm", f"{short(b.thickness_mm)} mm"),
-            ("the kind of scene", words[a.cut], words[b.cut]),
+            ("the kind of scene", kinds[a.cut], kinds[b.cut]),
             ("which blades move", a.moving, b.moving),
             ("the closure of the torque", a.closure, b.closure),
         ):
             if one != other:
                 found.append(f"{name} differs ({one} against {other})")
-    pairs = [(x, y) for x in first.fits for y in second.fits if x.what == y.what]
+    pairs = [
+        (x, y) for x in first.provenance.fits for y in second.provenance.fits if x.part == y.part
+    ]
     if not pairs:
         found.append("they have no fit of the same kind")
     for x, y in pairs:
-        found += _unlike(x, y)
+        found += _unlike(first, x, second, y)
     return found
 
 
-def _unlike(a: FitSection, b: FitSection) -> list[str]:
+def compare_rows(one: Panel, other: Panel) -> Panel | None:
+    """The values of both panels, row by row: the parameters all, of others those that differ.
+
+    Each row has A, B, their difference, and that in standard deviations of independent runs; runs
+    that share data differ by less. None where the panels share no row.
+    """
+    rows: list[Row] = []
+    compared = 0
+    every = one.id.endswith("-parameters")
+    for a in one.rows:
+        b = other.row(a.name)
+        for x in a.values if b is not None else ():
+            y = b.value(x.name) if b is not None else None
+            if y is None or (every and x.name != "mean"):
+                continue
+            compared += 1
+            name = a.name if every else f"{a.name}: {x.name}"
+            row = _changed(name, x, y)
+            if every or (str(x), x.unit) != (str(y), y.unit):
+                rows.append(row)
+    if not compared:
+        return None
+    marked = [row.name for row in rows if row.marked]
+    rows.sort(key=lambda row: not (row.marked or every))
+    if every:
+        sentence = f"Changed: {', '.join(marked)}." if marked else "No parameter has changed."
+    else:
+        sentence = f"{len(rows)} of {compared} values differ, {len(marked)} of them notably."
+    caption = (
+        f"Notable: beyond {short(NOTABLE_SD)} standard deviations of the difference of independent "
+        f"runs or, where none is stated, beyond {percent(NOTABLE_SHARE)}."
+    )
+    charts = (_changes(rows, f"{one.id}-f"),) if every else ()
+    if len(rows) > MOST_ROWS:
+        sentence += f" The first {MOST_ROWS} are listed."
+    title = f"{one.part.capitalize()}: {one.title}"
+    return Panel(
+        one.id, one.part, title, sentence, tuple(rows[:MOST_ROWS]),
+        tuple(chart for chart in charts if chart is not None), caption=caption,
+    )  # fmt: skip
+
+
+def _unlike(first: ReportDocument, a: FitOrigin, second: ReportDocument, b: FitOrigin) -> list[str]:
     for name, one, other in (
         ("effort", a.effort_unit, b.effort_unit),
         ("position", a.position_unit, b.position_unit),
     ):
         if one != other:
-            return [f"the {name} of the {a.what} fits has other units ({one} against {other})"]
-    if a.rung != b.rung:
-        return [f"the {a.what} fits have other laws ({a.rung} against {b.rung})"]
-    have, others = ({p.name: p.unit for p in fit.parameters} for fit in (a, b))
-    alone = sorted(set(have) ^ set(others))
-    if alone:
-        return [f"only one of the {a.what} fits has the parameters {', '.join(alone)}"]
-    units = sorted(name for name in have if have[name] != others[name])
-    return [f"the {a.what} fits have other units of {', '.join(units)}"] if units else []
+            return [f"the {name} of the {a.fit} fits has other units ({one} against {other})"]
+    if a.law != b.law:
+        return [f"the {a.fit} fits have other laws ({a.law} against {b.law})"]
+    names = []
+    for document in (first, second):
+        panel = document.panel(f"{a.part}-parameters")
+        names.append({row.name for row in panel.rows} if panel else set())
+    alone = sorted(names[0] ^ names[1])
+    return [f"only one of the {a.fit} fits has the parameters {', '.join(alone)}"] if alone else []
 
 
-def _compare_fits(a: FitSection, b: FitSection) -> FitComparison:
-    others = {parameter.name: parameter for parameter in b.parameters}
+def _changed(name: str, x: Value, y: Value) -> Row:
+    if x.number is None or y.number is None or x.unit != y.unit:
+        same = str(x) == str(y)
+        return Row(name, (words("A", str(x)), words("B", str(y))), marked=not same)
+    difference = y.number - x.number
+    spread = float(np.hypot(x.sd or 0.0, y.sd or 0.0))
+    in_sd = difference / spread if spread > 0 else None
+    larger = max(abs(x.number), abs(y.number))
+    marked = (
+        abs(in_sd) > NOTABLE_SD if in_sd is not None else abs(difference) > NOTABLE_SHARE * larger
+    )
+    values: tuple[Value, ...] = (
+        replace(x, name="A", low=None, high=None),
+        replace(y, name="B", low=None, high=None),
+        number("B − A", difference, x.unit),
+    )
+    if in_sd is not None:
+        values = (*values, number("in sd", in_sd, digits=2))
+    return Row(name, values, marked=marked)
+
+
+def _changes(rows: Sequence[Row], id_: str) -> Chart | None:
+    """B against A in standard deviations, parameter by parameter."""
+    shown = [(row, value) for row in rows if (value := row.value("in sd")) is not None]
+    if not shown:
+        return None
+    ends = (-NOTABLE_SD, NOTABLE_SD)
+    rim = Series(
+        "chance", "bars", (ends[1],) * len(shown), tuple(float(i) for i in range(len(shown))),
+        low=(ends[0],) * len(shown), look="muted",
+    )  # fmt: skip
+    marks = [
+        points(
+            name,
+            [value.number for row, value in shown if row.marked == marked],
+            [i for i, (row, _) in enumerate(shown) if row.marked == marked],
+            "vermillion" if marked else "blue",
+        )
+        for name, marked in (("as before", False), ("changed", True))
+    ]
+    return Chart(
+        id_,
+        "Parameters, B against A",
+        Axis("B − A in standard deviations"),
+        Axis("", categories=tuple(row.name for row, _ in shown), reverse=True),
+        (rim, *(mark for mark in marks if mark.x)),
+        f"Within the bars, up to {short(NOTABLE_SD)}, a difference is chance.",
+    )
+
+
+def _verdicts(first: ReportDocument, second: ReportDocument) -> Panel:
+    """Checks of both, those with another outcome first."""
+    outcomes = []
+    for document in (first, second):
+        panel = document.panel("verdicts-all")
+        found = panel.verdicts if panel else ()
+        outcomes.append({f"{v.scope} {v.check}": v.status.replace("_", " ") for v in found})
     rows = []
-    for one in a.parameters:
-        other = others[one.name]
-        difference, in_sd = None, None
-        if one.mean is not None and other.mean is not None:
-            difference = finite(other.mean - one.mean)
-            spread = float(np.hypot(one.sd or 0.0, other.sd or 0.0))
-            in_sd = finite((other.mean - one.mean) / spread) if spread > 0 else None
-        changed = in_sd is not None and abs(in_sd) > NOTABLE_SD
-        values = (one.mean, one.sd, other.mean, other.sd)
-        rows.append(ParameterChange(one.name, one.unit, *values, difference, in_sd, changed))
-    return FitComparison(
-        a.what,
-        a.rung,
-        a.effort_unit,
-        (a.effort, b.effort),
-        a.inputs_hash == b.inputs_hash != "",
-        tuple(rows),
-        (a.held_out.median_relative_rms, b.held_out.median_relative_rms),
-        (a.held_out.worst_relative_rms, b.held_out.worst_relative_rms),
-    )
+    for name in dict.fromkeys([*outcomes[0], *outcomes[1]]):
+        a, b = (own.get(name, "not made") for own in outcomes)
+        both = all(name in own for own in outcomes)
+        rows.append(Row(name, (words("A", a), words("B", b)), marked=both and a != b))
+    rows.sort(key=lambda row: not row.marked)
+    changed = sum(row.marked for row in rows)
+    both_made = set(outcomes[0]) & set(outcomes[1])
+    sentence = f"{changed} of {len(both_made)} checks that both made have another outcome."
+    if len(rows) > len(both_made):
+        sentence += f" {len(rows) - len(both_made)} checks were made by one alone."
+    return Panel("verdicts-all", "verdicts", "Verdicts", sentence, tuple(rows))
 
 
-def _compare_verdicts(
-    first: Sequence[VerdictRow], second: Sequence[VerdictRow]
-) -> tuple[VerdictChange, ...]:
-    """Checks of both that came out otherwise first."""
-    outcomes: list[dict[tuple[str, str], Status]] = [
-        {(row.scope, row.check): row.status for row in rows} for rows in (first, second)
-    ]
-    keys = dict.fromkeys([*outcomes[0], *outcomes[1]])
-    found = [
-        VerdictChange(*key, (a := outcomes[0].get(key)), (b := outcomes[1].get(key)), a != b)
-        for key in keys
-    ]
-    return tuple(sorted(found, key=lambda row: not row.changed))
-
-
-def _compare_torque(first: Side, second: Side) -> TorqueComparison:
-    a, b = first.scene_torque, second.scene_torque
-    missing = _no_torque(first, second)
-    if missing or a is None or b is None or a.grid is None or b.grid is None:
-        return TorqueComparison(missing, missing, None, None, None, None, None, ())
-    one, other = (np.array(grid.torque, dtype=np.float64) for grid in (a.grid, b.grid))
-    difference = other - one
-    known = np.isfinite(difference)
-    scale = max(a.largest or 0.0, b.largest or 0.0)
-    felt = known & (np.maximum(np.abs(one), np.abs(other)) >= 0.05 * scale)
-    low, high = (
-        [np.array(getattr(grid, name), dtype=np.float64) for grid in (a.grid, b.grid)]
-        for name in ("band_low", "band_high")
-    )
-    apart = felt & ((low[0] > high[1]) | (low[1] > high[0]))
-    tolerance = (a.tolerance or 0.0) * np.maximum(np.abs(one), np.abs(other))
-    more = felt & (np.abs(difference) > tolerance)
-    if not known.any():
-        why = "Neither scene has a place that both reach."
-        return TorqueComparison(why, why, None, None, None, None, None, ())
-    at = int(np.nanargmax(np.abs(difference)))
-    place = _place(a, at, one[at], difference[at])
-    shares = [float(np.mean(flags[felt])) if felt.any() else 0.0 for flags in (apart, more)]
+def _torque(first: Side, second: Side) -> Panel:
+    """Rendered torque of B minus A, over the places of the scene that both reach."""
+    grids = [side.document.panel("scene-grid") for side in (first, second)]
+    for side, grid in zip((first, second), grids, strict=True):
+        if grid is None:
+            return absent("torque", SCENE, SCENE_TITLE, _no_torque(side))
+    scenes = [side.document.scene for side in (first, second)]
+    if scenes[0] and scenes[1] and scenes[0].render_friction != scenes[1].render_friction:
+        why = "Friction is rendered in one scene only, so the torques are not compared."
+        return absent("torque", SCENE, SCENE_TITLE, why)
+    assert grids[0] is not None
+    assert grids[1] is not None
+    others = {row.name: row for row in grids[1].rows}
+    pairs = [(row, others[row.name]) for row in grids[0].rows if row.name in others]
+    if not pairs:
+        why = "The scenes have no place in common: their ranges differ."
+        return absent("torque", SCENE, SCENE_TITLE, why)
+    a, b = (np.array([_ends(pair[i]) for pair in pairs], dtype=np.float64) for i in (0, 1))
+    difference = b[:, 0] - a[:, 0]
+    size = np.maximum(np.abs(a[:, 0]), np.abs(b[:, 0]))
+    scale = float(size.max())
+    felt = size >= FELT_SHARE * scale
+    apart = felt & ((a[:, 1] > b[:, 2]) | (b[:, 1] > a[:, 2]))
+    tolerance = 0.01 * (scenes[0].tolerance_percent if scenes[0] else 0.0)
+    beyond = felt & (np.abs(difference) > tolerance * size)
+    shares = [float(np.mean(flags[felt])) if felt.any() else 0.0 for flags in (apart, beyond)]
+    at = int(np.argmax(np.abs(difference)))
     most = abs(float(difference[at]))
     sentence = (
         f"Rendered torque differs by at most {significant(most)} N m "
-        f"({percent(most / scale if scale else None)} of the largest torque); by more than the "
-        f"tolerance of {percent(a.tolerance)} at {percent(shares[1])} of the places that can be "
-        f"felt, and the bands do not meet at {percent(shares[0])}."
+        f"({percent(most / scale if scale else None)} of the largest torque, at "
+        f"{pairs[at][0].name}); by more than the tolerance of {percent(tolerance)} at "
+        f"{percent(shares[1])} of the places that can be felt, and the bands do not meet at "
+        f"{percent(shares[0])}."
     )
-    return TorqueComparison(
-        "",
-        sentence,
-        finite(np.sqrt(np.mean(difference[known] ** 2))),
-        place,
-        finite(difference[at]),
-        shares[0],
-        shares[1],
-        tuple(finite(value) for value in difference),
+    rows = (
+        Row("largest difference", (number("B − A", difference[at], "N m"),), pairs[at][0].name),
+        Row("root mean square", (number("B − A", np.sqrt(np.mean(difference**2)), "N m"),)),
+        Row("mean", (number("B − A", difference.mean(), "N m"),)),
     )
+    charts = _overlays(first.document, second.document)
+    return Panel("torque", SCENE, SCENE_TITLE, sentence, rows, charts)
 
 
-def _no_torque(first: Side, second: Side) -> str:
-    for side in (first, second):
-        if side.scene_torque is None:
-            return f"{side.source} is a fit alone, so it has no scene to compare torque over."
-        if side.scene_torque.missing or side.scene_torque.grid is None:
-            return f"{side.source}: {side.scene_torque.missing}"
-    a, b = (side.scene_torque.grid for side in (first, second) if side.scene_torque)
-    if a is None or b is None:
-        return ""
-    for name in ("opening", "opening_rate", "contact"):
-        if getattr(a, name) != getattr(b, name):
-            return (
-                f"The scenes have other ranges of {name.replace('_', ' ')}, so their torques are "
-                "not differenced."
+def _ends(row: Row) -> tuple[Number, Number, Number]:
+    value = row.value("torque")
+    return (value.number, value.low, value.high) if value else (None, None, None)
+
+
+def _no_torque(side: Side) -> str:
+    panel = side.document.panel("scene-torque")
+    why = panel.notes[0] if panel and panel.notes else "It is a fit alone and has no scene."
+    return f"{side.source}: {why}"
+
+
+def _overlays(first: ReportDocument, second: ReportDocument) -> tuple[Chart, ...]:
+    """The charts of both over each other: A blue and full, B vermillion and dashed."""
+    panels = [document.panel("scene-torque") for document in (first, second)]
+    charts = [{c.id: c for c in panel.charts} if panel else {} for panel in panels]
+    found = []
+    for id_, chart in charts[0].items():
+        if id_ not in charts[1] or id_ == "scene-support":
+            continue
+        series = [
+            replace(
+                one, name=f"{side}, {one.name}", look=look, style=style, group=side, toggle=False
             )
-    if first.scene and second.scene and first.scene.render_friction != second.scene.render_friction:
-        return "Friction is rendered in one scene only, so the torques are not differenced."
-    return ""
+            for side, own, look, style in _sides(chart, charts[1][id_])
+            for one in own.series
+            if one.kind in {"line", "band"}
+        ]
+        shown = [replace(one, style="full") if one.kind == "band" else one for one in series]
+        caption = f"A is full, B dashed. {chart.caption}"
+        found.append(replace(chart, series=tuple(shown), caption=caption))
+    return tuple(found)
 
 
-def _place(torque: SceneTorque, at: int, value: float, difference: float) -> TorquePlace:
-    grid = torque.grid
-    assert grid is not None
-    shape = (len(grid.opening), len(grid.opening_rate), len(grid.contact))
-    i, j, k = np.unravel_index(at, shape)
-    share = abs(difference / value) if value else None
-    return TorquePlace(
-        grid.opening[int(i)],
-        grid.opening_rate[int(j)],
-        grid.contact[int(k)],
-        finite(value),
-        finite(abs(difference)),
-        finite(share),
-    )
+def _sides(a: Chart, b: Chart) -> tuple[tuple[str, Chart, Look, Style], ...]:
+    return ("A", a, "blue", "full"), ("B", b, "vermillion", "dashed")
 
 
-def _sentence(fits: Sequence[FitComparison], torque: TorqueComparison) -> str:
-    changed = [row.name for fit in fits for row in fit.parameters if row.changed]
-    if changed:
-        words = f"{', '.join(changed)} differ by more than {short(NOTABLE_SD)} standard deviations."
-    else:
-        words = f"No parameter differs by more than {short(NOTABLE_SD)} standard deviations."
-    return f"{words} {torque.sentence}"
+def _alone(first: Side, second: Side) -> str:
+    have = [{fit.part for fit in side.document.provenance.fits} for side in (first, second)]
+    said = [
+        f"Only {name} has a fit of {', '.join(sorted(own))}."
+        for name, own in (("A", have[0] - have[1]), ("B", have[1] - have[0]))
+        if own
+    ]
+    return " ".join(said)

@@ -1,48 +1,42 @@
-"""The report as facts: what the page shows and the JSON twin holds."""
+"""A whole report as panels: what the page, the terminal and the JSON twin are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.errors import MissingError
+from scissorcal.package.scene_torque import SceneTorque, scene_torque
+from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
-from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
-from scissorcal.report.sections.critic import (
-    ProposalRow,
-    ReplaySection,
-    take_proposals,
-    take_replay,
-)
-from scissorcal.report.sections.diagnostics import Diagnostic, list_diagnostics
-from scissorcal.report.sections.edge_force import EdgeForce, force_along_edge
-from scissorcal.report.sections.fracture_work import FractureWork, fracture_work
-from scissorcal.report.sections.friction_curve import FrictionCurve, trace_friction
-from scissorcal.report.sections.friction_map import FrictionMap, map_friction
-from scissorcal.report.sections.geometry import GeometrySection, geometry_verdicts, take_geometry
-from scissorcal.report.sections.headline import Headline, write_headline
-from scissorcal.report.sections.held_out import HeldOutSection, gather_held_out
-from scissorcal.report.sections.law import named
-from scissorcal.report.sections.left_out import LeftOut, list_left_out
-from scissorcal.report.sections.pairs import Correlation, PriorRow, compare_prior, correlate
-from scissorcal.report.sections.parameters import ParameterRow, tabulate_parameters
-from scissorcal.report.sections.provenance import Provenance, trace
-from scissorcal.report.sections.residuals import StrokeResidual, rank_residuals
-from scissorcal.report.sections.response_curve import ResponseCurve, trace_response
-from scissorcal.report.sections.rungs import RungRow, compare_rungs
-from scissorcal.report.sections.scene_torque import SceneTorque, scene_torque
-from scissorcal.report.sections.sheets import SheetSection, take_sheet
-from scissorcal.report.sections.torque import TorqueSection, compare_torque
-from scissorcal.report.sections.verdicts import VerdictSection, gather_verdicts
+from scissorcal.report.headline import Headline, geometry_headline, write_headline
+from scissorcal.report.inputs import Evidence, FactSheet, Geometry
+from scissorcal.report.panel import Panel, absent, clean
 from scissorcal.report.strokes import StrokeSamples, strokes_of
+from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
+from scissorcal.report.subjects.blade import blade_panels
+from scissorcal.report.subjects.camera import camera_panels
+from scissorcal.report.subjects.closing import Provenance
+from scissorcal.report.subjects.friction import friction_panel
+from scissorcal.report.subjects.plate import plate_panels
+from scissorcal.report.subjects.scene import scene_panels
+from scissorcal.report.subjects.trust import trust_panels
+from scissorcal.verdicts import Verdict
 
-Format = Literal["scissorcal-report/1"]
+Format = Literal["scissorcal-report/2"]
 
-FORMAT: Format = "scissorcal-report/1"
+FORMAT: Format = "scissorcal-report/2"
+
+KINDS: tuple[GeometryKind, ...] = ("camera", "blade", "plate")
+PHOTOGRAPHS: dict[GeometryKind, str] = {
+    "camera": "board-*.jpg",
+    "blade": "blade-*.jpg",
+    "plate": "plate-*.jpg",
+}
+ORDER = ("fail", "not_evaluated", "pass")
 
 
 @dataclass(frozen=True)
@@ -55,46 +49,21 @@ class SceneFacts:
     thickness_mm: float
     closure: str
     render_friction: bool
+    tolerance_percent: float
 
 
 @dataclass(frozen=True)
-class FitSection:
-    """Everything said about one fit. ``anchor`` is its address on the page.
+class Part:
+    """A part of the report below the decision page; its panels name it by ``id``."""
 
-    What belongs to friction alone is None for a cut, and the other way round.
-    """
-
-    anchor: str
-    what: str
-    rung: str
-    effort: str
-    inputs_hash: str
-    effort_unit: str
-    position_unit: str
-    headline: Headline
-    friction_curve: FrictionCurve | None
-    friction_map: FrictionMap | None
-    torque: TorqueSection
-    residuals: tuple[StrokeResidual, ...]
-    response: ResponseCurve | None
-    fracture_work: FractureWork | None
-    edge_force: EdgeForce | None
-    parameters: tuple[ParameterRow, ...]
-    correlations: tuple[Correlation, ...]
-    prior: tuple[PriorRow, ...]
-    selection: str
-    rungs: tuple[RungRow, ...]
-    proposals: tuple[ProposalRow, ...]
-    replay: ReplaySection | None
-    trust_check: VerifyResult | None
-    held_out: HeldOutSection
-    diagnostics: tuple[Diagnostic, ...]
-    notes: tuple[str, ...]
+    id: str
+    title: str
+    sentence: str = ""
 
 
 @dataclass(frozen=True)
 class ReportDocument:
-    """A whole report. ``created`` carries its time zone."""
+    """A whole report. ``created`` carries its time zone; ``scene`` is None for a fit alone."""
 
     format: Format
     created: datetime
@@ -102,37 +71,20 @@ class ReportDocument:
     recipe_name: str
     recipe_description: str
     material: str
-    scene: SceneFacts
-    verdicts: VerdictSection
-    geometry: GeometrySection
-    scene_torque: SceneTorque
-    fits: tuple[FitSection, ...]
-    sheets: tuple[SheetSection, ...]
-    left_out: tuple[LeftOut, ...]
+    origin: decision.Origin
+    scene: SceneFacts | None
+    parts: tuple[Part, ...]
+    panels: tuple[Panel, ...]
     provenance: Provenance
+    inputs_hash: str = ""
 
+    def panel(self, id_: str) -> Panel | None:
+        """The panel of this address; None where there is none."""
+        return next((panel for panel in self.panels if panel.id == id_), None)
 
-@dataclass(frozen=True)
-class FitMaterial:
-    """A fit with its section and strokes: what figures are drawn from."""
-
-    fit: FitResult
-    section: FitSection
-    strokes: tuple[StrokeSamples, ...]
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What fits are reported from besides themselves, all of it optional.
-
-    ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
-    checks by fit ("friction", "cut"), ``geometry`` what photographs gave.
-    """
-
-    recordings: tuple[RecordingSummary, ...] = ()
-    raw: tuple[Recording, ...] = ()
-    checks: Mapping[str, VerifyResult] = field(default_factory=dict)
-    geometry: Geometry = field(default_factory=Geometry)
+    def panels_of(self, part: str) -> tuple[Panel, ...]:
+        """The panels of one part, in order."""
+        return tuple(panel for panel in self.panels if panel.part == part)
 
 
 def compose(
@@ -144,37 +96,131 @@ def compose(
     recipe_text: str,
     created: datetime,
     version: str,
-) -> tuple[ReportDocument, tuple[FitMaterial, ...]]:
-    """Gather every section's facts; draws nothing and touches no file."""
-    friction = named(fits, "friction")
-    materials = tuple(
-        compose_fit(fit, anchor, evidence, friction)
-        for fit, anchor in zip(fits, _anchors(fits), strict=True)
-    )
-    geometry = take_geometry(recipe, evidence.geometry)
-    verdicts = list(geometry_verdicts(geometry, evidence.geometry))
-    verdicts += [v for fit in fits for v in fit.verdicts]
-    verdicts += [
-        v for m in materials if m.section.trust_check for v in m.section.trust_check.verdicts
+) -> ReportDocument:
+    """Gather all panels; draws nothing and touches no file."""
+    named: dict[str, FitResult] = {}
+    for fit in fits:
+        named.setdefault(fit.what, fit)
+    geometry, missing = _required(recipe, evidence.geometry)
+    checks = {w: evidence.checks[w] for w, fit in named.items() if _is_of(evidence, fit)}
+    keyed = dict(zip(_anchors(fits), fits, strict=True))
+    strokes = {part: strokes_of(fit, part, evidence.recordings) for part, fit in keyed.items()}
+    headlines = [geometry_headline(kind, fit.verdicts) for kind, fit in geometry.fits.items()]
+    headlines += [
+        Headline(kind, "care", f"The {kind} fit is not there yet.", "not there yet", (why,))
+        for kind, why in missing.items()
     ]
-    verdicts += [v for s in sheets for v in s.verdicts]
-    document = ReportDocument(
+    own: list[Panel] = []
+    for part, fit in keyed.items():
+        check = checks.get(fit.what) if named[fit.what] is fit else None
+        headlines.append(write_headline(fit, check.verdicts if check else ()))
+        own.append(_outcome(headlines[-1], part))
+        own += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
+        own += trust_panels(fit, check, part)
+    found, why = _scene(recipe, named)
+    sliding = recipe.rig.joint == "linear" or any(fit.position_unit == "m" for fit in fits)
+    if sliding:
+        found, why = None, "A sliding joint carries no blades, so nothing is felt."
+    sheet_panels = [closing.sheet_panel(sheet) for sheet in sheets]
+    scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
+    provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
+    photographed = _geometry_panels(geometry, evidence.geometry, missing)
+    cells = evidence.completeness or decision.cells_of(
+        [(fit, strokes[part]) for part, fit in keyed.items()], replace(evidence, geometry=geometry)
+    )
+    totals, every_cell = decision.data_panels(cells)
+    verdicts = [v for kind in geometry.fits.values() for v in kind.verdicts]
+    verdicts += [v for fit in fits for v in fit.verdicts]
+    verdicts += [v for check in checks.values() for v in check.verdicts]
+    verdicts += [v for sheet in sheets for v in sheet.verdicts]
+    origin = decision.origin_of(evidence.recordings)
+    panels = (
+        decision.origin_panel(origin, evidence.recordings),
+        decision.trust_panel(headlines, list(named)),
+        totals,
+        decision.checked_panel(list(named.values()), checks),
+        decision.felt_panel(found, why, fits, recipe),
+        decision.weaknesses_panel(fits, found),
+        verdict_panel(verdicts),
+        every_cell,
+        *scene,
+        *photographed,
+        *own,
+        *sheet_panels,
+        closing.left_out_panel(recipe, fits, dict(missing.items())),
+        closing.provenance_panel(provenance, evidence.recordings),
+    )
+    return ReportDocument(
+        FORMAT, created, version, recipe.name, recipe.description, recipe.material.name, origin,
+        scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
+    )  # fmt: skip
+
+
+def compose_fit(
+    fit: FitResult, recipe: Recipe | None, *, created: datetime, version: str
+) -> ReportDocument:
+    """A fit alone; ``recipe`` says what it is of, if that is known."""
+    part = fit.what
+    panels = (
+        verdict_panel(fit.verdicts),
+        *fit_panels(fit, strokes_of(fit, part, ()), part, Evidence(), None),
+    )
+    return ReportDocument(
         FORMAT,
         created,
         version,
-        recipe.name,
-        recipe.description,
-        recipe.material.name,
-        scene_facts(recipe),
-        gather_verdicts(verdicts),
-        geometry,
-        scene_torque(recipe, fits),
-        tuple(material.section for material in materials),
-        tuple(take_sheet(sheet) for sheet in sheets),
-        list_left_out(recipe, fits, tuple((item.fit, item.why) for item in geometry.missing)),
-        trace(recipe, recipe_text, fits, evidence.recordings, evidence.geometry),
+        recipe.name if recipe else "",
+        recipe.description if recipe else "",
+        recipe.material.name if recipe else "",
+        "unknown",
+        scene_facts(recipe) if recipe else None,
+        (),
+        panels,
+        closing.trace(recipe, "", {part: fit}),
     )
-    return document, materials
+
+
+def fit_panels(
+    fit: FitResult,
+    strokes: tuple[StrokeSamples, ...],
+    part: str,
+    evidence: Evidence,
+    friction: FitResult | None,
+) -> tuple[Panel, ...]:
+    """All panels on one fit; ``friction`` is what a cut's torque was freed from."""
+    physics: list[Panel | None] = [friction_panel(fit, strokes, part)]
+    if fit.what == "cut":
+        physics += [
+            cut.response_panel(fit, part),
+            cut.work_panel(fit, friction, evidence.raw, strokes, part),
+            cut.edge_panel(fit, strokes, part),
+        ]
+    return (
+        torque.torque_panel(fit, strokes, part),
+        *(panel for panel in physics if panel is not None),
+        posterior.parameters_panel(fit, part),
+        torque.strokes_panel(fit, strokes, part),
+        torque.held_out_panel(fit, strokes, part),
+        candidates.candidates_panel(fit, part),
+        posterior.prior_panel(fit, part),
+        posterior.correlations_panel(fit, part),
+        candidates.critic_panel(fit, part),
+        candidates.replay_panel(fit, strokes, part),
+        posterior.diagnostics_panel(fit, part),
+    )
+
+
+def verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
+    """Every verdict, failures first; within an outcome they keep their order."""
+    ordered = sorted(map(clean, verdicts), key=lambda verdict: ORDER.index(verdict.status))
+    counts = {status: sum(v.status == status for v in ordered) for status in ORDER}
+    sentence = (
+        f"{counts['fail']} failed, {counts['not_evaluated']} not evaluated, "
+        f"{counts['pass']} passed."
+        if ordered
+        else "No check was made."
+    )
+    return Panel("verdicts-all", "verdicts", "Every check", sentence, verdicts=tuple(ordered))
 
 
 def scene_facts(recipe: Recipe) -> SceneFacts:
@@ -186,52 +232,13 @@ def scene_facts(recipe: Recipe) -> SceneFacts:
         recipe.material.thickness_mm,
         recipe.scene.closure,
         recipe.scene.render_friction,
+        recipe.scene.tolerance_percent,
     )
 
 
-def compose_fit(
-    fit: FitResult,
-    anchor: str,
-    evidence: Evidence | None = None,
-    friction: FitResult | None = None,
-) -> FitMaterial:
-    """Gather one fit's facts; ``friction`` is the fit that a cut's torque was freed with."""
-    evidence = evidence or Evidence()
-    strokes = strokes_of(fit, anchor, evidence.recordings)
-    held_out = gather_held_out(fit, [stroke.name for stroke in strokes])
-    parameters = tabulate_parameters(fit)
-    cut = fit.what == "cut"
+def _is_of(evidence: Evidence, fit: FitResult) -> bool:
     check = evidence.checks.get(fit.what)
-    trust = check if check is not None and check.fit_hash == fit.inputs_hash else None
-    section = FitSection(
-        anchor=anchor,
-        what=fit.what,
-        rung=fit.rung,
-        effort=fit.effort,
-        inputs_hash=fit.inputs_hash,
-        effort_unit=fit.effort_unit,
-        position_unit=fit.position_unit,
-        headline=write_headline(fit, held_out, parameters, trust.verdicts if trust else ()),
-        friction_curve=trace_friction(fit),
-        friction_map=map_friction(fit),
-        torque=compare_torque(fit, strokes),
-        residuals=rank_residuals(fit, strokes),
-        response=trace_response(fit) if cut else None,
-        fracture_work=fracture_work(fit, friction, evidence.raw, strokes) if cut else None,
-        edge_force=force_along_edge(fit, strokes) if cut else None,
-        parameters=parameters,
-        correlations=correlate(fit),
-        prior=compare_prior(fit),
-        selection=fit.selection,
-        rungs=compare_rungs(fit),
-        proposals=take_proposals(fit),
-        replay=take_replay(fit, strokes),
-        trust_check=trust,
-        held_out=held_out,
-        diagnostics=list_diagnostics(fit),
-        notes=fit.notes,
-    )
-    return FitMaterial(fit, section, strokes)
+    return check is not None and check.fit_hash == fit.inputs_hash
 
 
 def _anchors(fits: Sequence[FitResult]) -> list[str]:
@@ -241,3 +248,75 @@ def _anchors(fits: Sequence[FitResult]) -> list[str]:
         earlier = sum(anchor.split("-")[0] == fit.what for anchor in anchors)
         anchors.append(f"{fit.what}-{earlier + 1}" if earlier else fit.what)
     return anchors
+
+
+def _required(recipe: Recipe, geometry: Geometry) -> tuple[Geometry, dict[GeometryKind, str]]:
+    """The fits of photographs that the scene requires, and how to have those that are missing."""
+    needs = requirements(recipe)
+    wanted = [kind for kind in KINDS if needs.needs_geometry(kind)]
+    missing = {
+        kind: geometry.missing.get(kind)
+        or f"The scene requires it: run `scissorcal capture {kind} --image {PHOTOGRAPHS[kind]}`, "
+        f"then `scissorcal fit {kind}`."
+        for kind in wanted
+        if kind not in geometry.fits
+    }
+    kept = Geometry(
+        camera=geometry.camera if "camera" in wanted else None,
+        blade=geometry.blade if "blade" in wanted else None,
+        plate=geometry.plate if "plate" in wanted else None,
+        pictures={k: files for k, files in geometry.pictures.items() if k in wanted},
+        sha256=geometry.sha256,
+    )
+    return kept, missing
+
+
+def _geometry_panels(
+    shown: Geometry, given: Geometry, missing: Mapping[GeometryKind, str]
+) -> list[Panel]:
+    panels: list[Panel] = []
+    pictures = {kind: given.pictures.get(kind, ()) for kind in KINDS}
+    if shown.camera is not None:
+        panels += camera_panels(shown.camera, pictures["camera"])
+    if shown.blade is not None:
+        panels += blade_panels(shown.blade, pictures["blade"])
+    if shown.plate is not None:
+        panels += plate_panels(shown.plate, pictures["plate"])
+    panels += [absent(f"{k}-missing", k, "Not there yet", why) for k, why in missing.items()]
+    return sorted(panels, key=lambda panel: KINDS.index(panel.part))
+
+
+def _scene(recipe: Recipe, fits: Mapping[str, FitResult]) -> tuple[SceneTorque | None, str]:
+    try:
+        return scene_torque(recipe, fits.get("cut"), fits.get("friction")), ""
+    except MissingError as error:
+        return None, str(error)
+
+
+def _outcome(headline: Headline, part: str) -> Panel:
+    steps = tuple(f"Next: {step}" for step in headline.next_steps)
+    return Panel(f"{part}-outcome", part, "Outcome", headline.sentence, notes=steps)
+
+
+def _parts(
+    panels: Sequence[Panel], headlines: Sequence[Headline], fits: Mapping[str, FitResult]
+) -> tuple[Part, ...]:
+    """The parts below the decision page in the order of their panels, each with a sentence."""
+    said = {headline.fit: headline.sentence for headline in headlines}
+    titles = {
+        "verdicts": "Verdicts",
+        "data": "Data",
+        "scene": "Rendered torque",
+        "left-out": "Left out",
+        "provenance": "Provenance",
+    }
+    titles.update({kind: kind.capitalize() for kind in KINDS})
+    for part, fit in fits.items():
+        again = f" {part.rpartition('-')[2]}" if part != fit.what else ""
+        titles[part] = f"{fit.what.capitalize()} fit{again}: {fit.rung}, {fit.effort} effort"
+    found = []
+    for part in dict.fromkeys(p.part for p in panels if p.part != decision.PART):
+        first = next(panel for panel in panels if panel.part == part)
+        sentence = said.get(part) or first.sentence
+        found.append(Part(part, titles.get(part, first.title), sentence))
+    return tuple(found)

@@ -1,13 +1,15 @@
-"""What a report is told besides the fits: recordings in brief, and sheets of facts."""
+"""What a report is made from besides the fits: recordings, completeness, sheets of facts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path, PurePath
 from typing import Any
 
 from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.edge.result import BladeResult
 from scissorcal.calibration.plate.result import PlateFit
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.numbers import Scalar, scalar
@@ -98,6 +100,45 @@ class Geometry:
             "plate": self.plate,
         }
         return {what: fit for what, fit in every.items() if fit is not None}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One planned cell of a capture, such as all closing strokes at one speed.
+
+    ``planned``, ``recorded`` and ``used`` (by the fit) count ``unit``; None where that is not
+    known. ``remark`` says what is missing and which command completes it.
+    """
+
+    capture: str
+    name: str
+    planned: int | None
+    recorded: int | None
+    used: int | None
+    unit: str = "strokes"
+    remark: str = ""
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether less was recorded than planned, or less used than recorded."""
+        counts = [n for n in (self.planned, self.recorded, self.used) if n is not None]
+        return any(b < a for a, b in pairwise(counts))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What fits are reported from besides themselves, all of it optional.
+
+    ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
+    checks by fit ("friction", "cut"), ``geometry`` what photographs gave, ``completeness`` what was
+    planned, recorded and used (without it, it is counted from recordings and fits).
+    """
+
+    recordings: tuple[RecordingSummary, ...] = ()
+    raw: tuple[Recording, ...] = ()
+    checks: Mapping[str, VerifyResult] = field(default_factory=dict)
+    geometry: Geometry = field(default_factory=Geometry)
+    completeness: tuple[Cell, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,16 @@ def finite(value: Any) -> Number:
 
 def finite_each(values: Iterable[Any], digits: int = 6) -> tuple[Number, ...]:
     """Return each value rounded to ``digits`` significant digits, None where not finite."""
-    return tuple(None if (v := finite(value)) is None else _round(v, digits) for value in values)
+    import numpy as np
+
+    given = np.array(values if isinstance(values, np.ndarray) else list(values), dtype=np.float64)
+    known = np.isfinite(given) & (np.abs(given) > 1e-290)
+    exponent = digits - 1 - np.floor(np.log10(np.abs(np.where(known, given, 1.0))))
+    scale = 10.0 ** np.abs(np.clip(exponent, -300, 300))
+    with np.errstate(over="ignore", invalid="ignore"):
+        up, down = np.rint(given * scale) / scale, np.rint(given / scale) * scale
+    rounded = np.where(known & np.isfinite(up), np.where(exponent >= 0, up, down), given)
+    return tuple(v if math.isfinite(v) else None for v in rounded.tolist())
 
 
 def scalar(value: Any) -> Scalar:
@@ -146,7 +155,7 @@ def unit_text(unit: str) -> str:
     'kg m²'
     """
     written = []
-    parts = unit.split("^")
+    parts = ["" if unit == "1" else unit] if "^" not in unit else unit.split("^")
     written.append(parts[0])
     for part in parts[1:]:
         length = next((i for i, c in enumerate(part) if not (c.isdigit() or c == "-")), len(part))

@@ -1,4 +1,4 @@
-"""Photographs on the page: made small, carried within it, and dropped where they would be much."""
+"""Photographs on the page: made small, carried within it, left out where they would be too much."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 from pathlib import Path
 
-WIDEST_PX = 900
 QUALITY = 70
 PAGE_BYTES = 4_800_000
 """What the whole page may take, pictures in it included."""
@@ -18,53 +17,43 @@ PICTURE_BYTES = 2_400_000
 
 @dataclass(frozen=True)
 class PictureFile:
-    """A picture that a fit left on disk: its title, its caption, and in words what it shows.
-
-    It is made no wider than ``widest`` pixels.
-    """
+    """A picture on disk, to be made at most ``widest_px`` wide."""
 
     path: Path
-    title: str
-    caption: str
-    alt: str
-    widest: int = WIDEST_PX
+    widest_px: int = 900
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture for the page: ``data`` is a data URI of a JPEG, or of nothing where it was dropped,
-    which ``caption`` then says."""
+class Image:
+    """A picture for the page: a data URI of a JPEG, or empty with the reason in ``missing``."""
 
     data: str
     width: int
     height: int
-    title: str
-    caption: str
-    alt: str
+    missing: str = ""
 
 
 def place_pictures(
     files: Mapping[str, Sequence[PictureFile]], room: int
-) -> dict[str, tuple[Picture, ...]]:
-    """Make the pictures of each fit ready for the page, as many as ``room`` bytes hold.
+) -> dict[str, tuple[Image, ...]]:
+    """Make the pictures of each part ready for the page, as many as ``room`` bytes hold.
 
-    The first of every fit come before the second of any, so that each fit shows something. What
-    does not fit in is still there, with its file's name in its place.
+    The first of every part come before the second of any, so that each part shows something.
     """
-    placed: dict[Path, Picture] = {}
+    placed: dict[Path, Image] = {}
     taken = 0
     for file in chain.from_iterable(zip_longest(*files.values())):
         if file is None:
             continue
-        picture = _read(file)
-        if picture.data and taken + len(picture.data) > room:
-            picture = _without(file, "left out to keep this page small")
-        taken += len(picture.data)
-        placed[file.path] = picture
+        image = _read(file)
+        if image.data and taken + len(image.data) > room:
+            image = _without(file, "left out to keep this page small")
+        taken += len(image.data)
+        placed[file.path] = image
     return {what: tuple(placed[file.path] for file in own) for what, own in files.items()}
 
 
-def _read(file: PictureFile) -> Picture:
+def _read(file: PictureFile) -> Image:
     """The picture as a small JPEG; one that cannot be read says so."""
     import cv2
     import numpy as np
@@ -77,8 +66,8 @@ def _read(file: PictureFile) -> Picture:
     if image is None:
         return _without(file, "not there any more, or damaged")
     height, width = image.shape[:2]
-    if width > file.widest:
-        size = (file.widest, max(round(height * file.widest / width), 1))
+    if width > file.widest_px:
+        size = (file.widest_px, max(round(height * file.widest_px / width), 1))
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     height, width = image.shape[:2]
     # colours at full resolution: what is drawn is one pixel wide
@@ -87,8 +76,8 @@ def _read(file: PictureFile) -> Picture:
     if not done:
         return _without(file, "not there any more, or damaged")
     data = "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
-    return Picture(data, width, height, file.title, file.caption, file.alt)
+    return Image(data, width, height)
 
 
-def _without(file: PictureFile, why: str) -> Picture:
-    return Picture("", 0, 0, file.title, f"{file.path.name} is {why}.", file.alt)
+def _without(file: PictureFile, why: str) -> Image:
+    return Image("", 0, 0, f"{file.path.name} is {why}.")

@@ -1,4 +1,4 @@
-"""Which samples of a fit belong to which stroke, and what each stroke is called."""
+"""Which samples of a fit belong to which stroke, and the words and units of its channels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recording.recording import Stroke, StrokeKind
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.numbers import Number, finite, short
+from scissorcal.report.panel import Look
 from scissorcal.report.reduce import median
 
 KINDS: dict[str, StrokeKind] = {
@@ -20,6 +21,49 @@ KINDS: dict[str, StrokeKind] = {
     "press": "press",
 }
 BETWEEN = "between strokes"
+
+
+LOOKS: dict[str, Look] = {
+    "closing": "closing",
+    "opening": "opening",
+    "excitation": "excitation",
+    "press": "press",
+}
+"""Colour and mark of each kind of stroke, after Okabe and Ito (doi:10.1038/nmeth.1618)."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """How a fit's channels are shown: an opening in degrees, what slides in metres.
+
+    ``scale`` takes the fit's position to ``unit``; rates stay in the fit's unit, as the recipe
+    has them.
+    """
+
+    position: str
+    unit: str
+    scale: float
+    effort: str
+    effort_unit: str
+    rate_unit: str
+
+
+def channels_of(fit: FitResult) -> Channels:
+    """Words and units of a fit's channels."""
+    turns = fit.position_unit != "m"
+    return Channels(
+        "opening" if turns else "position",
+        "°" if fit.position_unit == "rad" else fit.position_unit,
+        float(np.degrees(1.0)) if fit.position_unit == "rad" else 1.0,
+        "force" if fit.effort_unit == "N" else "torque",
+        fit.effort_unit,
+        f"{fit.position_unit}/s",
+    )
+
+
+def look_of(kind: str) -> Look:
+    """Colour and mark of a kind of stroke."""
+    return LOOKS.get(kind, "orange")
 
 
 @dataclass(frozen=True)

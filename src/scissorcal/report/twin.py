@@ -1,17 +1,23 @@
 """The JSON twins of reports and comparisons, and the JSON Schemas that they keep."""
 
-import json
-from typing import Any
+from __future__ import annotations
 
-from scissorcal.report.comparison import Comparison
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
 from scissorcal.report.document import ReportDocument
+
+if TYPE_CHECKING:
+    from scissorcal.report.comparison import Comparison
 
 
 def twin_text(document: ReportDocument | Comparison) -> str:
-    """The document as JSON: what is not finite is null, never NaN."""
+    """The document as JSON: what has its default is left out, what is not finite is null."""
     from pydantic import TypeAdapter
 
-    plain = TypeAdapter(type(document)).dump_python(document, mode="json")
+    adapter: TypeAdapter[Any] = TypeAdapter(type(document))
+    plain = adapter.dump_python(document, mode="json", exclude_defaults=True)
     return json.dumps(plain, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
 
@@ -29,6 +35,8 @@ def schema_text() -> str:
 
 def comparison_schema_text() -> str:
     """The schema as it stands in ``data_schemas/comparison.schema.json``."""
+    from scissorcal.report.comparison import Comparison
+
     return _schema_text(Comparison, "scissorcal comparison of two reports")
 
 
@@ -40,10 +48,29 @@ def _schema_text(kind: type, title: str) -> str:
     for definition in (schema, *schema.get("$defs", {}).values()):
         if definition.get("type") == "object":
             definition["additionalProperties"] = False
-            definition["required"] = sorted(definition.get("properties", {}))
+            definition["required"] = sorted(
+                name for name, own in definition["properties"].items() if "default" not in own
+            )
+        for own in definition.get("properties", {}).values():
+            own.pop("title", None)
     whole = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,
         **{name: value for name, value in schema.items() if name != "title"},
     }
-    return json.dumps(whole, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    text = json.dumps(_short(whole), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
+def _short(schema: Any) -> Any:
+    """The schema with "a number or null" as one type."""
+    if isinstance(schema, list):
+        return [_short(entry) for entry in schema]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {name: _short(entry) for name, entry in schema.items()}
+    kinds = plain.get("anyOf", [])
+    if kinds and all(set(kind) == {"type"} for kind in kinds):
+        del plain["anyOf"]
+        plain["type"] = [kind["type"] for kind in kinds]
+    return plain

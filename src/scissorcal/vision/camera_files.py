@@ -1,14 +1,14 @@
-"""Camera files of others: OpenCV, ROS and Kalibr are read, OpenCV and ROS are written."""
+"""Camera files: read from OpenCV, ROS and Kalibr, written for OpenCV and ROS."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, file_error
 from scissorcal.vision.geometry.camera import Camera
 
 Style = Literal["opencv", "ros"]
@@ -27,12 +27,14 @@ _WIDTHS, _HEIGHTS = (
     ("image_width", "image_Width", "width"),
     ("image_height", "image_Height", "height"),
 )
+_RMS = ("avg_reprojection_error", "rms")
+_OPENCV_KEYS = (*MATRIX_KEYS, *DISTORTION_KEYS, *_WIDTHS, *_HEIGHTS, *_RMS, "fisheye_model")
 _ROS_MODELS = ("plumb_bob", "rational_polynomial")
 
 
 @dataclass(frozen=True)
 class CameraFile:
-    """What a file said: the camera, whose format it is, and its own figure of fit in pixels."""
+    """A file's camera, its format, and its rms reprojection error in pixels."""
 
     camera: Camera
     style: Literal["OpenCV", "ROS", "Kalibr"]
@@ -40,15 +42,15 @@ class CameraFile:
 
 
 def read_camera_file(path: Path) -> CameraFile:
-    """Read an OpenCV (YAML or XML), ROS camera_info or Kalibr camchain file, told by its content.
+    """Read an OpenCV (YAML or XML), ROS camera_info or Kalibr camchain file, recognised by content.
 
     Distortion must be the pinhole camera's radial-tangential one (plumb_bob, radtan; up to k6).
-    None of these files holds a covariance. Raises InputError naming what is missing or not known.
+    None of these files holds a covariance. Raises InputError with what is missing or unsupported.
     """
     try:
         text = path.read_text("utf-8", errors="replace")
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+        raise file_error(error, path) or error from None
     start = text.lstrip("\ufeff \t\r\n")
     if start.startswith(("%YAML", "<?xml", "<opencv_storage", "{")) or "!!opencv-matrix" in text:
         return _opencv(path)
@@ -58,7 +60,7 @@ def read_camera_file(path: Path) -> CameraFile:
 def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "camera") -> Path:
     """Write a camera as OpenCV (.yml, .yaml, .xml or .json) or ROS camera_info (.yaml).
 
-    Covariance is not written: neither format has a place for it. Complete or not at all. Raises
+    Neither format holds a covariance. The file is written atomically. Raises
     InputError where the ending does not fit the style.
     """
     endings = (".yml", ".yaml", ".xml", ".json") if style == "opencv" else (".yaml", ".yml")
@@ -70,61 +72,46 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
         part.write_text(text, "utf-8")
         part.replace(path)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}.") from None
+        raise file_error(error, path) or error from None
     return path
 
 
 def _opencv(path: Path) -> CameraFile:
     import cv2
 
+    facts: dict[str, Any] = {}
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        opened = storage.isOpened()
+        if storage.isOpened():
+            facts = {key: _opencv_value(storage.getNode(key)) for key in _OPENCV_KEYS}
     except (cv2.error, SystemError):
-        opened = False
-    if not opened:
+        facts = {}
+    if not facts:
         raise InputError(f"{path} is damaged: save it again.")
 
-    def matrix(keys: Sequence[str]) -> Any:
-        for key in keys:
-            node = storage.getNode(key)
-            if not node.empty() and not node.isNone():
-                found = node.mat()
-                if found is not None:
-                    return found
-        return None
+    def first(keys: Sequence[str], kind: type) -> Any:
+        return next((facts[key] for key in keys if isinstance(facts.get(key), kind)), None)
 
-    def number(keys: Sequence[str]) -> float | None:
-        for key in keys:
-            node = storage.getNode(key)
-            if not node.empty() and (node.isInt() or node.isReal()):
-                return float(node.real())
-        return None
-
-    try:
-        return _from_opencv(path, matrix, number)
-    except cv2.error:
-        raise InputError(
-            f"{path} has no matrices where a camera's belong: save it again."
-        ) from None
-    finally:
-        storage.release()
-
-
-def _from_opencv(
-    path: Path,
-    matrix: Callable[[Sequence[str]], Any],
-    number: Callable[[Sequence[str]], float | None],
-) -> CameraFile:
-    K = matrix(MATRIX_KEYS)
+    K, bend = first(MATRIX_KEYS, np.ndarray), first(DISTORTION_KEYS, np.ndarray)
     if K is None or np.shape(K) != (3, 3):
         raise InputError(f"{path} has no 3 x 3 matrix called {' or '.join(MATRIX_KEYS[:2])}.")
-    bend = matrix(DISTORTION_KEYS)
-    if number(("fisheye_model",)):
-        raise InputError(f"{path} is of a fisheye lens; {_ONLY_PINHOLE}")
-    size = number(_WIDTHS), number(_HEIGHTS)
+    if facts.get("fisheye_model"):
+        raise InputError(f"{path} has a fisheye model; {_ONLY_PINHOLE}")
+    size = first(_WIDTHS, float), first(_HEIGHTS, float)
     camera = _camera(path, K, np.zeros(5) if bend is None else bend, size)
-    return CameraFile(camera, "OpenCV", number(("avg_reprojection_error", "rms")))
+    return CameraFile(camera, "OpenCV", first(_RMS, float))
+
+
+def _opencv_value(node: Any) -> Any:
+    """A number or a matrix of OpenCV's file storage; None for anything else."""
+    import cv2
+
+    if node.isInt() or node.isReal():
+        return float(node.real())
+    try:
+        return node.mat() if node.isMap() else None
+    except cv2.error:
+        return None
 
 
 def _plain_yaml(path: Path, text: str) -> CameraFile:
@@ -133,18 +120,19 @@ def _plain_yaml(path: Path, text: str) -> CameraFile:
     try:
         facts = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise InputError(f"{path} is no YAML that can be read ({_first(str(error))}).") from None
+        raise InputError(f"{path} is not readable YAML ({_first(str(error))}).") from None
     if not isinstance(facts, Mapping):
-        raise InputError(f"{path} is no camera file of OpenCV, ROS or Kalibr.")
+        raise InputError(f"{path} is not a camera file of OpenCV, ROS or Kalibr.")
     try:
         if any(str(key).startswith("cam") and _is_kalibr(facts[key]) for key in facts):
             return _kalibr(path, facts)
         if "camera_matrix" in facts or "K" in facts or "k" in facts:
             return _from_ros(path, facts)
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise InputError(f"{path} is not complete ({error}): save it again.") from None
+        raise InputError(f"{path} is incomplete ({error}): save it again.") from None
     raise InputError(
-        f"{path} is no camera file of OpenCV, ROS or Kalibr: it has neither camera_matrix nor cam0."
+        f"{path} is not a camera file of OpenCV, ROS or Kalibr: it has neither camera_matrix nor "
+        "cam0."
     )
 
 
@@ -156,12 +144,12 @@ def _kalibr(path: Path, facts: Mapping[str, Any]) -> CameraFile:
     cameras = [key for key in facts if _is_kalibr(facts[key])]
     if len(cameras) > 1:
         raise InputError(
-            f"{path} holds {len(cameras)} cameras ({', '.join(cameras)}): keep the one of the rig."
+            f"{path} has {len(cameras)} cameras ({', '.join(cameras)}): keep only the rig's."
         )
     part = facts[cameras[0]]
     model = part.get("camera_model", "pinhole"), part.get("distortion_model", "radtan")
     if model not in (("pinhole", "radtan"), ("pinhole", "none")):
-        raise InputError(f"{path} is of the model {'-'.join(model)}; {_ONLY_PINHOLE}")
+        raise InputError(f"{path} has the model {'-'.join(model)}; {_ONLY_PINHOLE}")
     fx, fy, cx, cy = (float(value) for value in part["intrinsics"])
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     bend = np.array(part.get("distortion_coeffs", ()), dtype=np.float64)
@@ -176,7 +164,7 @@ def _from_ros(path: Path, facts: Mapping[str, Any]) -> CameraFile:
 
     model = facts.get("distortion_model", "plumb_bob")
     if model not in _ROS_MODELS:
-        raise InputError(f"{path} is of the model {model}; {_ONLY_PINHOLE}")
+        raise InputError(f"{path} has the model {model}; {_ONLY_PINHOLE}")
     size = tuple(
         next((float(facts[key]) for key in keys if key in facts), None)
         for keys in (_WIDTHS, _HEIGHTS)
@@ -187,17 +175,15 @@ def _from_ros(path: Path, facts: Mapping[str, Any]) -> CameraFile:
 
 
 _ONLY_PINHOLE = (
-    "scissorcal knows the pinhole camera with radial and tangential distortion (plumb_bob, radtan) "
-    "alone: calibrate it anew with 'scissorcal capture camera'."
+    "scissorcal supports only the pinhole model with radial and tangential distortion (plumb_bob, "
+    "radtan). Calibrate the camera with 'scissorcal capture camera'."
 )
 
 
 def _camera(path: Path, K: Any, bend: Any, size: tuple[float | None, float | None]) -> Camera:
     width, height = size
     if not width or not height:
-        raise InputError(
-            f"{path} does not say how large its pictures are: add image_width and image_height."
-        )
+        raise InputError(f"{path} has no picture size: add image_width and image_height.")
     coefficients = [float(value) for value in np.ravel(bend)]
     if any(coefficients[8:]):
         raise InputError(f"{path} has {len(coefficients)} distortion coefficients; {_ONLY_PINHOLE}")
@@ -207,7 +193,7 @@ def _camera(path: Path, K: Any, bend: Any, size: tuple[float | None, float | Non
         coefficients += [0.0] * (8 - len(coefficients))
     fx, fy, cx, cy = (float(K[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
     if not all(math.isfinite(value) for value in (fx, fy, cx, cy, *coefficients)):
-        raise InputError(f"{path} holds numbers that are not finite.")
+        raise InputError(f"{path} has numbers that are not finite.")
     if min(fx, fy) <= 0.0 or abs(float(K[0, 1])) > 1e-6 * fx:
         raise InputError(f"{path} has a camera matrix with a negative focal length or a skew.")
     return Camera(fx, fy, cx, cy, tuple(coefficients), int(width), int(height))

@@ -1,12 +1,13 @@
-"""Which places, sizes and slants a board has been seen in, and what is still wanted."""
+"""Coverage of a board's views: places, sizes and slants, and what is still missing."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
-from scissorcal.vision.targets.detect import Detection
+from scissorcal.vision.targets.detect import SMALL_PX, Detection
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ _SQUARE_ON = np.radians(12.0)
 
 @dataclass(frozen=True)
 class ViewCoverage:
-    """What has been seen: ninths of the picture, sizes of the board in it, ways it faces.
+    """Covered ninths of the picture, sizes of the board and its slants.
 
     A board is far where it spans less than 40 % of the picture, near where it spans more than 65 %.
     """
@@ -49,7 +50,7 @@ class ViewCoverage:
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """What no photograph has shown yet."""
+        """What no photograph has covered yet."""
         return (
             *(place for place in PLACES if place not in self.places),
             *(size for size in SIZES if size not in self.sizes),
@@ -57,7 +58,7 @@ class ViewCoverage:
         )
 
     def sentence(self) -> str:
-        """Say how much has been seen and what is wanted next."""
+        """Sentence on what is covered and what is still wanted."""
         seen = (
             f"places {len(self.places)} of {len(PLACES)}, sizes {len(self.sizes)} of {len(SIZES)}, "
             f"slants {len(self.slants)} of {len(SLANTS)}"
@@ -68,8 +69,8 @@ class ViewCoverage:
 def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
     """How a board is turned from square-on, to the right and up (rad), by a guess of the camera.
 
-    A focal length of 1.1 times the picture's longer side is right to a third for most cameras,
-    which is enough to tell slants apart.
+    A focal length of 1.1 times the picture's longer side is within a third of most cameras', which
+    is enough to classify slants.
     """
     import cv2
 
@@ -83,9 +84,17 @@ def slant_of(detection: Detection, width: int, height: int) -> tuple[float, floa
     return float(np.arctan2(facing[0], -facing[2])), float(np.arctan2(-facing[1], -facing[2]))
 
 
-def view_words(detection: Detection, width: int, height: int) -> str:
-    """Say where and how a board stands in one photograph."""
-    return f"{_size(detection, width, height)}, {_slant(detection, width, height)}"
+def detection_words(photo: Photo, detection: Detection) -> str:
+    """Describe a detection: corners, size of a square, size and slant of the board."""
+    size = _size(detection, photo.width, photo.height)
+    slant = _slant(detection, photo.width, photo.height)
+    words = (
+        f"{photo.source}: {len(detection.ids)} of {len(detection.board.points)} corners, "
+        f"{detection.square_px:.0f} px a square, {size}, {slant}"
+    )
+    if detection.square_px < SMALL_PX:
+        words += f" (small: {SMALL_PX:.0f} px a square and more are safe; move closer)"
+    return words
 
 
 def _places(pixels: Array, width: int, height: int) -> frozenset[str]:

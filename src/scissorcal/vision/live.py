@@ -1,4 +1,4 @@
-"""Pictures of a running camera or a video, and photographs picked from them."""
+"""Frames of a running camera or a video, and photographs selected from them."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
-from scissorcal.vision.targets.detect import Detection, find_board
+from scissorcal.vision.targets.detect import Detection, find_any_board
 
 Array = NDArray[np.float64]
 
@@ -25,8 +25,8 @@ one in a new place has moved farther than the second from where it was in every 
 
 @dataclass(frozen=True)
 class Frame:
-    """One picture of a camera or video. ``time_s`` counts from the first one; ``count`` is how many
-    there will be, None where nobody knows."""
+    """One picture of a camera or video. ``time_s`` counts from the first one; ``count`` is the
+    total, None where it is unknown."""
 
     number: int
     time_s: float
@@ -38,8 +38,8 @@ def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[
     """Yield frames as PNG files in ``folder``, each with the board held still in a new place.
 
     ``source`` is a camera's number or a video file. Ends after ``most``, with the video, or by an
-    interrupt from the keyboard; what was picked counts. Raises DeviceError or InputError where
-    nothing comes.
+    interrupt from the keyboard; selected frames are kept. Raises DeviceError or InputError
+    without any frame.
     """
 
     def new_place(frame: Frame, seen: Detection, kept: list[tuple[int, Detection]]) -> bool:
@@ -67,17 +67,17 @@ def frames_of(source: str) -> Iterator[Frame]:
 
     number = int(source) if source.isdigit() else None
     if number is None and not Path(source).is_file():
-        raise InputError(f"{source} is not there: name a video file, or a camera by its number.")
+        raise InputError(f"{source} does not exist: give a video file, or a camera's number.")
     video = cv2.VideoCapture(source if number is None else number)
     try:
         good, image = video.read() if video.isOpened() else (False, None)
         if not good:
             if number is not None:
                 raise DeviceError(
-                    f"Camera {number} gives no picture: see that it is plugged in, that no other "
-                    "program uses it, and which number it has."
+                    f"Camera {number} gives no picture: check that it is connected, that no other "
+                    "program uses it, and its number."
                 )
-            raise InputError(f"{source} is no video that can be read.")
+            raise InputError(f"{source} is not a readable video.")
         rate = float(video.get(cv2.CAP_PROP_FPS)) or 30.0
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         count = total if number is None and total > 0 else None
@@ -120,16 +120,14 @@ def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
     """Find the first of several boards that a picture shows, or None."""
     height, width = image.shape[:2]
     photo = Photo(image, width, height, 1, (0, 0), 1, "", name)
-    for board in boards:
-        try:
-            return find_board(photo, board, explain=False)
-        except InputError:
-            continue
-    return None
+    try:
+        return find_any_board(photo, boards, explain=False)
+    except InputError:
+        return None
 
 
 def _moved(one: Detection | None, other: Detection | None) -> float:
-    """Middle distance in pixels by which the corners that both show are apart."""
+    """Median distance in pixels between the corners that both show."""
     if one is None or other is None:
         return float("inf")
     _, here, there = np.intersect1d(one.ids, other.ids, return_indices=True)

@@ -1,7 +1,7 @@
-"""Pictures for people: what was detected, and how far off a fit is, drawn over the photograph."""
+"""Overlays: detections and a fit's residuals, drawn over the photograph."""
 
-from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,65 +10,59 @@ from scissorcal.vision.photo import Photo, Picture
 from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
+Colour = tuple[int, int, int]
 
 WIDEST_PX = 1000
 """Larger photographs are drawn smaller, small ones at most twice as large."""
 
-_GREEN, _RED, _BLUE, _WHITE, _BLACK = (
-    (60, 170, 0),
-    (40, 40, 220),
-    (200, 90, 0),
-    (255, 255, 255),
-    (0, 0, 0),
-)
+GREEN, RED, BLUE = (60, 170, 0), (40, 40, 220), (200, 90, 0)
+
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 _ARROW_SHARE = 0.03
+_FINE = 4
 
 
 def detection_overlay(photo: Photo, detection: Detection) -> Picture:
-    """Draw each corner that was found, the first one in red, joined in their order."""
-    import cv2
-
-    canvas, scale = _canvas(photo)
-    places = [_place(pixel, scale) for pixel in detection.pixels]
-    for before, after in pairwise(places):
-        cv2.line(canvas, before, after, _BLUE, 1, cv2.LINE_AA)
-    for index, place in enumerate(places):
-        cv2.circle(canvas, place, 5, _GREEN if index else _RED, 1, cv2.LINE_AA)
-    words = f"{photo.source}: {len(places)} corners of the {detection.board.name}"
-    return _labelled(canvas, words)
+    """Draw the detected corners, the first one in red, connected in order."""
+    canvas = _pale_canvas(photo)
+    canvas.line(detection.pixels, BLUE)
+    for index, pixel in enumerate(detection.pixels):
+        canvas.ring(pixel, GREEN if index else RED, 5)
+    canvas.title(f"{photo.source}: {len(detection.ids)} corners of the {detection.board.name}")
+    return canvas.picture
 
 
 def residual_overlay(
     photo: Photo, pixels: Array, residuals: Array, words: str = "", axes: Array | None = None
 ) -> Picture:
-    """Draw what is left between seen and predicted corners as arrows, with a bar for their scale.
+    """Draw residuals of corners as arrows, with a scale bar.
 
-    Arrows run from where the fit predicts a corner toward where it was seen. All are enlarged so
-    that the middle one is 3 % of the picture's width; those three times as long are red. ``axes``
-    (4, 2) are where a frame's origin and the ends of its x, y and z axes stand.
+    Arrows run from the predicted corner toward the detected one, enlarged so that the median is 3 %
+    of the picture's width; those three times as long are red. ``axes`` (4, 2) are the pixels of a
+    frame's origin and the ends of its x, y and z axes.
     """
-    import cv2
-
-    canvas, scale = _canvas(photo)
+    canvas = _pale_canvas(photo)
+    width = canvas.picture.shape[1]
     if axes is not None and np.all(np.isfinite(axes)):
-        _draw_axes(canvas, [_place(pixel, scale) for pixel in axes])
+        for name, colour, end in zip("xyz", (RED, GREEN, BLUE), axes[1:], strict=True):
+            canvas.arrow(axes[0], end, colour, thickness=2)
+            canvas.words(name, canvas.whole(end) + np.array([6, 0]))
     length = np.linalg.norm(residuals, axis=1)
     middle = max(float(np.median(length)), 1e-3)
-    magnified = _ARROW_SHARE * canvas.shape[1] / middle
+    magnified = _ARROW_SHARE * width / middle
     for pixel, residual, size in zip(pixels, residuals, length, strict=True):
-        start = _place(pixel - residual, scale)
-        off = magnified * residual
-        end = (round(start[0] + off[0]), round(start[1] + off[1]))
-        colour = _RED if size > 3.0 * middle else _GREEN
-        cv2.arrowedLine(canvas, start, end, colour, 1, cv2.LINE_AA, tipLength=0.25)
-    bar = _round_length(0.1 * canvas.shape[1] / magnified)
-    _draw_bar(canvas, round(bar * magnified), f"{bar:g} px")
+        start = pixel - residual
+        colour = RED if size > 3.0 * middle else GREEN
+        canvas.arrow(start, start + magnified / canvas.scale * residual, colour)
+    bar = _round_length(0.1 * width / magnified)
+    canvas.bar(round(bar * magnified), f"{bar:g} px")
     rms = float(np.sqrt(np.mean(length**2)))
-    return _labelled(canvas, f"{photo.source}: {rms:.2f} px rms {words}".rstrip())
+    canvas.title(f"{photo.source}: {rms:.2f} px rms {words}".rstrip())
+    return canvas.picture
 
 
 def write_picture(picture: Picture, path: Path) -> Path:
-    """Write a picture as PNG, complete or not at all."""
+    """Write a picture as PNG, atomically."""
     import cv2
 
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -78,67 +72,102 @@ def write_picture(picture: Picture, path: Path) -> Path:
     return path
 
 
-def _canvas(photo: Photo) -> tuple[Picture, float]:
-    """The photograph in pale grey at a handy size, and the canvas's pixels per photo's pixel."""
-    import cv2
+class Canvas:
+    """A scaled copy of a picture, or of a part of it, to draw on in the picture's own pixels.
 
-    grey = photo.grey
-    zoom = min(2.0, WIDEST_PX / max(grey.shape))
-    size = (round(grey.shape[1] * zoom), round(grey.shape[0] * zoom))
-    way = cv2.INTER_AREA if zoom < 1.0 else cv2.INTER_CUBIC
-    pale = (0.5 * cv2.resize(grey, size, interpolation=way) + 127.0).astype(np.uint8)
-    canvas = np.asarray(cv2.cvtColor(pale, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-    return canvas, size[0] / photo.width
+    ``image`` is grey or BGR, ``scale`` the canvas's pixels per pixel of it, ``origin`` the pixel at
+    its corner. ``picture`` is the result.
+    """
+
+    def __init__(self, image: Picture, scale: float, origin: tuple[int, int] = (0, 0)) -> None:
+        import cv2
+
+        part: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+        size = (round(part.shape[1] * scale), round(part.shape[0] * scale))
+        method = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
+        self.picture: Picture = np.asarray(cv2.resize(part, size, interpolation=method), np.uint8)
+        self.scale = scale
+        self.origin = np.array(origin, dtype=np.float64)
+
+    def line(self, pixels: Array, colour: Colour, *, closed: bool = False) -> None:
+        """Draw a line through pixels (n, 2) of the photograph."""
+        import cv2
+
+        cv2.polylines(
+            self.picture, [self._fine(pixels)], closed, colour, 1, cv2.LINE_AA, shift=_FINE
+        )
+
+    def arrow(self, start: Array, end: Array, colour: Colour, *, thickness: int = 1) -> None:
+        """Draw an arrow between two pixels of the photograph."""
+        import cv2
+
+        ends = self._fine(np.array([start, end])).tolist()
+        cv2.arrowedLine(
+            self.picture, ends[0], ends[1], colour, thickness, cv2.LINE_AA, _FINE, tipLength=0.2
+        )
+
+    def cross(self, pixel: Array, colour: Colour) -> None:
+        """Mark a pixel of the photograph."""
+        for step in np.eye(2) * 12.0 / self.scale:
+            self.line(np.array([pixel - step, pixel + step]), colour)
+
+    def ring(self, pixel: Array, colour: Colour, radius: int) -> None:
+        """Draw a circle of a radius on the canvas about a pixel of the photograph."""
+        import cv2
+
+        centre = self._fine(np.asarray(pixel)[None])[0].tolist()
+        cv2.circle(self.picture, centre, radius * 2**_FINE, colour, 1, cv2.LINE_AA, shift=_FINE)
+
+    def words(self, text: str, place: NDArray[np.int64]) -> None:
+        """Write black on white; ``place`` (2,) on the canvas is the left end of the baseline."""
+        import cv2
+
+        font, size = cv2.FONT_HERSHEY_SIMPLEX, self._letter_size
+        (width, height), below = cv2.getTextSize(text, font, size, 1)
+        left, low = (int(value) for value in place)
+        corner = (left - 4, low - height - 4)
+        cv2.rectangle(self.picture, corner, (left + width + 4, low + below + 2), _WHITE, cv2.FILLED)
+        cv2.putText(self.picture, text, (left, low), font, size, _BLACK, 1, cv2.LINE_AA)
+
+    def title(self, text: str) -> None:
+        """Write a line in the upper left corner."""
+        self.words(text, np.array([8, round(40 * self._letter_size)]))
+
+    def bar(self, length: int, text: str) -> None:
+        """Draw a scale bar of a length on the canvas in the lower left corner."""
+        import cv2
+
+        low = self.picture.shape[0] - 20
+        cv2.rectangle(self.picture, (10, low - 16), (40 + length, low + 14), _WHITE, cv2.FILLED)
+        cv2.line(self.picture, (20, low), (20 + length, low), _BLACK, 2)
+        for end in (20, 20 + length):
+            cv2.line(self.picture, (end, low - 5), (end, low + 5), _BLACK, 2)
+        self.words(text, np.array([34 + length, low + 7]))
+
+    def whole(self, pixel: Array) -> NDArray[np.int64]:
+        """The canvas's pixel (2,) at a pixel of the photograph."""
+        return np.asarray(self._fine(np.asarray(pixel)[None])[0] // 2**_FINE, dtype=np.int64)
+
+    def _fine(self, pixels: Array) -> NDArray[np.int32]:
+        """Places (n, 2) on the canvas in sixteenths of its pixels."""
+        there = (np.asarray(pixels) - self.origin + 0.5) * self.scale - 0.5
+        return np.asarray(np.rint(np.nan_to_num(there, nan=-1e4) * 2**_FINE), dtype=np.int32)
+
+    @property
+    def _letter_size(self) -> float:
+        return max(float(self.picture.shape[1]) / 1900.0, 0.5)
 
 
-def _place(pixel: Array, scale: float) -> tuple[int, int]:
-    u, v = (np.asarray(pixel) + 0.5) * scale - 0.5
-    return round(float(u)), round(float(v))
-
-
-def _draw_axes(canvas: Picture, ends: list[tuple[int, int]]) -> None:
-    import cv2
-
-    for name, colour, end in zip("xyz", (_RED, _GREEN, _BLUE), ends[1:], strict=True):
-        cv2.arrowedLine(canvas, ends[0], end, colour, 2, cv2.LINE_AA, tipLength=0.1)
-        _write(canvas, name, (end[0] + 6, end[1]))
-
-
-def _labelled(canvas: Picture, words: str) -> Picture:
-    size = _letter_size(canvas)
-    _write(canvas, words, (8, round(40 * size)))
+def _pale_canvas(photo: Photo) -> Canvas:
+    """The photograph in pale grey, drawn on in pixels of the whole photograph."""
+    pale = np.asarray(0.5 * photo.grey + 127.0, dtype=np.uint8)
+    canvas = Canvas(pale, min(2.0, WIDEST_PX / max(pale.shape)))
+    canvas.scale = canvas.picture.shape[1] / photo.width
     return canvas
 
 
-def _draw_bar(canvas: Picture, length: int, words: str) -> None:
-    import cv2
-
-    low = canvas.shape[0] - 20
-    cv2.rectangle(canvas, (10, low - 16), (40 + length, low + 14), _WHITE, cv2.FILLED)
-    cv2.line(canvas, (20, low), (20 + length, low), _BLACK, 2)
-    for end in (20, 20 + length):
-        cv2.line(canvas, (end, low - 5), (end, low + 5), _BLACK, 2)
-    _write(canvas, words, (34 + length, low + 7))
-
-
-def _write(canvas: Picture, words: str, place: tuple[int, int]) -> None:
-    """Write black on a white field; ``place`` is the left end of the baseline."""
-    import cv2
-
-    font, size = cv2.FONT_HERSHEY_SIMPLEX, _letter_size(canvas)
-    (width, height), below = cv2.getTextSize(words, font, size, 1)
-    left, low = place
-    corner = (left - 4, low - height - 4)
-    cv2.rectangle(canvas, corner, (left + width + 4, low + below + 2), _WHITE, cv2.FILLED)
-    cv2.putText(canvas, words, place, font, size, _BLACK, 1, cv2.LINE_AA)
-
-
-def _letter_size(canvas: Picture) -> float:
-    return max(float(canvas.shape[1]) / 1900.0, 0.5)
-
-
 def _round_length(length: float) -> float:
-    """The nearest of 1, 2, 5 times a power of ten below a length."""
+    """The largest of 1, 2, 5 times a power of ten below a length."""
     power = 10.0 ** np.floor(np.log10(length))
     step = max(step for step in (1.0, 2.0, 5.0) if step * power <= length * (1.0 + 1e-9))
     return float(step * power)

@@ -1,4 +1,4 @@
-"""Read a photograph: upright, eight bits, no larger than asked for; or say what is amiss."""
+"""Read a photograph: upright, eight bits, limited in size."""
 
 import hashlib
 import struct
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 MAX_PIXELS = 25_000_000
-"""What is read of a photograph by default; larger ones are reduced by 2, 4 or 8."""
+"""Default size limit; larger photographs are reduced by 2, 4 or 8."""
 
 _EXIF_ORIENTATION = 0x0112
 _DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")
@@ -33,8 +33,8 @@ class Photo:
     ``image`` is (rows, columns) grey or (rows, columns, 3) blue-green-red, eight bits. ``width``
     and ``height`` are those of the whole photograph, turned upright; ``reduction`` says how many of
     its pixels make one of ``image`` along each side (1, 2, 4 or 8), ``origin`` where the corner of
-    ``image`` lies in it. ``orientation`` is what EXIF asked for: 1 to 8, 1
-    for nothing. ``sha256`` is of the file's bytes.
+    ``image`` lies in it. ``orientation`` is EXIF's, 1 to 8; 1 means
+    upright. ``sha256`` is of the file's bytes.
     """
 
     image: Picture
@@ -45,11 +45,6 @@ class Photo:
     orientation: int
     sha256: str
     source: str
-
-    @property
-    def exif_orientation_applied(self) -> bool:
-        """Whether the file asked to be turned or mirrored, and was."""
-        return self.orientation != 1
 
     @property
     def grey(self) -> Picture:
@@ -89,19 +84,19 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
             with Image.open(path) as opened:
                 return _photo(path, opened, digest, max_pixels, colour)
         except FileNotFoundError:
-            raise InputError(f"{path} is not there: name a photograph that is.") from None
+            raise InputError(f"{path} does not exist: check the photograph's path.") from None
         except (IsADirectoryError, PermissionError) as error:
             raise InputError(f"{path} cannot be read: {error.strerror}.") from None
         except (Image.DecompressionBombWarning, Image.DecompressionBombError):
             limit = (Image.MAX_IMAGE_PIXELS or 0) // 1_000_000
             raise InputError(
-                f"{path} has more than {limit} million pixels: save it smaller and try again."
+                f"{path} has more than {limit} million pixels: save it at a smaller size."
             ) from None
         except UnidentifiedImageError:
             raise InputError(_not_a_picture(path)) from None
         except _DAMAGE as error:
             raise InputError(
-                f"{path} is damaged or cut short ({error}): copy it from the camera again."
+                f"{path} is damaged or truncated ({error}): copy it from the camera again."
             ) from None
 
 
@@ -111,8 +106,8 @@ def _photo(path: Path, opened: "Image.Image", digest: str, max_pixels: int, colo
     reduction = _reduction(width, height, max_pixels)
     if opened.mode == "F":
         raise InputError(
-            f"{path} holds floating-point numbers, whose white is unknown: save it as an 8- or "
-            "16-bit picture."
+            f"{path} has floating-point pixels of unknown white level: save it as an 8- or 16-bit "
+            "picture."
         )
     left = reduction
     if opened.format in ("JPEG", "MPO"):
@@ -126,6 +121,29 @@ def _photo(path: Path, opened: "Image.Image", digest: str, max_pixels: int, colo
     if orientation >= 5:
         width, height = height, width
     return Photo(image, width, height, reduction, origin, orientation, digest, path.name)
+
+
+PictureShape = tuple[int, int, int]
+"""Width and height in pixels, and the EXIF orientation that was applied."""
+
+
+def same_shape(photo: Photo, shape: PictureShape | None) -> PictureShape:
+    """The shape of a photograph. Raises InputError where it is not ``shape``.
+
+    A photograph of another size or orientation would be one of another camera to the fit.
+    """
+    own = (photo.width, photo.height, photo.orientation)
+    if shape is None or own == shape:
+        return own
+    if own[:2] != shape[:2]:
+        raise InputError(
+            f"{photo.source} has {own[0]} x {own[1]} pixels, the photographs before it "
+            f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom."
+        )
+    raise InputError(
+        f"{photo.source} has the EXIF orientation {own[2]}, the photographs before it "
+        f"{shape[2]}: hold the camera the same way for all."
+    )
 
 
 def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
@@ -167,7 +185,7 @@ def _averaged(image: Picture, factor: int) -> Picture:
 
 
 def _upright(image: Picture, orientation: int) -> Picture:
-    """Turn and mirror as EXIF's orientation (1 to 8) says."""
+    """Rotate and mirror by EXIF's orientation (1 to 8)."""
     if orientation in (2, 4, 5, 7):
         image = image[:, ::-1]
     turns = {3: 2, 4: 2, 5: 1, 6: 3, 7: 3, 8: 1}.get(orientation, 0)
@@ -175,7 +193,7 @@ def _upright(image: Picture, orientation: int) -> Picture:
 
 
 def _origin(spare: tuple[int, int], orientation: int) -> tuple[int, int]:
-    """Where the reduced picture's corner comes to lie in the whole one once both are turned.
+    """Place of the reduced picture's corner in the whole one, both upright.
 
     A reduced picture lacks (or exceeds) the whole one by ``spare`` pixels at its right and lower
     end, which the turn may bring to the left or to the top.
@@ -210,4 +228,4 @@ def _not_a_picture(path: Path) -> str:
         return f"{path} is empty: copy it from the camera again."
     if path.suffix.lower() in (".heic", ".heif"):
         return f"{path} is an HEIF photograph: set the camera to JPEG, or save it as JPEG or PNG."
-    return f"{path} is not a photograph that can be read: give a JPEG, PNG, TIFF, BMP or WebP file."
+    return f"{path} is not a readable photograph: give a JPEG, PNG, TIFF, BMP or WebP file."

@@ -1,4 +1,4 @@
-"""The pose of a target from picture to picture, and why it is not known in some of them."""
+"""The pose of a target in each picture of a sequence, or why it has none."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ State = Literal["seen", "ambiguous", "blank", "no target", "no pose"]
 
 STATES: dict[State, str] = {
     "seen": "its pose is known",
-    "ambiguous": "two poses explain the picture about alike",
-    "blank": "the picture is of one shade: lens covered, or no light",
-    "no target": "the target is out of the picture, hidden or blurred",
-    "no pose": "what is seen of the target does not determine a pose",
+    "ambiguous": "two poses explain the picture about equally well",
+    "blank": "the picture is uniform: lens covered, or no light",
+    "no target": "the target is outside the picture, hidden or blurred",
+    "no pose": "the visible part of the target does not determine a pose",
 }
-"""What a picture can come to, and what that means. The last three are drop-outs: no pose."""
+"""The states of a picture and their meaning. The last three are drop-outs: no pose."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """One picture: its number and time, what it came to, and the target's pose where it has one."""
+    """One picture: its number, time and state, and the target's pose if there is one."""
 
     number: int
     time_s: float
@@ -45,7 +45,7 @@ class Tracked:
 def track(
     frames: Iterable[Frame], boards: Sequence[MarkedBoard], camera: Camera
 ) -> Iterator[Tracked]:
-    """Locate a target in every picture, by itself; the first board that is seen is the target.
+    """Locate a target in every picture independently; the first board that is seen is the target.
 
     Raises InputError where pictures are of another size than the camera was fitted at.
     """

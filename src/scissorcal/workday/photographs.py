@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -91,6 +91,74 @@ def photo_captures(workspace: Workspace, kind: PhotoKind) -> tuple[PhotoCapture,
         for path in folders
         if not path.parent.name.endswith(".part")
     )
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What was found in one photograph, and the sentence that says so."""
+
+    words: str
+    detection: "Detection | None" = None
+    stance: tuple[float, float] | None = None
+    drawn: "Callable[[Path], object] | None" = None
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A finished capture of photographs: a sentence on each that was kept, and on each refused."""
+
+    capture: PhotoCapture
+    seen: tuple[Seen, ...]
+    refused: tuple[str, ...]
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        return tuple(one.words for one in self.seen)
+
+
+def take_photographs(
+    workspace: Workspace,
+    kind: PhotoKind,
+    paths: Iterable[Path],
+    look: "Callable[[Path, Photo], Seen]",
+    tell: Callable[[str], None],
+    nothing: str = "No photograph was given.",
+    *,
+    board: "CharucoBoard | MarkerBoard | Chessboard | None" = None,
+    blade: BladeSetup | None = None,
+) -> Taken:
+    """Copy photographs byte for byte into captures/<kind>-<stamp>/, each looked at at once.
+
+    ``look`` finds what the photograph must show and raises InputError where it does not; such a
+    photograph, and one that was taken before, is left out with its reason. ``tell`` hears of each.
+    ``board`` is noted where ``look`` detects none, ``blade`` is how a blade was laid down.
+    Raises InputError, and keeps nothing, where none is left.
+    """
+    from scissorcal.vision.photo import read_photo
+
+    before = photo_captures(workspace, kind)
+    seen: list[Seen] = []
+    refused: list[str] = []
+    with PhotoWriter(workspace, kind) as writer:
+        for path in paths:
+            try:
+                photo = read_photo(path, colour=False)
+                refuse_known(photo, before, writer)
+                found = look(path, photo)
+            except InputError as error:
+                refused.append(str(error))
+                tell(f"left out: {error}")
+                continue
+            stored = writer.add(path, photo, found.detection, found.stance)
+            if found.drawn is not None:
+                found.drawn(writer.part / f"{Path(stored.file).stem}-detected.png")
+            seen.append(found)
+            tell(found.words)
+        if not seen:
+            raise InputError(" ".join(refused[:3] or [nothing]) + " Nothing was kept.")
+        found_in = seen[-1].detection
+        capture = writer.finish(found_in.board if found_in else board, blade)
+    return Taken(capture, tuple(seen), tuple(refused))
 
 
 class PhotoWriter:
@@ -197,11 +265,6 @@ def already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:
             if photograph.sha256 == sha256:
                 return capture.path(photograph)
     return None
-
-
-def pictures_beside(path: Path) -> tuple[Path, ...]:
-    """Pictures that were drawn for a fit's file: those in the folder of its name."""
-    return tuple(sorted(path.with_suffix("").glob("*.png")))
 
 
 def _new_folder(workspace: Workspace, kind: PhotoKind) -> Path:

@@ -1,61 +1,162 @@
-"""The recordings of a workspace: recovered where they were cut off, and which of them count."""
+"""The recordings of a workspace: which a fit uses, which it does not, and why."""
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, MissingError
+from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, capture_facts
 from scissorcal.recipe.schema import Recipe
+from scissorcal.workday.index import FileIndex
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.recording import Recording
 
-
-class UnreadableError(InputError):
-    """A file among the recordings, ``path``, that is none or holds nothing."""
-
-    def __init__(self, sentence: str, path: Path) -> None:
-        super().__init__(sentence)
-        self.path = path
+Use = Literal["used", "excluded", "other recipe", "unreadable"]
 
 
 @dataclass(frozen=True)
-class Usable:
-    """Recordings of one kind that belong to the recipe as it is now, and those that do not.
+class RecordingRow:
+    """One recording: whether a fit uses it, ``why`` not where it does not, and what it holds.
 
-    ``left_out`` has one sentence for each recording that is not used: which, and why.
+    ``facts`` are empty for a file that cannot be read.
     """
 
-    recordings: "tuple[Recording, ...]"
-    left_out: tuple[str, ...]
+    path: Path
+    kind: str
+    use: Use
+    why: str
+    facts: Mapping[str, Any]
+
+    @property
+    def seconds(self) -> float:
+        return float(self.facts.get("seconds", 0.0))
 
 
-def usable_recordings(workspace: Workspace, recipe: Recipe, kind: CaptureKind) -> Usable:
-    """Read the recordings of one kind, and set aside those that are of something else.
+def list_recordings(
+    workspace: Workspace, recipe: Recipe, kind: CaptureKind, index: FileIndex
+) -> tuple[RecordingRow, ...]:
+    """List the recordings of one kind, oldest first, with the use that fits make of them.
 
-    A recording is set aside where the recipe at its capture names another rig, material or scene
-    (`capture_facts`); an import carries no recipe and is always used. Raises UnreadableError where
-    a file cannot be read as a recording, InputError where turning and sliding joints are mixed.
+    A recording is not used where a person excluded it, where it cannot be read, or where the
+    recipe at its capture names another rig, material or scene (`capture_facts`). An import carries
+    no recipe and is always used.
     """
-    used, left_out = [], []
+    excluded = exclusions(workspace)
+    rows = []
     for path in workspace.recordings(kind):
-        recording = _read_or_refuse(path)
-        changed = _changed(recording, recipe, kind)
-        if changed:
-            left_out.append(f"{workspace.relative(path)} is not used: {changed}.")
-        else:
-            used.append(recording)
-    joints = {recording.joint.kind: recording.source for recording in used}
+        if path.name in excluded:
+            rows.append(RecordingRow(path, kind, "excluded", excluded[path.name]["why"], {}))
+            continue
+        try:
+            facts = index.facts(path, f"recording {kind}", lambda file: _facts(file, kind))
+        except InputError as error:
+            rows.append(RecordingRow(path, kind, "unreadable", str(error), {}))
+            continue
+        changed = _changed(facts, recipe, kind)
+        use: Use = "other recipe" if changed else "used"
+        rows.append(RecordingRow(path, kind, use, changed, facts))
+    return tuple(rows)
+
+
+def used_recordings(
+    workspace: Workspace, recipe: Recipe, kind: CaptureKind, index: FileIndex | None = None
+) -> "tuple[Recording, ...]":
+    """Read the recordings of one kind that fits use, oldest first.
+
+    Raises InputError where a file cannot be read or rotary and linear joints are mixed.
+    """
+    rows = list_recordings(workspace, recipe, kind, index or FileIndex(workspace.root))
+    for row in rows:
+        if row.use == "unreadable":
+            raise InputError(f"{row.why} {exclude_hint(row.path)}")
+    used = [row.path for row in rows if row.use == "used"]
+    found = tuple(_read(path, path.stat().st_mtime_ns, path.stat().st_size) for path in used)
+    refuse_mixed_joints(rows)
+    return found
+
+
+def refuse_mixed_joints(rows: tuple[RecordingRow, ...]) -> None:
+    """Raise InputError where recordings of a rotary and of a linear joint are used together."""
+    joints = {row.facts["joint"]: row.path for row in rows if row.use == "used"}
     if len(joints) > 1:
         raise InputError(
-            f"{workspace.captures_dir} has {kind} recordings of a rotary joint "
-            f"({joints['rotary']}) and of a linear one ({joints['linear']}), which no fit can "
-            "take together: move one of them away."
+            f"One fit cannot use recordings of a rotary joint ({joints['rotary'].name}) and of a "
+            f"linear joint ({joints['linear'].name}). {exclude_hint(joints['linear'])}"
         )
-    return Usable(tuple(used), tuple(left_out))
+
+
+def completeness_counts(
+    row: RecordingRow, recipe: Recipe, kind: CaptureKind, index: FileIndex
+) -> Mapping[str, Any]:
+    """Count what one recording holds of the recipe's plan; see `device.counting`."""
+    settings = digest(recipe.model_dump(include={"capture", "scene", "rig", "material", "fit"}))
+
+    def count(path: Path) -> dict[str, Any]:
+        from scissorcal.device.counting import count_recorded
+        from scissorcal.recording import read_recording
+
+        try:
+            return count_recorded(read_recording(path), recipe, kind)
+        except InputError as error:
+            return {"refused": str(error)}
+
+    return index.facts(row.path, f"completeness {kind} {settings[:16]}", count)
+
+
+def exclude_recording(workspace: Workspace, name: str, why: str) -> Path:
+    """Note that fits do not use a recording; the file stays as it is.
+
+    Raises MissingError where there is no recording of this name, InputError without a reason.
+    """
+    path = _named(workspace, name)
+    if not why.strip():
+        raise InputError("State the reason with --why: it is shown wherever the data are listed.")
+    noted = dict(exclusions(workspace))
+    noted[path.name] = {
+        "why": why.strip(),
+        "time_utc": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+    }
+    _note(workspace, noted)
+    return path
+
+
+def include_recording(workspace: Workspace, name: str) -> Path:
+    """Let fits use a recording again. Raises MissingError where it was not excluded."""
+    noted = dict(exclusions(workspace))
+    key = Path(name).name
+    if key not in noted:
+        listed = ", ".join(noted) or "none"
+        raise MissingError(f"{key} is not excluded. Excluded recordings: {listed}.")
+    del noted[key]
+    _note(workspace, noted)
+    return workspace.captures_dir / key
+
+
+def exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
+    """Reason and time of each excluded recording, by file name. InputError where damaged."""
+    path = workspace.exclusions_path
+    if not path.is_file():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {str(name): {"why": str(row["why"]), **row} for name, row in found.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(
+            f"{path} cannot be read ({error}). It lists the excluded recordings: correct it, or "
+            "remove it to use every recording."
+        ) from None
+
+
+def exclude_hint(path: Path) -> str:
+    """The command that goes on without a recording."""
+    return f"Exclude one with 'scissorcal recording exclude {path.name} --why REASON'."
 
 
 def recover_recordings(workspace: Workspace) -> tuple[str, ...]:
@@ -67,13 +168,61 @@ def recover_recordings(workspace: Workspace) -> tuple[str, ...]:
     return tuple(recovered.sentence for recovered in recover(workspace.captures_dir))
 
 
-def _read_or_refuse(path: Path) -> "Recording":
+def _facts(path: Path, kind: CaptureKind) -> dict[str, Any]:
+    recording = _read(path, path.stat().st_mtime_ns, path.stat().st_size)
+    return {
+        "content": recording.content_hash,
+        "joint": recording.joint.kind,
+        "seconds": recording.duration_s,
+        "samples": len(recording.samples),
+        "device": " ".join(str(recording.device.get(key, "")) for key in ("name", "serial")),
+        "notes": list(recording.notes),
+        "captured": _captured(recording, kind),
+    }
+
+
+def _captured(recording: "Recording", kind: CaptureKind) -> dict[str, object] | str | None:
+    """What the recipe at the capture says of it; a sentence where that recipe cannot be read."""
+    from scissorcal.recipe.load import parse_recipe
+
+    if not recording.recipe_toml:
+        return None
     try:
-        return _read(path, path.stat().st_mtime_ns, path.stat().st_size)
-    except InputError as error:
-        raise UnreadableError(
-            f"{error} To go on without it, move it out of {path.parent}.", path
-        ) from error
+        return dict(capture_facts(parse_recipe(recording.recipe_toml), kind))
+    except InputError:
+        return "the recipe at its capture cannot be read by this version"
+
+
+def _changed(facts: Mapping[str, Any], recipe: Recipe, kind: CaptureKind) -> str:
+    """Say what the recipe names differently now; empty where nothing is."""
+    before = facts["captured"]
+    if before is None or isinstance(before, str):
+        return before or ""
+    now = capture_facts(recipe, kind)
+    changes = [
+        f"{key} was {before.get(key)} and is now {now[key]}"
+        for key in now
+        if before.get(key) != now[key]
+    ]
+    return "; ".join(changes)
+
+
+def _named(workspace: Workspace, name: str) -> Path:
+    path = workspace.captures_dir / Path(name).name
+    if not path.is_file():
+        there = [p.name for kind in ("friction", "cut") for p in workspace.recordings(kind)]
+        raise MissingError(
+            f"{workspace.captures_dir} has no recording {path.name}. It has: "
+            f"{', '.join(there) or 'none'}."
+        )
+    return path
+
+
+def _note(workspace: Workspace, noted: Mapping[str, Mapping[str, str]]) -> None:
+    path = workspace.exclusions_path
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(noted, indent=1) + "\n", encoding="utf-8")
+    part.replace(path)
 
 
 @lru_cache(maxsize=64)
@@ -81,20 +230,3 @@ def _read(path: Path, _modified_ns: int, _size: int) -> "Recording":
     from scissorcal.recording import read_recording
 
     return read_recording(path)
-
-
-def _changed(recording: "Recording", recipe: Recipe, kind: CaptureKind) -> str:
-    """Say what the recipe names differently now; empty where nothing is."""
-    if not recording.recipe_toml:
-        return ""
-    from scissorcal.recipe.load import parse_recipe
-
-    try:
-        before = capture_facts(parse_recipe(recording.recipe_toml), kind)
-    except InputError:
-        return "the recipe it was recorded with cannot be read by this version"
-    now = capture_facts(recipe, kind)
-    changes = [
-        f"{key} was {before[key]} and is now {now[key]}" for key in now if before[key] != now[key]
-    ]
-    return "; ".join(changes)

@@ -16,19 +16,16 @@ from scissorcal.recipe.library import schemas_dir
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
-    "blade.schema.json": "scissorcal.calibration.edge.store:BladeDocument",
-    "camera.schema.json": "scissorcal.calibration.camera.store:CameraDocument",
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
-    "plate.schema.json": "scissorcal.calibration.plate.store:PlateDocument",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
-    "track.schema.json": "scissorcal.workday.runs.track:track_schema",
+    "track.schema.json": "scissorcal.calibration.plate.track:track_schema",
     "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or

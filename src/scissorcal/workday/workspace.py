@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, file_error
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -29,6 +29,10 @@ class Workspace:
 
     root: Path
 
+    def __repr__(self) -> str:
+        """One line: the folder."""
+        return f"<workspace {self.root}>"
+
     @property
     def recipe_path(self) -> Path:
         return self.root / RECIPE_FILE
@@ -36,6 +40,11 @@ class Workspace:
     @property
     def captures_dir(self) -> Path:
         return self.root / "captures"
+
+    @property
+    def exclusions_path(self) -> Path:
+        """Which recordings fits do not use, and why."""
+        return self.captures_dir / "excluded.json"
 
     @property
     def report_html(self) -> Path:
@@ -70,18 +79,12 @@ class Workspace:
             path = self.captures_dir / f"{kind}-{stamp}-{number}.mcap"
         return path
 
-    def fit_path(self, what: FitKind) -> Path:
+    def fit_path(self, what: str) -> Path:
         return self.root / "fits" / f"{what}.nc"
 
-    def verify_path(self, what: FitKind) -> Path:
-        return self.root / "fits" / f"{what}.verify.json"
-
     def verify_partial_path(self, what: FitKind) -> Path:
+        """Where a trust check keeps each of its fits as it is done."""
         return self.root / "fits" / f"{what}.verify.partial.jsonl"
-
-    def checkpoint_path(self, what: FitKind, inputs_hash: str) -> Path:
-        """Where a thorough fit of these inputs keeps how far it got."""
-        return self.root / "fits" / f"{what}-{inputs_hash[:12]}.chains"
 
     def package_path(self, recipe: "Recipe") -> Path:
         return self.root / "package" / f"{recipe.name}.zip"
@@ -129,9 +132,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
         workspace.root.mkdir(parents=True, exist_ok=True)
         workspace.recipe_path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(
-            f"{workspace.root} cannot be made into a workspace: {error.strerror}."
-        ) from None
+        raise file_error(error, workspace.root) or error from None
     return workspace
 
 
@@ -152,5 +153,5 @@ def demo_folder(folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         marker.write_text("A demo made this folder; the next one replaces it.\n", encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{folder} cannot be used for a demo: {error.strerror}.") from None
+        raise file_error(error, folder) or error from None
     return folder

@@ -14,14 +14,13 @@ from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, 
 from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, guess, seen_region
 from scissorcal.calibration.camera.pictures import left_over, residual_chart, uncertainty_chart
-from scissorcal.calibration.camera.store import load_camera, save_camera
 from scissorcal.calibration.camera.uncertainty import (
     camera_covariance,
     camera_of,
     halves,
     pixel_map,
 )
-from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.errors import MissingError, VerdictError
 from scissorcal.vision.sim import Lens, Pose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
@@ -218,21 +217,11 @@ def fitted() -> tuple[list[CameraPhoto], object]:
     return photos, fit_camera(photos, rng=np.random.default_rng(0), inputs_hash="abc")
 
 
-def test_a_good_fit_passes_and_is_read_back(fitted, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_a_good_fit_passes_every_check(fitted) -> None:  # type: ignore[no-untyped-def]
     _, fit = fitted
     assert [verdict.status for verdict in fit.verdicts] == ["pass"] * 6
     assert fit.draws.shape == (500, 9)
     assert np.cov(fit.draws[:, 0]) == pytest.approx(fit.camera.covariance[0, 0], rel=0.3)
-    path = tmp_path / "fits" / "camera.json"
-    save_camera(fit, path)
-    again = load_camera(path)
-    assert again.camera.covariance == pytest.approx(fit.camera.covariance)
-    assert again.verdicts == fit.verdicts
-    assert again.views == fit.views
-    assert again.cross == fit.cross
-    assert again.pixel_map.sd_px == pytest.approx(fit.pixel_map.sd_px, nan_ok=True)
-    assert again.draws == pytest.approx(fit.draws)
-    assert again.inputs_hash == "abc"
 
 
 def test_the_map_says_what_drawn_cameras_do(fitted) -> None:  # type: ignore[no-untyped-def]
@@ -316,11 +305,3 @@ def parallel(rng: np.random.Generator, tilt: float) -> list[CameraPhoto]:
         detection = Detection(CAMERA_BOARD, np.arange(48), pixels, 60.0)
         found.append(CameraPhoto(f"{number}.jpg", WIDTH, HEIGHT, detection))
     return found
-
-
-def test_a_file_that_is_no_camera_is_refused(tmp_path: Path) -> None:
-    for text in ("", "{}", '{"format": "scissorcal-camera/2"}', "[1, 2"):
-        path = tmp_path / "camera.json"
-        path.write_text(text)
-        with pytest.raises(InputError, match="is not a camera"):
-            load_camera(path)

@@ -31,7 +31,7 @@ RESPONSE = Response("power", TRUTH.force, TRUTH.exponent, TRUTH.reference)
 LAW = Cutting(EDGE, RESPONSE, 2, TRUTH.upper_face, TRUTH.fracture_energy)
 GEOMETRY = Geometry(EdgeBelief(EDGE, (), np.zeros((0, 0))), TRUTH.upper_face, 2, TRUTH.reference)
 GUESS = Guess(RESPONSE, TRUTH.fracture_energy, 1.0)
-FRICTION = FrictionLaw(coulomb_pos=COULOMB, coulomb_neg=COULOMB)
+FRICTION = FrictionLaw({"coulomb": COULOMB})
 NOISE = TorqueNoise(1e-4, 1e-4, 0.01)
 
 HIGH, LOW = 0.85, 0.25

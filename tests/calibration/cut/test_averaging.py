@@ -17,6 +17,7 @@ from scissorcal.calibration.cut.laws import CutLaw
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem
+from scissorcal.model.transforms import IDENTITY
 
 DATA_SD = 0.3
 NO_LAYOUT = Layout(())
@@ -113,7 +114,7 @@ def test_an_improbable_law_is_left_out():
 def test_a_share_below_zero_is_no_friction():
     data = np.array([-0.9, -1.4, -1.1])
     (plain, design), (loaded, other) = pair(data)
-    shares = tuple(Parameter(n, "1", "identity", 0.0, 1.0, "") for n in ("a", "load_share"))
+    shares = tuple(Parameter(n, "1", IDENTITY, 0.0, 1.0, "") for n in ("a", "load_share"))
     compared = [(plain, design), (loaded, replace(other, layout=Layout(shares)))]
     assert loaded.optimum.point[1] < 0.0
     (only,) = by_load(loaded, compared)

@@ -122,23 +122,23 @@ def test_a_coarse_encoder_gives_running_segments_their_true_work(rig, seed):
 
 
 def _known(rig, truth) -> KnownFriction:
+    names = (
+        "coulomb_pos",
+        "coulomb_neg",
+        "viscous_pos",
+        "viscous_neg",
+        "stribeck",
+        "stribeck_rate",
+        "angle_slope",
+        "angle_curvature",
+    )
     law = FrictionLaw(
-        angle_center=CENTER_RAD,
-        presliding_share=truth.get("presliding_share", 0.0),
-        presliding_length=truth.get("presliding_length", 1.0),
-        **{
-            name: truth[name]
-            for name in (
-                "coulomb_pos",
-                "coulomb_neg",
-                "viscous_pos",
-                "viscous_neg",
-                "stribeck",
-                "stribeck_rate",
-                "angle_slope",
-                "angle_curvature",
-            )
+        {
+            "presliding_share": truth.get("presliding_share", 0.0),
+            "presliding_length": truth.get("presliding_length", 1.0),
+            **{name: truth[name] for name in names},
         },
+        angle_center=CENTER_RAD,
     )
     motor, sensors = rig.motor, rig.sensors
     wave = np.array([np.sin(motor.cogging_phase_rad), np.cos(motor.cogging_phase_rad)])

@@ -125,7 +125,7 @@ def test_running_cracks_are_expanded_as_differences_say(edge):
     assert view.lever + view.lever_de @ away == pytest.approx(lever, abs=2e-6)
 
 
-def test_a_belief_without_parameters_has_no_derivatives():
+def test_an_exact_edge_has_no_derivatives():
     opening = np.stack([OPENING, OPENING + 0.01], axis=1)
     spans = geometry(names=()).spans(opening, np.zeros(7), np.full((7, 2), 0.03))
     assert spans.depth_de.size == 0

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.model import friction_torque
+from scissorcal.recipe.priors import CutPriors
 from tests.package.fits import friction_fit
 
 RATE, LEVEL = 0.1, 0.015
@@ -39,7 +40,7 @@ def bent(spread: float):
     )
 
 
-def test_means_of_parameters_on_a_bend_are_no_law_of_the_posterior():
+def test_on_a_curved_ridge_the_mode_replaces_the_mean():
     """With Stribeck friction open by a factor of 4.5 they give 2 mN m less than every draw."""
     fit = bent(1.5)
     known = KnownFriction.of(fit)
@@ -51,11 +52,11 @@ def test_means_of_parameters_on_a_bend_are_no_law_of_the_posterior():
     assert means["coulomb"] + bell < LEVEL - 1e-3
 
 
-def test_the_spread_is_that_of_the_posteriors_core():
+def test_the_standard_deviation_is_of_the_posteriors_core():
     """Friction at 0.3 rad/s: a few draws far out do not count."""
     fit = bent(0.3)
     draws = fit.draws.copy()
     draws[:20, [p.name for p in fit.parameters].index("coulomb")] += 0.05
     wide, narrow = KnownFriction.of(replace(fit, draws=draws)), KnownFriction.of(fit)
     assert wide.closing_sd == pytest.approx(narrow.closing_sd, rel=0.1)
-    assert narrow.closing_sd > OFFSET_SD_FLOOR
+    assert narrow.closing_sd > CutPriors().friction_sd_floor_Nm

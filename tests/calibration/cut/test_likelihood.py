@@ -99,7 +99,7 @@ def test_places_of_rests_are_where_the_density_is_highest():
         assert best.x == pytest.approx(places[rest], abs=0.02 * spread)
 
 
-def test_many_points_at_once_are_each_as_one_alone():
+def test_a_batch_of_points_equals_single_evaluations():
     data = made_data(8)
     base = made_parameters(responses()["spline"], "rippled")
     kappas, forces = np.array([0.6, 0.7, 0.8]), np.array([-0.1, 0.0, 0.1])
@@ -119,14 +119,14 @@ def test_many_points_at_once_are_each_as_one_alone():
         assert (totals[index], periods[index]) == (alone[0], alone[5])
 
 
-def test_spoilt_numbers_give_no_likelihood():
+def test_invalid_numbers_give_no_likelihood():
     data, given = made_data(5), made_parameters(responses()["power"], "rippled")
     assert cut_log_likelihood(data, replace(given, energy=math.nan))[0] == -math.inf
     broken = replace(data, run_torque=np.full_like(data.run_torque, math.nan))
     assert cut_log_likelihood(broken, given)[0] == -math.inf
 
 
-def test_parameters_pull_where_they_should():
+def test_parameters_change_the_likelihood_in_the_right_direction():
     """Load adds to closing and takes from opening; a delay lowers by what the data say it does."""
     data = made_data(6)
     given = made_parameters(responses()["power"], "smooth", plain=True)

@@ -8,7 +8,7 @@ import pytest
 from scissorcal.calibration import fit_cut
 from scissorcal.calibration.cut.between import NOT_KNOWN
 from scissorcal.calibration.cut.usage import FREE, STARTING, usage_of_segments, usage_sentence
-from scissorcal.calibration.signals.usage import SPOILT
+from scissorcal.calibration.signals.usage import INVALID
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import GEOMETRY, GUESS, HIGH, LOW, NOISE, cut, way
 from tests.calibration.cut.recipes import friction_of, paper
@@ -42,7 +42,7 @@ def fitted(friction, *recordings):
     return fit_cut(recordings, recipe, friction, effort="draft", rng=np.random.default_rng(0))
 
 
-def test_one_recording_says_that_others_are_not_known(days):
+def test_one_recording_notes_that_the_variation_is_unknown(days):
     friction, monday, _ = days
     fit = fitted(friction, monday)
     assert NOT_KNOWN in fit.notes
@@ -69,9 +69,9 @@ def test_batches_that_differ_are_named_and_widen_the_interval(days):
 def test_every_sample_of_a_stroke_is_used_or_has_a_reason():
     from scissorcal.calibration.cut.segments import cut_into_segments
 
-    spoilt = np.ones(5 * len(way(HIGH, LOW, HIGH)), dtype=bool)
+    invalid = np.ones(5 * len(way(HIGH, LOW, HIGH)), dtype=bool)
     made = cut(*[way(HIGH, LOW, HIGH)] * 3)
-    usable = spoilt[: len(made.made.recording.samples)]
+    usable = invalid[: len(made.made.recording.samples)]
     usable[900:950] = False
     made = cut(*[way(HIGH, LOW, HIGH)] * 3, usable=usable)
     segments = cut_into_segments(made.motions, made.materials, GEOMETRY, GUESS, NOISE, 1e-4, True)
@@ -79,10 +79,10 @@ def test_every_sample_of_a_stroke_is_used_or_has_a_reason():
     usage = usage_of_segments(recordings, segments)
     for row in usage.rows:
         assert row.recorded_s == pytest.approx(row.used_s + sum(row.reasons.values()))
-        assert set(row.reasons) <= {SPOILT, STARTING, FREE}
+        assert set(row.reasons) <= {INVALID, STARTING, FREE}
     strokes = [row for row in usage.rows if row.stroke >= 0]
     assert len(strokes) == 3
-    assert strokes[0].reasons[SPOILT] > 0.0
+    assert strokes[0].reasons[INVALID] > 0.0
     assert all(row.reasons[STARTING] > 0.0 for row in strokes[1:])
     assert all(row.share > 0.2 for row in strokes[1:])
     assert usage_sentence(recordings, usage).endswith(".")

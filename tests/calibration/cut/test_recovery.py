@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, cut_experiment, cutting_from, fit_cut
-from scissorcal.calibration.store import load_fit, save_fit
+from scissorcal.calibration.store import load_fit, save
 from scissorcal.model import Edge, EdgeBelief
 from tests.calibration.cut.recipes import friction_of, paper, pressing
 from tests.calibration.truth import (
@@ -77,7 +77,7 @@ def test_strokes_that_end_at_the_highest_force(friction):
 
 
 @pytest.mark.parametrize("damping", [30.0, 0.0])
-def test_damping_is_told_from_none(friction, damping):
+def test_damping_is_separated_from_none(friction, damping):
     rng = np.random.default_rng(31)
     truth = replace(SMOOTH, damping=damping)
     cuts = cut_recording(truth, rng, sheets=1)
@@ -89,7 +89,7 @@ def test_damping_is_told_from_none(friction, damping):
         recovers(fit, truth, "rate_damping")
 
 
-def test_an_edge_that_is_believed_stands_among_the_draws(friction):
+def test_an_uncertain_edge_is_among_the_draws(friction):
     rng = np.random.default_rng(23)
     cuts = cut_recording(SMOOTH, rng, sheets=1)
     edge = EdgeBelief(LINE, ("offset_m", "taper_rad"), np.diag([5e-5, 1e-3]) ** 2)
@@ -114,8 +114,8 @@ def test_a_press_without_a_knee_is_a_power_law(pressed_friction):
     recovers(fit, truth, "response_force", "response_exponent")
 
 
-def test_two_slopes_are_told_from_a_power_law_and_an_exponential(pressed_friction, tmp_path):
-    """On strokes that a rung has not seen the spline's error is the noise, the others' is not."""
+def test_two_slopes_are_separated_from_a_power_law_and_an_exponential(pressed_friction, tmp_path):
+    """On held-out strokes the spline's error is the noise, the others' is not."""
     rng = np.random.default_rng(41)
     pressed = press_recording(KNEED, rng)
     wanted = pressing(response="auto+spline")
@@ -124,7 +124,7 @@ def test_two_slopes_are_told_from_a_power_law_and_an_exponential(pressed_frictio
     knots = fit.structure["response_knots_m"]
     assert knots[-1] == pytest.approx(1.2e-3, rel=0.1)
     assert knots[0] == pytest.approx(knots[-1] / 8.0, rel=1e-3)
-    save_fit(fit, tmp_path / "cut.nc")
+    save(fit, tmp_path / "cut.nc")
     design = cut_experiment((pressed,), wanted, pressed_friction, load_fit(tmp_path / "cut.nc"))
     assert tuple(design.key["response_knots_m"]) == tuple(knots)
     values = {p.name: fit.draws[:, [i]] for i, p in enumerate(fit.parameters)}

@@ -34,16 +34,16 @@ def test_a_recording_without_sheets_is_refused(friction):
     assert "scissorcal capture cut" in str(refused.value)
 
 
-def test_blades_that_never_let_go_are_refused(friction):
+def test_a_recording_without_unloading_is_refused(friction):
     """A cut that ends closed: nothing is unloaded."""
     rng = np.random.default_rng(15)
     closed = cut(way(HIGH, LOW)).made.recording
-    with pytest.raises(InputError, match="letting go of the material") as refused:
+    with pytest.raises(InputError, match="unloading the material") as refused:
         fit_cut((closed,), paper(), friction, effort="draft", rng=rng)
-    assert "let every stroke open the blades wide" in str(refused.value)
+    assert "open the blades wide in every stroke" in str(refused.value)
 
 
-def test_other_errors_are_not_told_as_a_lack_of_unloading(friction, monkeypatch):
+def test_other_errors_are_not_reported_as_missing_unloading(friction, monkeypatch):
     def broken(*_):
         raise ValueError("something else")
 

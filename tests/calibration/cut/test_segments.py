@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.calibration.cut.segments import cut_into_segments, find_runs, split
+from scissorcal.calibration.cut.path.runs import find_runs, split
+from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
     GEOMETRY,
     GUESS,
@@ -27,7 +28,7 @@ def two_strokes() -> Cut:
     return cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH))
 
 
-def test_a_sheet_is_touched_let_go_touched_again_and_run_through(two_strokes):
+def test_a_sheet_is_loaded_unloaded_loaded_and_cut(two_strokes):
     found = segments_of(two_strokes)
     assert [piece.kind for piece in found.pieces] == ["fresh", "unloading", "loading", "unloading"]
     assert [rest.fresh for rest in found.rests] == [True, False, False]
@@ -57,7 +58,7 @@ def test_mean_torques_are_those_of_the_truth(two_strokes):
         assert stretch.speed == pytest.approx(0.4, rel=0.2)
 
 
-def test_unloading_begins_where_the_blades_have_left_the_turn_for_good():
+def test_unloading_begins_after_the_blades_leave_the_turn():
     """A servo that opens by 2 mrad, comes back to within 0.2 mrad of the turn, and then opens."""
     made = cut(way(HIGH, LOW, LOW + 2e-3, LOW + 2e-4, HIGH))
     piece = segments_of(made).pieces[-1]
@@ -66,7 +67,7 @@ def test_unloading_begins_where_the_blades_have_left_the_turn_for_good():
     assert opening[piece.ends[0] :].min() == pytest.approx(opening[piece.ends[0]], abs=1e-5)
 
 
-def test_each_sheet_begins_fresh():
+def test_each_sheet_starts_uncut():
     found = segments_of(
         cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), places=(-0.018,) * 2, kinds=(0, 1))
     )
@@ -74,7 +75,7 @@ def test_each_sheet_begins_fresh():
     assert [stretch.sheet for stretch in found.stretches] == [0, 1]
 
 
-def test_a_pause_and_a_tremor_within_a_stroke_part_nothing(two_strokes):
+def test_a_pause_or_tremor_within_a_stroke_splits_nothing(two_strokes):
     """A servo that stops for a while in the middle and moves back by 2 mrad."""
     found = segments_of(two_strokes)
     paused = segments_of(cut(way(HIGH, 0.5, 0.502, LOW, HIGH), way(HIGH, LOW, HIGH)))
@@ -85,7 +86,7 @@ def test_a_pause_and_a_tremor_within_a_stroke_part_nothing(two_strokes):
     assert np.all(after.path < 0.0)
 
 
-def test_an_interrupted_stroke_rests_where_it_turned_and_runs_on_from_beyond():
+def test_an_interrupted_stroke_rests_at_its_turn_and_continues_beyond():
     """Back by 60 mrad at 0.5 rad: the crack waits, is loaded again and runs on only beyond."""
     found = segments_of(cut(way(HIGH, 0.5, 0.56, LOW, HIGH)))
     assert [rest.fresh for rest in found.rests] == [True, False, False]
@@ -97,29 +98,29 @@ def test_an_interrupted_stroke_rests_where_it_turned_and_runs_on_from_beyond():
     assert [p.kind for p in found.pieces][:2] == ["fresh", "unloading"]
 
 
-def test_spoilt_samples_part_a_stretch_and_take_no_other_segment(two_strokes):
+def test_invalid_samples_split_a_stretch_and_remove_one_segment(two_strokes):
     whole = segments_of(two_strokes)
     usable = np.ones(len(two_strokes.tip), dtype=bool)
     middle = int(whole.stretches[0].ends[len(whole.stretches[0].ends) // 2])
     usable[middle : middle + 3] = False
-    spoilt = segments_of(
+    invalid = segments_of(
         cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable),
     )
-    assert len(spoilt.stretches) == 3
-    for stretch in spoilt.stretches:
+    assert len(invalid.stretches) == 3
+    for stretch in invalid.stretches:
         assert np.all(usable[stretch.ends[0] : stretch.ends[-1] + 1])
     lost = sum(len(s.torque) for s in whole.stretches) - sum(
-        len(s.torque) for s in spoilt.stretches
+        len(s.torque) for s in invalid.stretches
     )
     assert 1 <= lost <= 2
 
 
-def test_a_spoilt_piece_is_left_out(two_strokes):
+def test_a_invalid_piece_is_left_out(two_strokes):
     whole = segments_of(two_strokes)
     usable = np.ones(len(two_strokes.tip), dtype=bool)
     usable[whole.pieces[1].ends[2]] = False
-    spoilt = segments_of(cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable))
-    assert [piece.kind for piece in spoilt.pieces] == ["fresh", "loading", "unloading"]
+    invalid = segments_of(cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable))
+    assert [piece.kind for piece in invalid.pieces] == ["fresh", "loading", "unloading"]
 
 
 def test_where_nothing_is_cut_the_near_edge_is_the_only_place():

@@ -49,7 +49,7 @@ def test_a_sheet_that_was_not_replaced_is_named():
     verdict = stale_verdict(rows)
     assert (verdict.status, verdict.value) == ("fail", 1.0)
     assert "sheet 1 of cut-1.mcap: 3 of 3" in verdict.why
-    assert "Put fresh material in" in verdict.why
+    assert "Insert fresh material" in verdict.why
 
 
 @pytest.mark.parametrize(("empty", "status"), [(0, "pass"), (2, "pass"), (3, "fail")])
@@ -72,7 +72,7 @@ def day(rng):
     return replace(made, strokes=tuple(planned))
 
 
-def test_a_whole_capture_with_a_sheet_that_was_never_put_in_is_no_calibration():
+def test_a_capture_with_a_missing_sheet_fails():
     rng = np.random.default_rng(4)
     friction = friction_of(Truth(), rng)
     recipe = paper(response="power", fracture="smooth")

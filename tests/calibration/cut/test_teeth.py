@@ -41,7 +41,7 @@ def found(signals, near=False) -> Line | None:
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.83, 1.0, 1.3, 2.1])
-def test_the_ratio_of_periods_is_read_off(ratio):
+def test_the_ratio_of_periods_is_recovered(ratio):
     line = found(day(int(100 * ratio), ratio=ratio))
     assert line is not None
     assert line.ratio == pytest.approx(ratio, abs=max(0.004 * ratio, 4 * line.sd * ratio))
@@ -68,7 +68,7 @@ def test_a_near_period_needs_no_search():
 
 
 @pytest.mark.parametrize("noise", [0.3, 0.5])
-def test_noise_that_grows_with_the_frequency_does_not_pull_the_line(noise):
+def test_noise_that_grows_with_the_frequency_does_not_bias_the_line(noise):
     """Differences of white noise, with more than the teeth's height as standard deviation."""
     lines = [found(day(seed, ratio=0.9, noise=noise)) for seed in range(60, 66)]
     ratios = [line.ratio for line in lines if line is not None]
@@ -133,12 +133,12 @@ def test_two_speeds_must_differ_and_agree():
     assert not at((0.1, 1.0, 50.0), (0.25, 1.0, 5.0))
 
 
-def test_strokes_too_fast_for_their_teeth_say_nothing():
+def test_strokes_too_fast_for_their_teeth_are_ignored():
     rng = np.random.default_rng(11)
     fast = [stretch(rng, k, 1.5, 1.6, ratio=1.0, noise=0.01) for k in range(4)]
     line = found(fast)
     assert line is None or not line.at_two_speeds
 
 
-def test_nothing_is_found_in_nothing():
+def test_without_strokes_there_is_no_line():
     assert found([]) is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.store import load_fit, save_fit
+from scissorcal.calibration.store import load_fit, save
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, recipe
 
@@ -19,7 +19,7 @@ def thick(sd_mm: float | None) -> Recipe:
 
 
 @pytest.mark.parametrize("sd_mm", [0.0, 0.004, 0.02])
-def test_both_uncertainties_are_in_it(sd_mm):
+def test_toughness_includes_both_uncertainties(sd_mm):
     """Standard deviations of logarithms add in squares; 3 % is three of the estimate's own."""
     fit = cut_fit(thick(sd_mm), energy=0.5, spread=0.03, draws=6000)
     found = with_toughness(fit, thick(sd_mm), np.random.default_rng(5)).derived[0]
@@ -30,7 +30,7 @@ def test_both_uncertainties_are_in_it(sd_mm):
     assert found.identifiability < 0.2
 
 
-def test_it_is_stated_only_where_the_thickness_is_known_and_something_is_cut():
+def test_toughness_needs_a_thickness_and_a_cut():
     rng = np.random.default_rng(6)
     fit = cut_fit(thick(None))
     assert with_toughness(fit, thick(None), rng) is fit
@@ -38,14 +38,14 @@ def test_it_is_stated_only_where_the_thickness_is_known_and_something_is_cut():
     assert with_toughness(pressed, recipe("press-only"), rng) is pressed
 
 
-def test_it_stands_beside_the_law_and_not_in_it(tmp_path):
+def test_toughness_is_derived_and_not_a_parameter_of_the_law(tmp_path):
     fit = cut_fit(thick(0.005))
     found = with_toughness(fit, thick(0.005), np.random.default_rng(7))
     assert found.parameters == fit.parameters
     assert found.draws is fit.draws
     again = with_toughness(fit, thick(0.005), np.random.default_rng(7))
     assert again.derived == found.derived
-    save_fit(found, tmp_path / "cut.nc")
+    save(found, tmp_path / "cut.nc")
     read = load_fit(tmp_path / "cut.nc")
     assert read.derived == found.derived
     assert np.array_equal(read.derived_draws, found.derived_draws)

@@ -28,11 +28,11 @@ def rig(**changes):
     )
 
 
-def test_nothing_measured_is_four_bounds_and_four_remedies():
+def test_four_unmeasured_quantities_give_four_bounds_and_remedies():
     found, fit = checks()
     for name, remedy in {
         "opening zero": "opening_zero_sd_deg",
-        "torque zero": "idle second",
+        "torque zero": "one second at idle",
         "edge shape": "Photograph the blade",
         "friction by load": "loaded sweeps",
     }.items():
@@ -41,7 +41,7 @@ def test_nothing_measured_is_four_bounds_and_four_remedies():
         assert verdict.limit == "at most"
         assert verdict.threshold == pytest.approx(0.07)
         assert verdict.status == ("pass" if verdict.value <= 0.07 else "not_evaluated")
-        assert verdict.why.startswith("Up to ")
+        assert verdict.why.startswith("Error up to ")
         assert remedy in verdict.why
     assert found["edge shape"].status == "not_evaluated"
     assert not fit.rejected
@@ -49,10 +49,10 @@ def test_nothing_measured_is_four_bounds_and_four_remedies():
     assert [row["share"] for row in rows] == [v.value for v in found.values()]
 
 
-def test_an_edge_known_by_numbers_or_photographs_is_no_unknown():
+def test_an_edge_with_stated_uncertainty_has_no_bound():
     photographed, _ = checks(rig(edge={"source": "photographs"}))
-    believed = with_edge(cut_fit(paper()), "offset_m", "taper_rad")
-    for found in (photographed, checks(fit=believed)[0]):
+    known = with_edge(cut_fit(paper()), "offset_m", "taper_rad")
+    for found in (photographed, checks(fit=known)[0]):
         assert (found["edge shape"].status, found["edge shape"].value) == ("pass", 0.0)
 
 
@@ -99,14 +99,14 @@ def test_turning_a_straight_edge_is_shifting_the_opening():
     assert opened == pytest.approx(turned, rel=1e-3)
 
 
-def test_a_stated_zero_takes_the_place_of_half_a_millimetre():
+def test_a_stated_zero_replaces_half_a_millimetre():
     stated, _ = checks(rig(opening_zero_sd_deg=0.02))
     assert stated["opening zero"].status == "pass"
     assert stated["opening zero"].value < 0.05 * checks()[0]["opening zero"].value
-    assert "half a millimetre" not in stated["opening zero"].why
+    assert "0.5 mm" not in stated["opening zero"].why
 
 
-def test_an_idle_second_takes_the_place_of_the_asymmetry():
+def test_an_idle_second_replaces_the_asymmetry():
     found, _ = checks(recordings=(recording(),))
     fit = checks()[1]
     before = fit.diagnostics["not_measured"][1]["torque_Nm"]
@@ -116,7 +116,7 @@ def test_an_idle_second_takes_the_place_of_the_asymmetry():
     assert torque == pytest.approx(ZERO + 2 * NOISE / np.sqrt(1500), rel=0.2)
 
 
-def test_friction_with_an_offset_of_its_own_renders_no_zero():
+def test_friction_with_an_offset_parameter_has_no_zero_error():
     assert checks(friction=friction_fit())[0]["torque zero"].value == 0.0
 
 

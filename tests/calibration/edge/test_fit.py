@@ -15,8 +15,7 @@ from scissorcal.calibration.edge.model import (
     EdgeEvidence,
     basis_of,
 )
-from scissorcal.calibration.edge.result import BladeResult, SeenOpening
-from scissorcal.calibration.edge.store import load_blade, save_blade
+from scissorcal.calibration.edge.result import BladeResult
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
 from scissorcal.recipe.library import recipe_path
@@ -295,32 +294,6 @@ def test_a_nick_is_found_without_a_scale_too():
 def test_nothing_to_fit_is_said():
     with pytest.raises(InputError, match="nothing to fit"):
         fit_blade([], None, rng=np.random.default_rng(0))
-
-
-def test_a_fit_comes_back_from_its_file(fit, tmp_path):
-    path = tmp_path / "fits" / "blade.json"
-    result = BladeResult((fit,), (SeenOpening("a.jpg", 0.7),), "hash", ("a.jpg",))
-    save_blade(result, path)
-    back = load_blade(path)
-    assert back.inputs_hash == "hash"
-    assert back.openings == result.openings
-    one = back.blades[0]
-    assert one.belief.edge == fit.belief.edge
-    assert one.belief.names == fit.belief.names
-    np.testing.assert_array_equal(one.belief.covariance, fit.belief.covariance)
-    np.testing.assert_array_equal(one.height.mean, fit.height.mean)
-    np.testing.assert_array_equal(one.draws, fit.draws)
-    assert one.nicks == fit.nicks
-    assert one.verdicts == fit.verdicts
-    assert back.belief.edge == fit.belief.edge
-
-
-@pytest.mark.parametrize("text", ["", "{}", '{"format": "scissorcal-blade/1", "blades": [{}]}'])
-def test_a_damaged_file_is_refused(tmp_path, text):
-    path = tmp_path / "blade.json"
-    path.write_text(text)
-    with pytest.raises(InputError, match=r"fit blade"):
-        load_blade(path)
 
 
 def test_many_photographs_take_fewer_cells_each():

@@ -9,6 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.checks import bandwidth_verdict
 from scissorcal.calibration.parameters import Layout, Parameter
+from scissorcal.model.transforms import LOG
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
@@ -77,26 +78,26 @@ def test_a_torque_of_the_wrong_sign_is_named():
 
 
 def test_an_estimate_that_moves_with_the_cutoff_is_named():
-    layout = Layout((Parameter("inertia", "1", "log", 0.0, 1.0, ""),))
+    layout = Layout((Parameter("inertia", "1", LOG, 0.0, 1.0, ""),))
     draws = np.random.default_rng(5).standard_normal((500, 1))
     here = np.zeros(1)
     steady = bandwidth_verdict(layout, draws, here, here + 1.0, (75.0, 91.0))
     assert steady.status == "pass"
     moved = bandwidth_verdict(layout, draws, here, here + 9.0, (75.0, 91.0))
     assert moved.status == "fail"
-    assert "inertia moves by 9" in moved.why
+    assert "inertia changes by 9" in moved.why
 
 
 def test_a_nuisance_that_moves_with_the_cutoff_fails_nothing():
     """The delay of the torque describes the motor's electronics, and is not rendered."""
-    rows = [Parameter(name, "1", "log", 0.0, 1.0, "") for name in ("inertia", "delay")]
+    rows = [Parameter(name, "1", LOG, 0.0, 1.0, "") for name in ("inertia", "delay")]
     draws = np.random.default_rng(5).standard_normal((500, 2))
     here = np.zeros(2)
     moved = bandwidth_verdict(
         Layout(tuple(rows)), draws, here, here + np.array([1.0, 9.0]), (75.0, 91.0)
     )
     assert moved.status == "pass"
-    assert "inertia moves" in moved.why
+    assert "inertia changes" in moved.why
 
 
 def test_windows_too_short_for_the_encoder_are_lengthened():

@@ -7,8 +7,10 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.cogging import FALSE_ALARM, find_cogging
-from scissorcal.calibration.friction.model import design, friction_law
+from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.signals.weak_form import weigh
+from scissorcal.model import FrictionLaw
+from scissorcal.recipe.priors import JointPriors
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
@@ -28,7 +30,8 @@ def searched(recording: Recording):
     every = weigh((recording,), 75.0)
     windows = every.where(every.bins.moving)
     strokes = windows.bins.stroke
-    return find_cogging(design(windows, strokes, "coulomb", False, recording.joint).moments)
+    plain = design(windows, strokes, "coulomb", False, recording.joint, JointPriors())
+    return find_cogging(plain.moments)
 
 
 @pytest.mark.parametrize("seed", range(15))
@@ -71,8 +74,8 @@ def test_its_size_is_fitted_with_friction_and_is_no_friction():
     assert any("packages do not render it" in note for note in fit.notes)
     assert not {"cogging_cos", "cogging_sin"} & {one.name for one in fit.parameters}
     values = {one.name: np.asarray(one.mean) for one in (*fit.parameters, *fit.nuisance)}
-    law = friction_law(values, float(fit.structure["angle_center"]))
-    assert law.terms == ()
+    law = FrictionLaw.of_fit(values, float(fit.structure["angle_center"]))
+    assert {term.name for term in law.terms} == {"coulomb", "viscous"}
     plain = fit_friction((clean,), SIMPLE, effort="draft", rng=np.random.default_rng(6))
     for name in ("coulomb_pos", "coulomb_neg"):
         assert fit.parameter(name).mean == pytest.approx(plain.parameter(name).mean, rel=0.01)

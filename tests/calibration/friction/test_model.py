@@ -22,19 +22,19 @@ def fitted():
 
 def test_the_fit_again_from_its_design_is_the_fit(fitted):
     fit, experiment = fitted
-    rung = pickle.loads(pickle.dumps(experiment)).candidate(experiment.observed)
-    assert rung.name == fit.rung
-    optimum = rung.optimum(experiment.series)
-    wanted = [i for i, n in enumerate(rung.layout.names) if n not in experiment.nuisance]
-    natural = rung.layout.columns(optimum.point)[wanted]
+    candidate = pickle.loads(pickle.dumps(experiment)).candidate(experiment.observed)
+    assert candidate.name == fit.rung
+    optimum = candidate.optimum(experiment.series)
+    wanted = [i for i, n in enumerate(candidate.layout.names) if n not in experiment.nuisance]
+    natural = candidate.layout.columns(optimum.point)[wanted]
     assert natural == pytest.approx(fit.map_point, rel=1e-6)
 
 
 def test_the_search_over_products_ends_where_a_search_over_bins_does(fitted):
     _, experiment = fitted
-    rung = experiment.candidate(experiment.observed)
-    slow = find_optimum(rung.problem(experiment.series))
-    assert rung.optimum(experiment.series).value > slow.value - 1e-3
+    candidate = experiment.candidate(experiment.observed)
+    slow = find_optimum(candidate.problem(experiment.series))
+    assert candidate.optimum(experiment.series).value > slow.value - 1e-3
 
 
 def test_simulated_data_have_the_priors_of_the_original(fitted):

@@ -9,6 +9,7 @@ from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.inference.curvature import gradient
+from scissorcal.recipe.priors import JointPriors
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from tests.calibration.truth import Truth, friction_recording
@@ -38,20 +39,20 @@ def windows():
 def experiment(windows, law: str, symmetric: bool = False, cogging: float = 120.0):
     joint = friction_recording(Truth(), np.random.default_rng(1)).joint
     strokes = windows.bins.stroke
-    return design(windows, strokes, law, symmetric, joint, ("rate^2",), cogging)
+    return design(windows, strokes, law, symmetric, joint, JointPriors(), ("rate^2",), cogging)
 
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("symmetric", [False, True])
 def test_products_give_the_likelihood_of_the_bins(windows, law, symmetric):
     one = experiment(windows, law, symmetric)
-    rung = one.candidate(one.observed)
-    reduced, layout = rung.reduced, rung.layout
+    candidate = one.candidate(one.observed)
+    reduced, layout = candidate.reduced, candidate.layout
     rng = np.random.default_rng(3)
-    draws = rung.starts[0] + 0.3 * layout.sd * rng.standard_normal((4, len(layout.names)))
+    draws = candidate.starts[0] + 0.3 * layout.sd * rng.standard_normal((4, len(layout.names)))
     by_stroke = reduced.by_stroke(draws)
     for draw, sums in zip(draws, by_stroke, strict=True):
-        terms = rung.likelihood.terms(draw)
+        terms = candidate.likelihood.terms(draw)
         assert reduced.log_likelihood(draw) == pytest.approx(terms.sum(), rel=1e-9)
         assert sums == pytest.approx(
             [terms[one.strokes == k].sum() for k in np.unique(one.strokes)], rel=1e-8
@@ -61,8 +62,8 @@ def test_products_give_the_likelihood_of_the_bins(windows, law, symmetric):
 @pytest.mark.parametrize("law", LAWS)
 def test_slopes_are_those_of_the_likelihood(windows, law):
     one = experiment(windows, law)
-    rung = one.candidate(one.observed)
-    reduced, point = rung.reduced, rung.starts[0]
+    candidate = one.candidate(one.observed)
+    reduced, point = candidate.reduced, candidate.starts[0]
     step = 1e-3 * np.ones(len(point))
     wanted = gradient(lambda u: np.array([reduced.log_likelihood(u)]), point, step)[0]
     assert reduced.slope(point) == pytest.approx(wanted, rel=1e-4, abs=1e-3 * np.abs(wanted).max())
@@ -70,10 +71,10 @@ def test_slopes_are_those_of_the_likelihood(windows, law):
 
 def test_leaving_strokes_out_is_leaving_their_bins_out(windows):
     one = experiment(windows, "stribeck+angle")
-    rung = one.candidate(one.observed)
-    point, gone = rung.starts[0], np.unique(one.strokes)[::3]
-    terms = rung.likelihood.terms(point)[~np.isin(one.strokes, gone)]
-    rest = rung.reduced.without(gone)
+    candidate = one.candidate(one.observed)
+    point, gone = candidate.starts[0], np.unique(one.strokes)[::3]
+    terms = candidate.likelihood.terms(point)[~np.isin(one.strokes, gone)]
+    rest = candidate.reduced.without(gone)
     assert rest.log_likelihood(point) == pytest.approx(terms.sum(), rel=1e-9)
     assert rest.counted == len(terms)
 
@@ -105,9 +106,9 @@ def test_the_scan_finds_a_length_far_from_every_start(length):
     windows = every.where(every.bins.moving)
     ways = np.sign(windows.bins.rate)
     strokes = np.cumsum(np.diff(ways, prepend=ways[:1]) != 0)
-    one = design(windows, strokes, "coulomb+presliding", True, recording.joint)
-    rung = one.candidate(one.observed)
-    problem = rung.problem(one.series)
+    one = design(windows, strokes, "coulomb+presliding", True, recording.joint, JointPriors())
+    candidate = one.candidate(one.observed)
+    problem = candidate.problem(one.series)
     found = search(problem)
     values = one.layout.natural(found.point)
     assert float(values["presliding_length"]) == pytest.approx(length, rel=0.1)

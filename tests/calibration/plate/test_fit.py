@@ -8,7 +8,6 @@ import pytest
 
 from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
 from scissorcal.calibration.plate.result import PlateFit
-from scissorcal.calibration.plate.store import load_plate, save_plate
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.geometry.camera import Camera
@@ -84,7 +83,7 @@ def test_the_pose_is_recovered(board: MarkedBoard, tilt: float) -> None:
     assert verdict(fit, "rig frame") == "not_evaluated"
 
 
-def test_how_the_target_lies_on_the_plate_is_taken_off(
+def test_the_targets_place_on_the_plate_is_removed(
     still: tuple[Pose, list[PlatePhoto]],
 ) -> None:
     truth, photos = still
@@ -96,7 +95,7 @@ def test_how_the_target_lies_on_the_plate_is_taken_off(
     assert fit.camera_plate.matrix[2, 2] < 0, "the plate's upper face looks at the camera"
 
 
-def test_a_moved_plate_is_noticed_and_named(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_moved_plate_is_detected_and_named(still: tuple[Pose, list[PlatePhoto]]) -> None:
     """Moved a little (its corners still count), and far (they are left out)."""
     truth, photos = still
     for moved_m in (3e-4, 5e-3):
@@ -110,7 +109,7 @@ def test_a_moved_plate_is_noticed_and_named(still: tuple[Pose, list[PlatePhoto]]
     assert verdict(fit_plate(photos, SURE), "at rest") == "pass"
 
 
-def test_one_photograph_cannot_show_that_nothing_moved(
+def test_one_photograph_leaves_motion_not_evaluated(
     still: tuple[Pose, list[PlatePhoto]],
 ) -> None:
     truth, photos = still
@@ -130,7 +129,7 @@ def test_one_small_marker_square_on_is_ambiguous() -> None:
     assert verdict(fit, "size") == "fail"
 
 
-def test_a_camera_that_does_not_hold_is_told(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_wrong_camera_fails_the_checks(still: tuple[Pose, list[PlatePhoto]]) -> None:
     """Grossly: corners do not fit. Slightly: both sides of the target claim other poses."""
     _, photos = still
     fit = fit_plate(photos, SURE)
@@ -166,26 +165,6 @@ def test_another_target_is_named() -> None:
     )
     with pytest.raises(InputError, match="shows the blade mat, not the plate board"):
         find_board(photo_of(picture), PLATE_BOARD)
-
-
-def test_what_is_stored_comes_back(still: tuple[Pose, list[PlatePhoto]], tmp_path: Path) -> None:
-    fit = fit_plate(still[1], SURE, inputs_hash="abc")
-    path = tmp_path / "fits" / "plate.json"
-    save_plate(fit, path)
-    again = load_plate(path)
-    for pose, stored in ((fit.camera_plate, again.camera_plate), (fit.other, again.other)):
-        assert (pose is None) == (stored is None)
-        if pose and stored:
-            assert pose.quaternion == stored.quaternion
-            assert pose.translation_m == stored.translation_m
-    assert np.array_equal(fit.camera_plate.covariance, again.camera_plate.covariance)  # type: ignore[arg-type]
-    assert again.verdicts == fit.verdicts
-    assert again.halves == fit.halves
-    assert [view.name for view in again.views] == [photo.name for photo in still[1]]
-    assert [file.name for file in path.parent.iterdir()] == ["plate.json"]
-    path.write_text(path.read_text()[:400])
-    with pytest.raises(InputError, match=r"plate\.json is not a plate's pose .* or it is damaged"):
-        load_plate(path)
 
 
 def test_a_slanted_marker_is_measured_within_its_own_border() -> None:

@@ -25,7 +25,7 @@ def recording(idle_s: float = 1.5, command: float = 0.02, creep: float = 0.0) ->
     return Recording("cut", samples, source="cut.mcap")
 
 
-def test_an_idle_second_tells_the_zero_of_the_drive():
+def test_an_idle_second_gives_the_drives_zero():
     drive = idle_zero((recording(),))
     assert abs(drive.mean - ZERO) < 3 * drive.sd
     assert drive.sd == pytest.approx(NOISE / np.sqrt(1500), rel=0.5)
@@ -37,5 +37,5 @@ def test_an_idle_second_tells_the_zero_of_the_drive():
     [{"idle_s": 0.5}, {"creep": 1e-5}, {"command": 0.0}],
     ids=["too short", "the blades creep", "nothing says when motors were off"],
 )
-def test_what_is_no_idle_second_tells_nothing(changes):
+def test_without_an_idle_second_there_is_no_zero(changes):
     assert idle_zero((recording(**changes),)) is None

@@ -37,7 +37,7 @@ def test_a_clean_recording_keeps_every_sample_and_its_step_is_known(clean):
     opening, torque = channels_of(clean)
     assert opening.step == pytest.approx(5e-5)
     assert np.isnan(torque.step)
-    assert any("opening comes in steps of 5e-05 rad" in note for note in found.notes)
+    assert any("opening has a resolution of 5e-05 rad" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -58,9 +58,9 @@ def test_saturated_samples_are_found_and_left_out(clean):
     assert any("at an end of its range" in note for note in found.notes)
 
 
-def test_a_fit_to_a_saturated_sensor_says_so_and_is_no_calibration(clean):
-    spoilt = clipped(clean, 0.0155)
-    fit = fit_friction((spoilt,), SIMPLE, effort="draft", rng=np.random.default_rng(2))
+def test_a_fit_to_a_saturated_sensor_fails(clean):
+    invalid = clipped(clean, 0.0155)
+    fit = fit_friction((invalid,), SIMPLE, effort="draft", rng=np.random.default_rng(2))
     (verdict,) = [v for v in fit.verdicts if v.check == "sensors"]
     assert verdict.status == "fail"
     assert "larger range" in verdict.why
@@ -85,16 +85,16 @@ def test_a_noiseless_plateau_is_not_called_saturation():
     assert np.all(found.usable[0])
 
 
-def test_flags_of_the_device_count_and_a_silent_channel_is_named(clean):
+def test_device_flags_invalidate_samples_and_a_constant_channel_is_named(clean):
     samples = clean.samples.copy()
     samples["flags"][5000:5100] = 64
     samples["motor_torque"] = 0.25
     found = inspect_sensors((dataclasses.replace(clean, samples=samples),))
     assert not np.any(found.usable[0][5000:5100])
-    assert any("motor_torque is 0.25 N m throughout" in note for note in found.notes)
+    assert any("motor_torque is constant at 0.25 N m" in note for note in found.notes)
 
 
-def test_a_step_is_seen_and_a_smooth_channel_has_none():
+def test_a_resolution_is_found_only_in_a_quantised_channel():
     rng = np.random.default_rng(4)
     smooth = np.cumsum(rng.standard_normal(5000))
     assert resolution_of(np.round(smooth / 0.25) * 0.25) == pytest.approx(0.25)
@@ -102,7 +102,7 @@ def test_a_step_is_seen_and_a_smooth_channel_has_none():
     assert np.isnan(resolution_of(np.full(100, 2.0)))
 
 
-def test_near_zero_rates_are_said_to_be_left_out(clean):
+def test_a_note_states_that_near_zero_rates_are_left_out(clean):
     fit = fit_friction((clean,), SIMPLE, effort="draft", rng=np.random.default_rng(5))
     assert any("leave the direction open" in note for note in fit.notes)
 

@@ -47,7 +47,7 @@ def test_white_noise_has_no_slow_part():
     assert found.slow_Nm**2 < 0.02 * found.white_Nm**2
 
 
-def test_a_momentum_that_the_torque_gave_is_no_noise():
+def test_momentum_from_the_torque_is_not_noise():
     """Torque that moves the joint is inertia times its change of rate, whatever its spectrum."""
     rng = np.random.default_rng(2)
     torque = 0.01 * np.sin(np.arange(50000) * 0.05)
@@ -70,7 +70,7 @@ def test_variance_of_a_mean_follows_the_covariance():
     assert noise.variance_of_mean(50, TICK_S) == pytest.approx(covariance.mean())
 
 
-def test_strokes_that_lie_apart_are_seen_and_others_are_not():
+def test_differing_strokes_are_detected_and_equal_ones_are_not():
     windows = weigh((friction_recording(Truth(), np.random.default_rng(1)),), 75.0)
     windows = windows.where(windows.bins.moving)
     rng = np.random.default_rng(3)
@@ -85,7 +85,7 @@ def test_strokes_that_lie_apart_are_seen_and_others_are_not():
     assert np.isnan(stroke_offsets(residuals, strokes, windows, None))
 
 
-def test_a_friction_fit_says_its_noise():
+def test_a_friction_fit_stores_its_noise():
     settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
     recording = friction_recording(Truth(), np.random.default_rng(1))
     fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(2))

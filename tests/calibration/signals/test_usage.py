@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.signals.sensors import inspect_sensors
-from scissorcal.calibration.signals.usage import EDGE, GAP, SLOW, SPOILT, usage_of_windows
+from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, usage_of_windows
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
@@ -32,7 +32,7 @@ def test_every_second_is_used_or_has_a_reason(recording):
     used = sum(row.used_s for row in usage.rows)
     assert used == pytest.approx(np.count_nonzero(every.bins.moving) * 0.005)
     reasons = {name for row in usage.rows for name in row.reasons}
-    assert reasons == {GAP, EDGE, SPOILT, SLOW}
+    assert reasons == {GAP, EDGE, INVALID, SLOW}
     lost = sum(row.reasons.get(GAP, 0.0) for row in usage.rows)
     assert lost == pytest.approx(0.1), "the piece of 0.1 s between the two gaps"
     strokes = {row.stroke for row in usage.rows}
@@ -44,9 +44,9 @@ def test_the_speed_that_is_hardly_used_is_named(recording):
     slow = min(stroke.speed for stroke in recording.strokes if np.isfinite(stroke.speed))
     lost = np.isin(samples["stroke"], [s.index for s in recording.strokes if s.speed == slow])
     samples["flags"][lost] = 64
-    spoilt = dataclasses.replace(recording, samples=samples)
-    sensors = inspect_sensors((spoilt,))
-    every = weigh((spoilt,), 75.0, sensors.usable)
-    sentence = usage_of_windows((spoilt,), every, sensors.usable).sentence
+    invalid = dataclasses.replace(recording, samples=samples)
+    sensors = inspect_sensors((invalid,))
+    every = weigh((invalid,), 75.0, sensors.usable)
+    sentence = usage_of_windows((invalid,), every, sensors.usable).sentence
     assert f"at {slow:.3g} per s: 0 s of" in sentence
-    assert "sensor spoilt" in sentence
+    assert "invalid sensor value" in sentence

@@ -1,4 +1,4 @@
-"""Windows: the weak form is exact, both sides are treated alike, rests and spoilt samples go."""
+"""Windows: the weak form is exact, both sides are treated alike, rests and invalid samples go."""
 
 import dataclasses
 
@@ -12,6 +12,7 @@ from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 from scissorcal.model.friction import angle_factor
+from scissorcal.model.friction_terms import law_names, terms_of
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 
@@ -81,13 +82,7 @@ def law_and_values(rng) -> tuple[FrictionLaw, dict[str, float]]:
         )
     }
     values["presliding_share"] = float(rng.uniform(0, 1))
-    fields = {name: value for name, value in values.items() if name in FrictionLaw.__annotations__}
-    law = FrictionLaw(
-        **fields,
-        angle_center=0.4,
-        terms=("rate^2", "sin(opening)"),
-        coefficients=(values["rate^2"], values["sin(opening)"]),
-    )
+    law = FrictionLaw(values, angle_center=0.4)
     return law, values
 
 
@@ -103,7 +98,7 @@ def test_the_basis_is_the_law_at_every_sample_and_weighed(seed):
     law, values = law_and_values(rng)
     state = presliding_state(windows.opening, values["presliding_length"])
     exact = friction_torque(law, windows.opening, windows.rate, windows.load, state)
-    basis = FrictionBasis(windows, 0.4, angle=True, terms=("rate^2", "sin(opening)"))
+    basis = FrictionBasis(windows, 0.4, terms_of(law_names()[-1], ("rate^2", "sin(opening)")))
     found = basis({name: np.asarray(value) for name, value in values.items()})
     coupled = values["presliding_share"] * values["stribeck"]
     coupled *= np.abs(angle_factor(law, windows.opening)).max()
@@ -143,7 +138,7 @@ def test_sticking_and_slipping_in_one_direction_is_a_row_of_rests():
     assert np.count_nonzero(bins.moving) > 200
 
 
-def test_windows_with_spoilt_samples_do_not_count():
+def test_windows_with_invalid_samples_do_not_count():
     time = np.arange(4000) / 1000
     one = recording(np.sin(time), np.cos(time))
     usable = np.ones(4000, dtype=bool)
@@ -154,7 +149,7 @@ def test_windows_with_spoilt_samples_do_not_count():
     assert np.all(windows.bins.moving[~touches & (windows.bins.rate > 0.5)])
 
 
-def test_held_drives_are_known_by_their_commands():
+def test_held_drives_are_recognised_by_their_commands():
     time = np.arange(1000) / 1000
     held = recording(np.sin(time), np.cos(time), commands=np.cos(time))
     assert weigh((held,), 75.0).held

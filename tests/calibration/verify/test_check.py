@@ -52,7 +52,7 @@ def status(result: VerifyResult) -> dict[str, str]:
     return {verdict.check: verdict.status for verdict in result.verdicts}
 
 
-def test_intervals_that_allow_for_the_noise_pass_and_those_that_do_not_are_found_out():
+def test_intervals_with_the_right_noise_pass_and_others_fail():
     """Noise of rho 0.8 makes naive intervals too narrow by 3."""
     _, right = checked(made(0.8), ("sbc",), 40)
     assert status(right) == {"calibration": "pass", "refits": "pass"}
@@ -79,7 +79,7 @@ def test_a_rig_that_changes_between_strokes_fails_the_halves():
     """Later strokes have another level, and the halves' standard deviations do not know of it."""
     _, result = checked(made(0.0, naive=True, change=0.3), ("halves",))
     assert status(result)["halves"] == "fail"
-    assert "changes between strokes" in result.verdicts[0].why
+    assert "law or rig change between strokes" in result.verdicts[0].why
 
 
 def test_a_local_prior_is_as_wide_as_stated_and_never_wider_than_the_recipes():
@@ -114,7 +114,7 @@ class Refusing(LinearSimulator):
         return cast(FitResult, SimpleNamespace(**other))
 
 
-def test_refusals_count_and_other_laws_are_ranked_by_what_they_share():
+def test_refused_data_count_and_other_laws_rank_common_quantities():
     experiment = made(0.0)
     plain = study_of(experiment, 0.0)
     made_of = plain.simulator
@@ -135,10 +135,10 @@ def test_refusals_count_and_other_laws_are_ranked_by_what_they_share():
     assert [q.name for q in result.calibration.quantities] == ["offset", "level"]
     verdict = next(v for v in result.verdicts if v.check == "refits")
     assert verdict.status == "fail"
-    assert "100.0% took another law" in verdict.why
+    assert "100.0% chose another candidate" in verdict.why
 
 
-def test_a_fit_that_breaks_is_counted_with_its_sentence():
+def test_a_failing_fit_is_counted_with_its_message():
     experiment = made(0.0)
     study = study_of(experiment)
     hopeless = Generating("local", 3.0, np.full(4, np.inf), np.eye(4))
@@ -148,7 +148,7 @@ def test_a_fit_that_breaks_is_counted_with_its_sentence():
     assert all("broken" in record for record in records)
     result = assess(study, fit_of(experiment), ("sbc",), records)
     assert status(result) == {"calibration": "not_evaluated"}
-    assert "Every simulated fit broke" in result.not_done[0]
+    assert "Every simulated fit failed" in result.not_done[0]
 
 
 def test_equal_seeds_give_equal_fits_and_other_indices_others():
@@ -159,7 +159,7 @@ def test_equal_seeds_give_equal_fits_and_other_indices_others():
     assert one["truths"] == again["truths"] != other["truths"]
 
 
-def test_a_fit_without_its_nuisance_draws_is_to_be_made_again():
+def test_a_fit_without_nuisance_draws_must_be_repeated():
     experiment = made(0.0)
     fit = fit_of(experiment)
     fit.__dict__["nuisance_draws"] = None

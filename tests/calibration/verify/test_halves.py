@@ -38,7 +38,7 @@ def test_both_halves_see_every_speed_in_every_direction():
         assert len(set(split.first[strokes == label])) == 1, "strokes stay whole"
 
 
-def test_without_repeats_speeds_alternate_against_direction_and_an_excitation_is_parted():
+def test_without_repeats_speeds_alternate_by_direction_and_an_excitation_is_split():
     strokes = np.repeat(np.arange(9), 40)
     split = split_strokes(strokes, facts(1, excitation=True))
     assert split is not None
@@ -66,7 +66,7 @@ def test_recordings_stay_whole_before_sheets_and_speeds():
     assert split.words == "whole recordings, 2 of 3 in one half"
 
 
-def test_one_stroke_cannot_be_parted():
+def test_one_stroke_cannot_be_split():
     assert split_strokes(np.zeros(10, dtype=int), [StrokeFacts(0, "closing", 0.1)]) is None
 
 
@@ -81,7 +81,7 @@ def halves_of_a_linear_model(rng, truth, prior_precision, widths, count=2000):
     return found
 
 
-def test_differences_are_as_large_as_claimed_although_a_strong_prior_is_shared():
+def test_differences_match_their_covariance_with_a_strong_common_prior():
     """300 draws from prior and data: p-values uniform (Kolmogorov, 1 in 10000), z of unit size."""
     from scipy.stats import kstest
 
@@ -102,7 +102,7 @@ def test_differences_are_as_large_as_claimed_although_a_strong_prior_is_shared()
     assert np.std(z, axis=0) == pytest.approx([1, 1, 1], abs=0.13)
 
 
-def test_halves_that_claim_too_much_are_found_out():
+def test_overconfident_halves_are_detected():
     rng = np.random.default_rng(2)
     width = 0.1 * np.eye(4)
     alarms = []
@@ -126,7 +126,7 @@ def test_few_independent_observations_are_allowed_for():
     assert np.mean(alarms) < 0.07
 
 
-def test_directions_that_only_repeat_the_prior_tell_nothing():
+def test_directions_that_only_repeat_the_prior_are_left_out():
     prior = np.eye(2)
     silent = HalfFit(np.zeros(2), np.diag([1.0, 0.01]), 100.0)
     found = compare(silent, HalfFit(np.array([0.0, 0.05]), silent.covariance, 100.0), prior)

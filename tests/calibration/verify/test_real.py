@@ -11,7 +11,7 @@ from tests.calibration.friction.test_fit import emps
 
 
 @pytest.mark.slow
-def test_emps_is_calibrated_at_its_own_size_and_its_halves_agree():
+def test_emps_is_calibrated_and_its_halves_agree():
     """30 fits, 1 % of false alarms. What the law lacks repeats: halves differ less than claimed."""
     recording = emps()
     settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")

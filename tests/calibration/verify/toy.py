@@ -12,6 +12,7 @@ from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
+from scissorcal.model.transforms import IDENTITY, LOG
 
 Array = NDArray[np.float64]
 
@@ -26,16 +27,16 @@ def columns() -> Array:
 
 LAYOUT = Layout(
     (
-        Parameter("offset", "N m", "identity", 0.0, 3.0, ""),
-        Parameter("slope", "N m", "identity", 0.0, 3.0, ""),
-        Parameter("level", "N m", "log", 0.0, 1.0, ""),
-        Parameter("noise", "N m", "log", -1.0, 2.0, ""),
+        Parameter("offset", "N m", IDENTITY, 0.0, 3.0, ""),
+        Parameter("slope", "N m", IDENTITY, 0.0, 3.0, ""),
+        Parameter("level", "N m", LOG, 0.0, 1.0, ""),
+        Parameter("noise", "N m", LOG, -1.0, 2.0, ""),
     )
 )
 
 
 class Naive(Candidate):
-    """A rung whose fit takes every bin for independent, whatever the noise."""
+    """A candidate whose fit takes every bin for independent, whatever the noise."""
 
     def problem(self, *given: Any, **named: Any) -> Problem:
         return replace(super().problem(*given, **named), independent=True)
@@ -94,13 +95,15 @@ class LinearSimulator:
         self, data: Array, prior: StatedPrior, effort: Effort, rng: np.random.Generator
     ) -> FitResult:
         experiment = replace(self.experiment, observed=data)
-        rung = experiment.candidate(data)
-        rung = replace(
-            rung,
+        candidate = experiment.candidate(data)
+        candidate = replace(
+            candidate,
             prior_mean=prior.layout(LAYOUT).mean,
-            prior_precision=prior.precision(LAYOUT, rung.prior_precision),
+            prior_precision=prior.precision(LAYOUT, candidate.prior_precision),
         )
-        return as_fit(experiment, infer(rung.problem(experiment.series), effort, rng, count=600))
+        return as_fit(
+            experiment, infer(candidate.problem(experiment.series), effort, rng, count=600)
+        )
 
 
 def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
@@ -114,7 +117,7 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
     facts: dict[str, Any] = {
         "what": "friction",
         "effort": "standard",
-        "rung": "linear",
+        "candidate": "linear",
         "structure": {},
         "verdicts": (),
         "parameters": fitted[:3],

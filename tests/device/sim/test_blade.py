@@ -81,7 +81,7 @@ def test_an_edge_that_never_comes_up_has_no_crossing() -> None:
     assert parallel.crossing(0.15) == math.inf
 
 
-def test_closing_edges_that_open_towards_the_tip_pull_no_crack() -> None:
+def test_edges_that_open_towards_the_tip_do_not_advance_the_crack() -> None:
     blade = BladeOnSheet(specimen(blade={"taper_deg": -10.0}))
     assert blade.touch(0.15, 0.03).drive < 0.0
 

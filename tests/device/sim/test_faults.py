@@ -17,7 +17,7 @@ def test_all_faults_are_read() -> None:
 @pytest.mark.parametrize(
     "word", ["drop", "dorp=0.1", "drop=", "drop=two", "drop=1.5", "drop=nan", "delay=-1", "=1", ""]
 )
-def test_words_that_make_no_sense_are_refused(word: str) -> None:
+def test_invalid_options_are_refused(word: str) -> None:
     with pytest.raises(InputError, match="drop=P"):
         parse_faults([word])
 
@@ -32,7 +32,7 @@ def test_a_fault_given_twice_is_refused() -> None:
     delay=st.floats(0, 1e6),
     unplug=st.none() | st.floats(0, 1e6),
 )
-def test_faults_survive_the_way_through_a_command_line(
+def test_faults_are_passed_on_a_command_line_unchanged(
     drop: float, delay: float, unplug: float | None
 ) -> None:
     faults = Faults(drop_share=drop, delay_ms=delay, unplug_s=unplug)

@@ -26,7 +26,7 @@ def test_stiction_holds_up_to_breakaway_and_not_beyond() -> None:
         assert advance(FRICTION, 0.0, 1.001 * breakaway) * sign > 0.0
 
 
-def test_stiction_holds_for_ever_without_creep() -> None:
+def test_stiction_holds_without_creep() -> None:
     rate = place = 0.0
     for _ in range(10_000):
         rate = advance(FRICTION, rate, 0.9 * 0.017 * FRICTION.factor(place), place)
@@ -75,7 +75,7 @@ def test_a_body_on_a_spring_comes_to_rest_and_stays() -> None:
     stribeck_rate=st.floats(1e-3, 10),
     brake=st.floats(0, 1),
 )
-def test_friction_only_ever_takes_energy(
+def test_friction_only_dissipates_energy(
     rate: float,
     torque: float,
     coulomb: float,

@@ -58,7 +58,7 @@ def test_equal_seeds_give_equal_bytes() -> None:
     assert run(7) != run(8)
 
 
-def test_configuration_gets_through_a_bad_line() -> None:
+def test_configuration_succeeds_on_a_line_with_losses() -> None:
     link = link_of(3, Faults(drop_share=0.3, garble_share=0.2, delay_ms=16.0))
     for _ in range(10):
         link.configure(ConfigKey.STREAM, 1.0)
@@ -67,7 +67,7 @@ def test_configuration_gets_through_a_bad_line() -> None:
     assert link.garbled > 0
 
 
-def test_refusals_and_unknown_keys_are_sentences() -> None:
+def test_refusals_and_unknown_keys_are_errors_with_reasons() -> None:
     with link_of() as link:
         with pytest.raises(DeviceError, match="refused STREAM"):
             link.configure(ConfigKey.STREAM, 3.0)
@@ -75,12 +75,12 @@ def test_refusals_and_unknown_keys_are_sentences() -> None:
             link.configure(0x4444, 1.0)
 
 
-def test_a_dead_line_is_reported() -> None:
+def test_a_line_error_is_reported() -> None:
     with pytest.raises(DeviceError, match="did not answer"):
         link_of(1, Faults(drop_share=1.0))
 
 
-def test_an_unplugged_rig_raises_and_stays_away() -> None:
+def test_an_unplugged_rig_raises_on_every_call() -> None:
     link = link_of(1, Faults(unplug_s=0.1))
     link.configure(ConfigKey.STREAM, 1.0)
 

@@ -84,7 +84,7 @@ def test_hello_is_answered_with_an_identity() -> None:
     assert identity.tick_us == 1000
 
 
-def test_nothing_is_said_before_streaming() -> None:
+def test_nothing_is_sent_before_streaming() -> None:
     host = Host()
     for _ in range(5):
         host.device.tick()
@@ -114,7 +114,7 @@ def test_states_count_ticks_and_the_devices_own_time(host: Host) -> None:
         (0x1234, 1.0, ConfigStatus.UNKNOWN_KEY),
     ],
 )
-def test_configuration_is_echoed_with_what_is_in_force(
+def test_configuration_is_echoed_with_the_value_in_force(
     key: int, value: float, status: ConfigStatus
 ) -> None:
     host = Host()
@@ -141,7 +141,7 @@ def test_a_fresh_sheet_starts_uncut(host: Host) -> None:
     assert host.rig.crack == 0.0
 
 
-def test_material_is_refused_while_the_blades_are_in_the_way(host: Host) -> None:
+def test_material_is_refused_while_the_blades_block_it(host: Host) -> None:
     host.rig.joint.place, host.rig.sledge.place = 0.2, 0.0
     echo = host.set(ConfigKey.MATERIAL, 1.0)
     assert echo.status == ConfigStatus.VALUE_REFUSED
@@ -181,20 +181,20 @@ def test_silence_brakes_and_latches_until_the_fault_is_cleared(host: Host) -> No
     assert state.flags == StateFlag.MOTOR_ENABLED
 
 
-def test_a_host_that_disables_first_may_go_quiet(host: Host) -> None:
+def test_without_enable_silence_is_no_fault(host: Host) -> None:
     host.tick(Command(ENABLE, 0, 0.01, 0.0))
     host.tick(Command(0, 0, 0.0, 0.0))
     assert [host.tick().flags for _ in range(100)] == [0] * 100
 
 
-def test_a_longer_patience_can_be_asked_for(host: Host) -> None:
+def test_the_timeout_can_be_raised(host: Host) -> None:
     host.set(ConfigKey.BRAKE_AFTER_MS, 50.0)
     host.tick(Command(ENABLE, 0, 0.01, 0.0))
     flags = [host.tick().flags for _ in range(60)]
     assert flags.index(StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST) == 49
 
 
-def test_commands_that_are_not_finite_are_no_commands(host: Host) -> None:
+def test_commands_that_are_not_finite_are_ignored(host: Host) -> None:
     host.tick(Command(ENABLE, 0, 0.01, 0.0))
     for _ in range(15):
         state = host.tick(Command(ENABLE, 0, float("nan"), 0.0))
@@ -202,7 +202,7 @@ def test_commands_that_are_not_finite_are_no_commands(host: Host) -> None:
     assert state.flags & StateFlag.COMMANDS_LOST
 
 
-def test_noise_on_the_line_is_counted_and_survived(host: Host) -> None:
+def test_noise_on_the_line_is_counted_and_skipped(host: Host) -> None:
     rng = np.random.default_rng(4)
     for _ in range(200):
         host.device.receive(rng.integers(0, 256, 40, dtype=np.uint8).tobytes())
@@ -241,7 +241,7 @@ def test_delayed_frames_come_late_and_in_order() -> None:
     assert heard == list(range(1, 85))
 
 
-def test_a_stuck_encoder_freezes_then_is_noticed_and_latches() -> None:
+def test_a_stuck_encoder_is_constant_then_detected_and_latches() -> None:
     host = Host(Faults(stuck_encoder_s=0.05))
     host.set(ConfigKey.STREAM, 1.0)
     drive = Command(ENABLE | CommandFlag.CLEAR_FAULT, 0, 0.1, 0.0)

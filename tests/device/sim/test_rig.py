@@ -27,7 +27,7 @@ def hand_strokes(rig: VirtualRig, speed: float, strokes: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["office-paper", "cotton-cloth", "soft-pad"])
-def test_the_energy_books_balance(name: str) -> None:
+def test_the_energies_balance(name: str) -> None:
     rig = rig_of(load_specimen(name))
     assert rig.load_sheet()
     hand_strokes(rig, 0.5, 2)
@@ -44,7 +44,7 @@ def test_the_energy_books_balance(name: str) -> None:
         assert min(book.fracture, book.arrest, book.damping, book.friction) >= 0.0
 
 
-def test_an_elastic_pad_gives_back_what_it_took() -> None:
+def test_an_elastic_pad_returns_its_energy() -> None:
     """No friction, no damping: blades thrown at a pad come back with the energy they had."""
     truth = specimen(
         mechanism={"friction": NO_FRICTION, "advance": {"coulomb_N": 1e3}},
@@ -151,7 +151,7 @@ def test_equal_seeds_give_equal_rigs_and_others_do_not() -> None:
     assert run(3) != run(4)
 
 
-def test_the_hand_cuts_moves_on_and_lets_go() -> None:
+def test_the_hand_cuts_advances_and_releases() -> None:
     rig = rig_of(load_specimen("office-paper"))
     assert rig.load_sheet()
     hand_strokes(rig, 0.6, 3)
@@ -181,7 +181,7 @@ def test_the_hand_moves_on_without_any_sheet() -> None:
     assert max(places) - min(places) > 0.02
 
 
-def test_the_hand_presses_a_pad_no_deeper_than_it_means_to() -> None:
+def test_the_hand_presses_a_pad_to_the_intended_depth() -> None:
     truth = load_specimen("soft-pad")
     rig = rig_of(truth)
     assert rig.load_sheet()
@@ -194,7 +194,7 @@ def test_the_hand_presses_a_pad_no_deeper_than_it_means_to() -> None:
     assert rig.crack == 0.0
 
 
-def test_a_moving_cut_has_the_average_torque_of_the_judge() -> None:
+def test_a_moving_cut_has_the_mean_torque_of_the_reference() -> None:
     """The mean over a stroke at speed agrees with the quasi-static truth within 1 %."""
     truth = specimen(sensors=QUIET, motor={"cogging_Nm": 0.0}, hand={"tremor_N": 0.0})
     rig = rig_of(truth)
@@ -236,7 +236,7 @@ def test_each_run_of_the_crack_ends_exactly_at_its_arrest(kappa: float) -> None:
     assert runs > 30
 
 
-def test_a_sheet_is_refused_while_the_blades_are_in_the_way() -> None:
+def test_a_sheet_is_refused_while_the_blades_block_it() -> None:
     rig = rig_of(specimen())
     rig.joint.place, rig.sledge.place = math.radians(12.0), -0.02
     assert not rig.load_sheet()

@@ -77,17 +77,17 @@ def test_it_stays_alive_while_a_reader_does_not_read() -> None:
         assert min(steps_of(late)) >= 1  # what waited in buffers comes first, in order
 
 
-def test_unplugged_in_use_the_port_is_gone() -> None:
+def test_a_port_unplugged_in_use_is_a_device_error() -> None:
     with SimProcess("office-paper", faults=Faults(unplug_s=0.2)) as sim:
         with open_link(sim.port) as link:
             link.configure(ConfigKey.STREAM, 1.0)
-            with pytest.raises(DeviceError, match="went away"):
+            with pytest.raises(DeviceError, match="is gone"):
                 states_in(link, 10.0)
         assert ended(sim.pid)
         assert not Path(sim.port).exists()
 
 
-def test_it_never_outlives_a_parent_that_is_killed() -> None:
+def test_it_ends_with_a_killed_parent() -> None:
     parent = subprocess.Popen(
         [
             sys.executable,

@@ -60,7 +60,7 @@ def test_a_typo_is_named_with_file_and_suggestion(tmp_path: Path) -> None:
         ({"colour": "red"}, "colour"),
     ],
 )  # fmt: skip
-def test_absurd_specimens_are_refused(change: dict, words: str) -> None:
+def test_impossible_specimens_are_refused(change: dict, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         specimen(**change)
 

@@ -10,7 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.vision.blade.measure import measure_blade
 from scissorcal.vision.blade.parts import lone_blade
 from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
-from scissorcal.vision.blade.picture import NickMark, as_png, blade_picture
+from scissorcal.vision.blade.picture import NickMark, blade_picture
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
@@ -36,7 +36,7 @@ def measured():
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_the_edge_is_where_it_is(measured, known):
+def test_the_measured_edge_is_the_true_edge(measured, known):
     one = measured[known].measured[0]
     off = one.offset - true_edge(SHAPE, one.station)
     assert len(one.station) > 200
@@ -48,7 +48,7 @@ def test_the_edge_is_where_it_is(measured, known):
     assert one.metric
 
 
-def test_points_know_their_noise_and_the_photograph_its_shared_errors(measured):
+def test_noise_and_common_errors_match_their_standard_deviations(measured):
     one = measured[True].measured[0]
     off = one.offset - true_edge(SHAPE, one.station)
     smooth = np.polyval(np.polyfit(one.station, off, 5), one.station)
@@ -70,7 +70,7 @@ class MovedView(CameraView):
         return super().to_sheet(pixels, np.array(self.moved) if values is None else values)
 
 
-def test_a_mode_is_what_measuring_again_gives_without_its_noise(measured):
+def test_a_mode_equals_the_difference_of_a_repeated_measurement(measured):
     """Each independent error of the mapping in turn moves the view, which measures once more."""
     photo = measured[True]
     one, view = photo.measured[0], photo.view
@@ -102,19 +102,19 @@ def test_a_mode_is_what_measuring_again_gives_without_its_noise(measured):
     assert np.abs(np.diff(modes, 2, axis=0)).max() < 0.02 * np.abs(modes).max()
 
 
-def test_without_a_camera_the_uncertainty_is_said(measured):
+def test_without_a_camera_the_uncertainty_is_stated(measured):
     assert "No camera fit" in measured[False].measured[0].uncertainty
-    assert "fitted camera" in measured[True].measured[0].uncertainty
+    assert "Fitted camera" in measured[True].measured[0].uncertainty
 
 
-def test_a_blade_laid_the_other_way_up_is_measured_from_its_other_rim():
+def test_edge_side_up_selects_the_other_side():
     # turned by half a turn, tip to the left, its edge faces the upper rim
     photo = blade_photo(turn=np.pi + 0.02, where=(0.16, 0.09))
     one = photograph_blade(photo, CAMERA, edge_side="up").measured[0]
     assert abs(np.median(one.offset - true_edge(SHAPE, one.station))) < 2e-5
 
 
-def test_a_pivot_may_be_given_where_no_hole_shows_it():
+def test_a_given_pivot_replaces_the_hole():
     photo = blade_photo(replace(SHAPE, hole_m=0.0))
     with pytest.raises(InputError, match=r"no round pivot hole .* --pivot"):
         photograph_blade(photo, CAMERA)
@@ -137,7 +137,7 @@ def test_both_blades_of_open_scissors(mat):
             off = one.offset - true_edge(replace(SHAPE, length_m=0.08), one.station)
             assert np.median(np.abs(off)) < 4e-4
     if not mat:
-        assert "up to its size" in found.view.uncertainty or "known up to" in found.view.uncertainty
+        assert "has no scale" in found.view.uncertainty
 
 
 def test_closed_scissors_hide_their_edges():
@@ -146,7 +146,7 @@ def test_closed_scissors_hide_their_edges():
     assert found.scissors.opening == 0.0
 
 
-def test_a_picture_shows_what_was_found(measured):
+def test_the_overlay_shows_the_measurement(measured):
     seen = measured[True]
     one = seen.measured[0]
     slope, level = np.polyfit(one.station, one.offset, 1)
@@ -162,7 +162,6 @@ def test_a_picture_shows_what_was_found(measured):
     assert max(drawn.shape[:2]) <= 1600
     green = (drawn[..., 1].astype(int) - drawn[..., 0] > 60) & (drawn[..., 1] > 150)
     assert green.sum() > 100
-    assert as_png(drawn)[:4] == b"\x89PNG"
 
 
 def two_blades():
@@ -187,8 +186,8 @@ BAD = {
         lambda: blade_photo(looks=replace(LOOKS, defocus_px=9.0, motion_px=25.0)),
         "blur|no marker|sharp",
     ),
-    "runs out of the field": (lambda: blade_photo(where=(0.175, 0.09)), "runs out"),
-    "two blades": (two_blades, "one blade was expected"),
+    "runs out of the field": (lambda: blade_photo(where=(0.175, 0.09)), "extends beyond"),
+    "two blades": (two_blades, "one blade is expected"),
     "crossed blades": (lambda: scissors_photo(0.7), "Two blades|one blade|round pivot"),
     "nothing there": (lambda: blade_photo(reflectance=0.84, brushed=0.0), "dark enough|nothing"),
     "mirror along the edge": (
@@ -199,7 +198,7 @@ BAD = {
                 for k in range(7)
             ),
         ),
-        "clear border|broken|glare",
+        "clear border|fragmented|glare",
     ),
     "another size than the camera's": (None, "was fitted at"),
 }
@@ -220,7 +219,7 @@ def test_bad_photographs_are_refused_with_the_reason(name):
 
 def test_a_tip_outside_the_picture_is_refused():
     pose = Pose.looking_at((0.06, 0.09), 0.16)
-    with pytest.raises(InputError, match=r"runs out|markers"):
+    with pytest.raises(InputError, match=r"extends beyond|markers"):
         photograph_blade(blade_photo(pose=pose), CAMERA)
 
 

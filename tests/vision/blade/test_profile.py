@@ -48,12 +48,12 @@ def test_the_stated_spread_is_that_of_the_places(noise):
     assert 0.7 < np.std(z) < 1.6
 
 
-def test_noise_without_a_border_is_no_border():
+def test_noise_gives_no_border():
     light = 0.5 + 0.02 * np.random.default_rng(1).standard_normal((60, 60)).astype("f4")
     assert across(light.astype("f4")).good.mean() < 0.1
 
 
-def test_a_line_is_followed_past_dirt_and_the_metal_told_from_its_shadow():
+def test_a_border_is_followed_past_dirt_and_separated_from_its_shadow():
     rows = 200
     light = strip(np.full(rows, 34.0), 1.0)
     light[80:100, 34:] = 0.2

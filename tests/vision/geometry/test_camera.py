@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.vision.coverage import PLACES, SIZES, SLANTS, ViewCoverage, view_words
+from scissorcal.vision.coverage import PLACES, SIZES, SLANTS, ViewCoverage, detection_words
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.sim import Lens, Pose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
-from tests.vision.scenes import lens, pose_before
+from tests.vision.scenes import lens, photo_of, pose_before
 
 BEND = (-0.25, 0.07, 0.001, -0.0006, 0.02)
 CAMERA = Camera(900.0, 900.0, 646.0, 351.0, BEND, 1280, 720)
@@ -26,18 +26,18 @@ def test_projection_is_browns_formula() -> None:
 
 
 @given(st.floats(0.0, 1279.0), st.floats(0.0, 719.0))
-def test_a_pixel_comes_back(u: float, v: float) -> None:
+def test_a_projected_ray_is_the_pixel(u: float, v: float) -> None:
     ray = CAMERA.rays([[u, v]])
     assert CAMERA.project(np.append(ray, 1.0)) == pytest.approx(np.array([[u, v]]), abs=1e-6)
 
 
-def test_undistorted_pixels_are_those_of_a_camera_without_distortion() -> None:
-    straight = Camera(900.0, 900.0, 646.0, 351.0, (0.0,) * 5, 1280, 720)
+def test_rays_of_projected_points_are_their_directions() -> None:
     points = np.array([[0.2, -0.1, 1.0], [0.0, 0.0, 1.0], [-0.4, 0.2, 1.3]])
-    assert CAMERA.undistort(CAMERA.project(points)) == pytest.approx(straight.project(points))
+    rays = CAMERA.rays(CAMERA.project(points))
+    assert rays == pytest.approx(points[:, :2] / points[:, 2:], abs=1e-9)
 
 
-def test_what_is_behind_has_no_pixel_and_what_is_folded_no_ray() -> None:
+def test_points_behind_have_no_pixel_and_folded_pixels_no_ray() -> None:
     assert np.isnan(CAMERA.project([[0.1, 0.1, -1.0], [0.0, 0.0, 0.0]])).all()
     barrel = Camera(500.0, 500.0, 320.0, 240.0, (-0.4, 0.0, 0.0, 0.0, 0.0), 640, 480)
     assert np.isnan(barrel.rays([[2000.0, 240.0]])).all()
@@ -65,18 +65,19 @@ def seen(pose: Pose) -> Detection:
     [(0.0, "facing left"), (np.pi, "facing right"), (np.pi / 2, "facing up"),
      (-np.pi / 2, "facing down")],
 )  # fmt: skip
-def test_slants_are_named_by_where_the_board_faces(azimuth: float, slant: str) -> None:
+def test_slants_are_named_by_the_boards_normal(azimuth: float, slant: str) -> None:
     pose = pose_before(CAMERA_BOARD, 0.5, tilt=0.5, azimuth=azimuth)
     # The board's face looks along minus z of its frame; x is right and y down in the camera's.
     face = -pose.rotation[:, 2]
     facing = {"facing left": face[0] < 0, "facing right": face[0] > 0, "facing up": face[1] < 0,
               "facing down": face[1] > 0}  # fmt: skip
-    named = view_words(seen(pose), 1280, 720).split(", ")[1]
+    photo = photo_of(np.zeros((720, 1280), dtype=np.uint8))
+    named = detection_words(photo, seen(pose)).split(", ")[3].split(" (")[0]
     assert facing[named]
     assert abs(face[0 if "t" in named.split()[1] else 1]) > 0.4
 
 
-def test_coverage_grows_until_nothing_is_wanted() -> None:
+def test_coverage_grows_until_it_is_complete() -> None:
     coverage = ViewCoverage()
     assert len(coverage.wanted) == 17
     coverage = coverage.with_view(seen(pose_before(CAMERA_BOARD, 0.5)), 1280, 720)

@@ -28,7 +28,7 @@ poses = st.builds(
 
 @given(poses, poses)
 @settings(max_examples=60, deadline=None)
-def test_a_pose_after_its_inverse_is_none(a: Pose, b: Pose) -> None:
+def test_a_pose_after_its_inverse_is_the_identity(a: Pose, b: Pose) -> None:
     assert np.allclose(
         difference(a.after(a.inverse()), Pose((1.0, 0, 0, 0), (0.0, 0, 0))), 0, atol=1e-9
     )
@@ -71,7 +71,7 @@ def test_covariances_of_inverse_and_product_agree_with_draws():
                            expected.covariance / np.outer(sizes, sizes), atol=0.1)  # fmt: skip
 
 
-def test_what_two_poses_err_alike_cancels_between_them():
+def test_common_errors_of_two_poses_cancel():
     """Drawn from one joint covariance, the pose between scatters as is said; alike, not at all."""
     rng = np.random.default_rng(11)
     root = 1e-3 * rng.standard_normal((12, 12))
@@ -200,9 +200,9 @@ def test_the_rig_is_located_from_advances_and_turns():
         assert np.degrees(np.linalg.norm(difference(found.camera_rig, truth)[:3])) < 1.0
 
 
-def test_motion_that_tells_only_part_of_the_frame_says_so():
+def test_motion_that_determines_part_of_the_frame_names_the_rest():
     _, shifted = card_views([(a, 0.2) for a in (0.0, 0.03, 0.06)], np.random.default_rng(9))
     assert locate_rig(shifted, CAMERA, MIDDLE).untold
     _, still = card_views([(0.0, 0.2)], np.random.default_rng(9))
-    with pytest.raises(ValueError, match="one place in all pictures"):
+    with pytest.raises(ValueError, match="same stance in all pictures"):
         locate_rig(still, CAMERA, MIDDLE)

@@ -66,7 +66,7 @@ def test_chessboard_corners_have_no_bias(board: Board, size_px: float, looks: Lo
         Looks(softness_px=0.7, defocus_px=2.0, noise=0.01),
     ],
 )
-def test_marker_corners_are_not_drawn_inward_by_blur(looks: Looks) -> None:
+def test_blur_does_not_shift_marker_corners(looks: Looks) -> None:
     width, height = 1280, 900
     eye = lens(width, height)
     pose = pose_before(BLADE_MAT, 0.021 * eye.focal_px / 80.0, tilt=0.3, azimuth=1.0)
@@ -87,7 +87,7 @@ def test_marker_corners_are_not_drawn_inward_by_blur(looks: Looks) -> None:
     assert len(rough) == len(BLADE_MAT.ids)
 
 
-def test_a_covered_side_leaves_a_marker_unsharp() -> None:
+def test_a_marker_with_a_covered_side_is_not_sharp() -> None:
     eye = lens()
     pose = pose_before(PLATE_STRIP, 0.4)
     image = picture(PLATE_STRIP, pose, eye)
@@ -139,7 +139,7 @@ def sentence(image: np.ndarray, board: Board) -> str:
     return words
 
 
-def test_a_photograph_says_what_it_shows_instead() -> None:
+def test_a_refusal_names_what_the_photograph_shows_instead() -> None:
     eye = lens()
     mat = picture(BLADE_MAT, pose_before(BLADE_MAT, 0.45), eye)
     assert "shows the blade mat, not the camera board" in sentence(mat, CAMERA_BOARD)
@@ -152,7 +152,7 @@ def test_a_photograph_says_what_it_shows_instead() -> None:
     assert "a plain chessboard, not the camera board" in sentence(plain, CAMERA_BOARD)
 
 
-def test_a_photograph_of_nothing_or_of_too_little_says_so() -> None:
+def test_a_photograph_without_enough_corners_is_refused() -> None:
     eye = lens()
     rng = np.random.default_rng(0)
     noise = cv2.GaussianBlur(rng.integers(0, 255, (480, 640, 3), dtype=np.uint8), (0, 0), 2.0)
@@ -164,7 +164,7 @@ def test_a_photograph_of_nothing_or_of_too_little_says_so() -> None:
     assert "are needed" in sentence(picture(CAMERA_BOARD, aside, eye), CAMERA_BOARD)
 
 
-def test_a_photograph_blurred_beyond_use_says_so() -> None:
+def test_a_blurred_photograph_is_refused() -> None:
     eye = lens()
     looks = Looks(softness_px=0.7, defocus_px=14.0, noise=0.01)
     blurred = picture(CAMERA_BOARD, pose_before(CAMERA_BOARD, 0.5), eye, looks)

@@ -40,7 +40,7 @@ def photos(found: dict[str, Detection]) -> list[CameraPhoto]:
 
 
 @needs_chessboard
-def test_all_published_poses_come_out_under_the_published_camera() -> None:
+def test_published_poses_are_recovered_with_the_published_camera() -> None:
     published = CHESS / "left_intrinsics.yml"
     read = read_camera_file(published)
     camera = read.camera
@@ -78,7 +78,7 @@ def test_the_published_corners_give_the_published_camera_and_name_left02() -> No
 
 
 @needs_chessboard
-def test_a_window_that_fits_each_corner_leaves_no_photograph_out_of_line() -> None:
+def test_adaptive_windows_leave_no_outlying_photograph() -> None:
     # The published focal length is pulled up by left02's corners: without that photograph plain
     # least squares on the published corners gives 534.1, which is between the two.
     fit = fit_camera(photos(detections(None)), rng=np.random.default_rng(0))
@@ -124,7 +124,7 @@ def test_every_single_marker_is_found() -> None:
 
 
 @needs_aruco
-def test_corners_by_the_sides_fit_the_board_better_than_a_corner_finders() -> None:
+def test_corners_from_sides_fit_the_board_better_than_a_corner_detectors() -> None:
     board = CharucoBoard("ChArUco 5x7", 5, 7, 0.04, 0.02, dictionary="DICT_6X6_250")
     camera = read_camera_file(ARUCO / "tutorial_camera_charuco.yml").camera
     grey = read_photo(ARUCO / "img_00.jpg", colour=False).grey

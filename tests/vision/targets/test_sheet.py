@@ -80,7 +80,7 @@ def test_the_png_is_exact_to_a_pixel(name: SheetName) -> None:
 
 
 @pytest.mark.parametrize(("name", "paper"), SHEETS)
-def test_the_rulers_are_as_long_as_they_say(name: SheetName, paper: Paper) -> None:
+def test_the_rulers_have_their_stated_length(name: SheetName, paper: Paper) -> None:
     drawn = pdf_pixels(name, paper) < 230
     width, height = PAPER_MM[paper]
     rows = drawn[int((height - 7.5) * SCALE) : int((height - 6.5) * SCALE)]
@@ -93,7 +93,7 @@ def test_the_rulers_are_as_long_as_they_say(name: SheetName, paper: Paper) -> No
 
 
 @pytest.mark.parametrize(("name", "paper"), SHEETS)
-def test_printers_can_reach_all_of_it(name: SheetName, paper: Paper) -> None:
+def test_the_sheet_is_within_the_printable_area(name: SheetName, paper: Paper) -> None:
     sheet = target_sheet(name, paper)
     margin = 4.0
     for shape in sheet.rectangles:
@@ -113,7 +113,7 @@ def test_every_target_is_found_by_its_own_detector() -> None:
             assert np.abs(off).max() < 0.5 / SCALE
 
 
-def test_the_mats_field_is_empty_but_for_the_pivot_mark() -> None:
+def test_the_mats_field_is_empty_except_for_the_pivot_mark() -> None:
     sheet = target_sheet("blade")
     _, x, y = sheet.boards[0]
     left, top, right, low = (1e3 * side for side in MAT_FIELD_M)
@@ -130,7 +130,7 @@ def test_the_mats_field_is_empty_but_for_the_pivot_mark() -> None:
     assert BLADE_MAT.width_m - MAT_FIELD_M[2] == pytest.approx(MAT_FIELD_M[0])
 
 
-def test_the_words_name_the_target_and_the_check() -> None:
+def test_the_text_names_the_target_and_the_check() -> None:
     for name, paper in SHEETS:
         words = " ".join(line.text for line in target_sheet(name, paper).words)
         assert "100 %" in words

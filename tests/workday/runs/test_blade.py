@@ -2,11 +2,15 @@
 
 import pytest
 
-from scissorcal.calibration.edge.store import load_blade
+from scissorcal.calibration.edge.result import BladeResult
+from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
-from scissorcal.workday.demo.sim_photographs import render_blade_photographs
+from scissorcal.vision.sim.sim_camera import render_blade_photographs
+from scissorcal.workday.demo.sim_photographs import specimen_blade
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import BladeSetup, photo_captures
-from scissorcal.workday.runs.blade import blade_path, capture_blade, fit_workspace_blade
+from scissorcal.workday.runs.blade import capture_blade
+from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import create_workspace
 
 
@@ -18,13 +22,13 @@ def workspace(tmp_path_factory):
 @pytest.fixture(scope="module")
 def photographs(workspace, tmp_path_factory):
     folder = tmp_path_factory.mktemp("photographs")
-    return render_blade_photographs(workspace.recipe(), folder, seed=1, count=2)
+    return render_blade_photographs(specimen_blade(workspace.recipe()), folder, seed=1, count=2)
 
 
 def test_nothing_captured_is_said(tmp_path):
     empty = create_workspace(tmp_path / "empty", "paper-80gsm")
     with pytest.raises(MissingError, match="capture blade"):
-        fit_workspace_blade(empty)
+        fit_workspace(empty, ["blade"])
 
 
 def test_photographs_that_cannot_be_used_are_left_out_and_none_leaves_nothing(workspace, tmp_path):
@@ -42,17 +46,17 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert len(done.taken) == 2
     assert "given twice" in done.refused[0]
     assert len(photo_captures(workspace, "blade")) == 1
-    outcome = fit_workspace_blade(workspace, effort="draft")
+    (outcome,) = fit_workspace(workspace, ["blade"], effort="draft")
     assert not outcome.cached
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in outcome.pictures)
     assert len(outcome.pictures) == 2
-    belief = load_blade(blade_path(workspace)).belief
+    belief = load(Engine.of(workspace).file("fit blade"), BladeResult).belief
     edge = workspace.recipe().rig.edge
     middle = 0.5e-3 * edge.length_mm
     found = float(belief.edge.offset_at(middle))
     stated = 1e-3 * edge.offset_mm + middle * 0.0349208
     assert found == pytest.approx(stated, abs=6e-5)
-    again = fit_workspace_blade(workspace, effort="draft")
+    (again,) = fit_workspace(workspace, ["blade"], effort="draft")
     assert again.cached
     assert again.result.belief.edge == belief.edge
     assert again.pictures == outcome.pictures
@@ -61,14 +65,17 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
 def test_open_scissors_do_not_mix_with_a_blade_alone(workspace, photographs):
     capture_blade_needed = photo_captures(workspace, "blade")
     assert capture_blade_needed
-    with pytest.raises(InputError, match="one fit takes one kind"):
+    with pytest.raises(InputError, match="one fit uses one kind"):
         capture_blade(workspace, photographs, BladeSetup(both=True), lambda _: None)
 
 
 def test_both_blades_of_virtual_scissors(tmp_path):
     lab = create_workspace(tmp_path / "pair", "paper-80gsm")
-    made = render_blade_photographs(lab.recipe(), tmp_path, seed=2, count=1, both=True)
+    made = render_blade_photographs(
+        specimen_blade(lab.recipe()), tmp_path, seed=2, count=1, both=True
+    )
     capture_blade(lab, made, BladeSetup(both=True), lambda _: None)
-    result = fit_workspace_blade(lab, effort="draft").result
+    (outcome,) = fit_workspace(lab, ["blade"], effort="draft")
+    result = outcome.result
     assert [blade.name for blade in result.blades] == ["left", "right"]
     assert 0.45 < result.openings[0].opening_rad < 0.95

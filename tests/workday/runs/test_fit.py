@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import Plan, make_plan
-from scissorcal.workday.runs.fit import current_fits, fit_workspace
+from scissorcal.workday.runs.fit import fit_workspace, load_result
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_friction
 
@@ -31,7 +32,7 @@ def copied(fitted: Workspace, tmp_path: Path) -> Workspace:
 
 
 def states(plan: Plan) -> dict[str, str]:
-    return {step.name: step.status for step in plan.steps}
+    return {step.name: step.state for step in plan.steps}
 
 
 def edit(workspace: Workspace, old: str, new: str) -> None:
@@ -60,7 +61,7 @@ def test_another_effort_is_another_fit(copied: Workspace) -> None:
     (outcome,) = fit_workspace(copied, ("friction",), effort="standard")
     assert not outcome.cached
     assert outcome.result.effort == "standard"
-    assert states(make_plan(copied))["fit friction"] == "done"
+    assert states(make_plan(copied))["fit friction"] == "unverified"
 
 
 def test_a_new_recording_makes_the_fit_stale_and_the_next_fit_takes_it(copied: Workspace) -> None:
@@ -70,7 +71,7 @@ def test_a_new_recording_makes_the_fit_stale_and_the_next_fit_takes_it(copied: W
     (outcome,) = fit_workspace(copied, ("friction",))
     assert not outcome.cached
     assert len(outcome.result.sources) == 2
-    assert states(make_plan(copied))["fit friction"] == "done"
+    assert states(make_plan(copied))["fit friction"] == "unverified"
 
 
 def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:
@@ -80,10 +81,9 @@ def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:
 
 def test_a_change_elsewhere_in_the_recipe_leaves_it_fresh(copied: Workspace) -> None:
     edit(copied, "tolerance_percent = 7.0", "tolerance_percent = 5.0")
-    edit(copied, "speeds_rad_per_s = [0.1,", "speeds_rad_per_s = [0.2,")
     plan = make_plan(copied)
     assert states(plan)["capture friction"] == "done"
-    assert states(plan)["fit friction"] == "done"
+    assert states(plan)["fit friction"] == "unverified"
 
 
 def test_another_rig_makes_the_capture_stale_and_it_is_not_fitted(copied: Workspace) -> None:
@@ -106,13 +106,14 @@ def test_a_damaged_fit_is_said_to_be_and_can_be_forced(copied: Workspace) -> Non
     copied.fit_path("friction").write_bytes(b"no fit")
     plan = make_plan(copied)
     step = next(step for step in plan.steps if step.name == "fit friction")
-    assert step.status == "stale"
-    assert "damaged" in step.state
+    assert step.state == "failed"
+    assert "cannot be read" in step.found
+    assert step.command == "scissorcal fit friction --force"
     with pytest.raises(InputError, match="scissorcal fit"):
         fit_workspace(copied, ("friction",))
     (outcome,) = fit_workspace(copied, ("friction",), force=True)
     assert outcome.path.is_file()
-    assert states(make_plan(copied))["fit friction"] == "done"
+    assert states(make_plan(copied))["fit friction"] == "unverified"
 
 
 def test_what_must_come_first_is_named(tmp_path: Path, fitted: Workspace) -> None:
@@ -121,8 +122,8 @@ def test_what_must_come_first_is_named(tmp_path: Path, fitted: Workspace) -> Non
         fit_workspace(empty)
     with pytest.raises(MissingError, match="scissorcal capture cut --device PORT"):
         fit_workspace(fitted, ("cut",))
-    with pytest.raises(MissingError, match="There is no fit of cut yet: run 'scissorcal fit'"):
-        current_fits(fitted, fitted.recipe())
+    with pytest.raises(MissingError, match="There is no fit of cut yet: run 'scissorcal fit cut'"):
+        load_result(Engine.of(fitted), "cut")
 
 
 def test_a_linear_joint_is_asked_for_friction_alone(tmp_path: Path) -> None:
@@ -132,6 +133,7 @@ def test_a_linear_joint_is_asked_for_friction_alone(tmp_path: Path) -> None:
     assert [step.name for step in plan.steps] == [
         "capture friction",
         "fit friction",
+        "verify friction",
         "report",
         "report sign",
     ]

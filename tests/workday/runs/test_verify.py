@@ -15,14 +15,16 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.verify import VerifyResult, load_verify, save_verify
+from scissorcal.calibration.store import load, save
+from scissorcal.calibration.verify import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.records import RecordFile
 from scissorcal.workday.runs.fit import fit_workspace
-from scissorcal.workday.runs.report import reportable_fits, why_stale, write_workspace_report
+from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_friction
@@ -78,9 +80,9 @@ def test_a_check_holds_all_three_parts_and_keeps_its_schema(
         "prior": "pass",
     }, [verdict.why for verdict in whole.verdicts]
     assert {row.diagnosis for row in whole.sensitivity.rows} == {"fine"}
-    path = cleared.verify_path("friction")
-    save_verify(whole, path)
-    assert load_verify(path) == whole
+    path = Engine.of(cleared).file("verify friction")
+    save(whole, path)
+    assert load(path, VerifyResult) == whole
     schema = json.loads((schemas_dir() / "verify.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(json.loads(path.read_text(encoding="utf-8")), schema)
 
@@ -89,18 +91,18 @@ def test_a_report_is_stale_once_its_check_is_another_or_gone(
     cleared: Workspace, whole: VerifyResult
 ) -> None:
     """A check of more fits, of the same seed, is another one."""
-    recipe, path = cleared.recipe(), cleared.verify_path("friction")
-    save_verify(whole, path)
-    write_workspace_report(cleared)
-    fits = reportable_fits(cleared, recipe)
-    assert why_stale(cleared, recipe, fits) == ""
+    path = Engine.of(cleared).file("verify friction")
+    save(whole, path)
+    write_workspace_report(Engine.of(cleared))
+    assert Engine.of(cleared).state("report").state == "done"
+    assert Engine.of(cleared).state("fit friction").state == "done"
     assert whole.calibration is not None
     longer = replace(whole, calibration=replace(whole.calibration, fits=400))
-    save_verify(longer, path)
-    said = "it shows another trust check of friction than there is now"
-    assert why_stale(cleared, recipe, fits) == said
+    save(longer, path)
+    assert Engine.of(cleared).state("report").state == "stale"
     path.unlink()
-    assert why_stale(cleared, recipe, fits) == said
+    assert Engine.of(cleared).state("report").state == "stale"
+    assert Engine.of(cleared).state("fit friction").state == "unverified"
 
 
 def test_two_workers_give_the_same_numbers(cleared: Workspace, whole: VerifyResult) -> None:
@@ -174,11 +176,13 @@ def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
     recipe = workspace.recipe_path.read_text(encoding="utf-8")
     workspace.recipe_path.write_text(recipe.replace("[rig]", '[rig]\njoint = "linear"'), "utf-8")
     record_friction(workspace, recipe_toml="")
-    assert not any("verify" in note for note in make_plan(workspace).notes)
+    assert Engine.of(workspace).state("fit friction").state == "missing"
     fit_workspace(workspace, ("friction",))
-    assert any("'scissorcal verify'" in note for note in make_plan(workspace).notes)
+    unverified = Engine.of(workspace).state("fit friction")
+    assert (unverified.state, unverified.command) == ("unverified", "scissorcal verify friction")
     verify_workspace(workspace, (), VerifySettings(checks=("prior",)), workers=1)
-    assert not any("verify" in note for note in make_plan(workspace).notes)
+    assert Engine.of(workspace).state("fit friction").state == "done"
+    assert make_plan(workspace).next_command == "scissorcal report"
 
 
 def test_one_run_at_a_time(cleared: Workspace) -> None:
@@ -191,7 +195,7 @@ def test_a_damaged_result_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "friction.verify.json"
     path.write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match=r"friction\.verify\.json is not a trust check"):
-        load_verify(path)
+        load(path, VerifyResult)
 
 
 def test_an_unreachable_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,14 +1,15 @@
-"""What a camera's fit ends in: the camera and its covariance, its views, checks and verdicts."""
+"""What a camera fit results in: the camera with its covariance, views, checks, verdicts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 
 Array = NDArray[np.float64]
 
@@ -32,30 +33,33 @@ class ViewError:
     pose: tuple[float, ...]
 
 
+_MAP = Stored(("y", "x"))
+
+
 @dataclass(frozen=True)
 class PixelMap:
-    """Pixels over a grid of places in the picture: ``x`` (columns,), ``y`` (rows,) in pixels.
+    """Errors over a grid of places in the picture: ``x`` (columns,), ``y`` (rows,) in pixels.
 
-    ``sd_px`` (rows, columns): how uncertain the fit says a projected point is, per coordinate, with
-    the best rotation of the camera taken out, since every use of a camera finds its own pose.
-    ``difference_px`` (rows, columns): how far the cameras of two independent halves of the
-    photographs are apart, the same taken out; None where there were too few. ``inside`` marks
-    places where corners were seen about.
+    ``sd_px`` (rows, columns): standard deviation of a projected point, per coordinate, after the
+    best rotation of the camera, since every use of a camera estimates its own pose.
+    ``difference_px`` (rows, columns): difference between the cameras fitted to two independent
+    halves of the photographs, after the best rotation; None with too few photographs. ``inside``
+    marks places near which corners were seen.
     """
 
-    x: Array
-    y: Array
-    sd_px: Array
-    inside: NDArray[np.bool_]
-    difference_px: Array | None = None
+    x: Annotated[Array, Stored(("x",))]
+    y: Annotated[Array, Stored(("y",))]
+    sd_px: Annotated[Array, _MAP]
+    inside: Annotated[NDArray[np.bool_], _MAP]
+    difference_px: Annotated[Array | None, _MAP] = None
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Two halves of the photographs fitted apart.
+    """Two halves of the photographs, fitted separately.
 
-    ``rms_px`` is their difference over the valid region, ``claimed_px`` what their covariances let
-    expect (rms), ``p_value`` the share of cameras drawn from these that differ as much.
+    ``rms_px`` is their difference over the valid region, ``claimed_px`` its expected value by their
+    covariances (rms), ``p_value`` the share of cameras drawn from these that differ as much.
     """
 
     rms_px: float
@@ -63,31 +67,37 @@ class CrossValidation:
     p_value: float
 
 
-@dataclass(frozen=True)
-class CameraFit:
-    """A camera with all that is known of how well it is known.
+@dataclass(frozen=True, repr=False)
+class CameraFit(Result):
+    """A camera and its uncertainty.
 
-    ``origin`` is "fitted" or "imported". ``rung`` names the distortion model that was chosen and
-    ``rungs`` lists those compared, cheapest first, each with ``name``, ``free``, ``unseen_px`` (rms
-    on photographs left out), ``behind`` and ``behind_se`` (how much worse than the best, in
-    log-likelihood per photograph), ``equivalent`` and ``chosen``. ``draws`` (draws, 9) are of the
+    ``origin`` is "fitted" or "imported". ``rung`` names the chosen distortion model and
+    ``rungs`` lists those compared, simplest first, each with ``name``, ``free``, ``unseen_px`` (rms
+    on photographs left out), ``score`` (log density of these), ``behind`` and ``behind_se`` (how
+    much lower than the best one's), ``equivalent`` and ``chosen``. ``draws`` (draws, 9) are of the
     posterior, columns as in `scissorcal.vision.geometry.camera.PARAMETERS`. ``bulge_mm`` is how far
     the board's middle stands out along its width and its height, ``noise_px`` the scale of corner
     errors, ``stretch`` the factor by which standard errors were widened because errors within a
-    photograph go together. ``region`` (k, 2) outlines where corners were seen.
+    photograph are correlated. ``region`` (k, 2) outlines where corners were seen.
     """
+
+    title = "camera fit"
+    command = "scissorcal fit camera"
+    what = "camera"
+    names = PARAMETERS
+    """Parameters of the camera, in the order of the columns of ``draws``."""
 
     camera: Camera
     origin: Literal["fitted", "imported"]
     board: str
     rung: str
     rungs: tuple[Mapping[str, Any], ...]
-    draws: Array
+    draws: Annotated[Array, by_name("/posterior", "names")]
     views: tuple[ViewError, ...]
     bulge_mm: tuple[float, float]
     noise_px: float
     stretch: float
-    region: Array
+    region: Annotated[Array, Stored(("corner", "axis"))]
     region_share: float
     pixel_map: PixelMap | None
     cross: CrossValidation | None

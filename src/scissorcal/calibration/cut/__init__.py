@@ -1,8 +1,12 @@
 """Cuts and presses: response, fracture and ripple, over the path."""
 
-from scissorcal.calibration.cut.fit import cut_experiment, fit_cut, settings_of
-from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.structure import cutting_from, edge_of
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.cut.fit import cut_experiment, fit_cut, settings_of
+    from scissorcal.calibration.cut.model import CutExperiment
+    from scissorcal.calibration.cut.structure import cutting_from, edge_of
 
 __all__ = [
     "CutExperiment",
@@ -12,3 +16,16 @@ __all__ = [
     "fit_cut",
     "settings_of",
 ]
+
+_HOMES = {
+    "fit": ("cut_experiment", "fit_cut", "settings_of"),
+    "model": ("CutExperiment",),
+    "structure": ("cutting_from", "edge_of"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""What differs between recordings of a cut: each fitted by itself, each predicted by the rest."""
+"""Differences between recordings of a cut: each fitted alone, each predicted from the others."""
 
 from dataclasses import replace
 
@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOT_KNOWN = (
-    "There is one recording: how much the material and the rig vary from recording to recording is "
-    "not known, and the intervals do not include it. Cut the same material again, after setting up "
-    "anew or on another day."
+    "One recording: the variation of material and rig between recordings is unknown, and the "
+    "intervals do not include it. Record the same material again, after a new set-up or on another "
+    "day."
 )
 
 
@@ -26,14 +26,12 @@ def compare_cuts(
     recordings: tuple[Recording, ...],
     rng: np.random.Generator,
 ) -> BetweenRecordings | None:
-    """Fit every recording by itself and by the others; None where fewer than two can be.
+    """Fit every recording alone, and from the others; None where fewer than two can be fitted.
 
     ``design`` is the law over all recordings, ``point`` (p,) its optimum, from which each search
     begins. No two recordings share a sheet, so that segments belong to one each. The line of the
-    teeth is left out: it is one number for all recordings, and what it says of kappa is not
-    compared.
+    teeth is left out, since it is one number for all recordings.
     """
-    # One line is read off all recordings together, so it says nothing of their differences.
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
     rung = replace(design.candidate(design.observed), starts=point[None, :])
 
@@ -50,5 +48,5 @@ def compare_cuts(
 
 
 def between_notes(between: BetweenRecordings | None, nuisance: tuple[str, ...]) -> tuple[str, ...]:
-    """What recordings differ in, or that it is not known."""
+    """Notes on the differences between recordings, or that they are unknown."""
     return between.notes(nuisance) if between else (NOT_KNOWN,)

@@ -19,7 +19,7 @@ from scissorcal.verdicts import Verdict, failed, judge
 Array = NDArray[np.float64]
 
 SUBHARMONIC = 0.3
-"""Power at a half or a third of the line's frequency over its own; a harmonic has more than 1."""
+"""Limit of the power at a half or a third of the line's frequency, relative to the line's."""
 
 
 def cut_verdicts(
@@ -39,7 +39,7 @@ def cut_verdicts(
 
 
 def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
-    """What is known to matter for a cut's calibration: encoder, line, fresh sheets.
+    """What a cut's calibration is known to depend on: the encoder and the line of the teeth.
 
     ``counts_per_sample`` is the median over the running cracks, or over the loadings where nothing
     runs.
@@ -61,25 +61,24 @@ def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
 
 
 def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:
-    """What the teeth say, what each sheet's toughness was, and what lack of fit was allowed for."""
+    """Notes on the line of the teeth, unresolved strokes, and the budget of lack of fit."""
     notes = []
-    if scouted.believed and scouted.line is not None:
-        speeds = ", ".join(
-            f"{speed:.2g}" for speed, _, gain in scouted.line.speeds if gain > COHERENT
-        )
+    line = scouted.accepted_line
+    if line is not None:
+        speeds = ", ".join(f"{speed:.2g}" for speed, _, gain in line.speeds if gain > COHERENT)
         notes.append(
-            f"The teeth of the running crack show as a line whose period is known to "
-            f"{scouted.line.sd:.2%}, at stroke speeds of {speeds} rad/s; without it kappa would be "
-            f"{scouted.without:.2g}, weakly known."
+            f"{line.sd:.2%} is the standard deviation of the period of the running crack's "
+            f"teeth, a spectral line at stroke speeds of {speeds} rad/s. Without it kappa would "
+            f"be {scouted.without:.2g}, with a large uncertainty."
         )
     elif design.law.fracture == "rippled":
-        notes.append(f"kappa is open: {scouted.reason}")
+        notes.append(f"Kappa is poorly determined: {scouted.reason}")
     runs = scouted.segments.stretches
     if unseen := sum(not run.resolved for run in runs):
         notes.append(
             f"In {unseen} of {len(runs)} running strokes the blades nearly stop at each tooth, and "
-            "the encoder is too coarse to show whether they swing back: only the teeth of these "
-            "strokes count, not their mean torque. Faster strokes or a finer encoder would help."
+            "the encoder is too coarse to show whether they move back. The fit uses the teeth of "
+            "these strokes, not their mean torque. Use faster strokes or a finer encoder."
         )
     names = design.layout.names
     shown = [
@@ -90,33 +89,34 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
     allowed = max(budget.shares.values(), default=0.0)
     if allowed > 0 and shown:
         notes.append(
-            f"A lack of fit of up to {allowed:.2%} in each kind of segment was allowed for: by "
-            f"itself it is worth a standard deviation of {', '.join(shown)}."
+            f"The budget of lack of fit is {allowed:.2%} in each kind of segment. It alone gives "
+            f"the standard deviations {', '.join(shown)}."
         )
     return tuple(notes)
 
 
 def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Verdict:
-    """Whether what the fit builds on may be used at all."""
+    """Whether the fits that this one uses passed their verdicts."""
     wrong = [*friction.rejected, *failed(edge_verdicts)]
     said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
-    good = "The fits that this one builds on passed their verdicts."
-    bad = f"A fit that this one builds on failed a verdict ({said}): correct and refit it first."
+    good = "The fits that this one uses passed their verdicts."
+    bad = f"A fit that this one uses failed a verdict ({said}): correct that fit first."
     return judge("fit.cut", "foundations", len(wrong), 0.0, good, bad)
 
 
 def _line(scouted: Scouted) -> tuple[Verdict, ...]:
-    """A line at a multiple of the teeth's frequency would put kappa off by tens of percent."""
-    line = scouted.line
-    if line is None or not scouted.believed:
+    """A line at a multiple of the teeth's frequency would bias kappa by tens of percent."""
+    line = scouted.accepted_line
+    if line is None:
         return ()
     worst = max(line.half, line.third)
     good = (
-        f"At a half and a third of the teeth's frequency there is {worst:.1%} of the line's "
-        "power at most, so the line is the teeth's own."
+        f"{worst:.1%} of the line's power is at a half or a third of its frequency (limit "
+        f"{SUBHARMONIC:.0%}): the line is the teeth's fundamental."
     )
     bad = (
-        f"There is {worst:.0%} of the line's power at a half or a third of its frequency: it may "
-        "be a multiple of the teeth's, and kappa is then wrong. Capture slower strokes."
+        f"{worst:.0%} of the line's power is at a half or a third of its frequency (limit "
+        f"{SUBHARMONIC:.0%}): it may be a harmonic of the teeth, and kappa would be wrong. Capture "
+        "slower strokes."
     )
     return (judge("fit.cut", "teeth", worst, SUBHARMONIC, good, bad),)

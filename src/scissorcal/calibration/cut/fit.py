@@ -1,7 +1,7 @@
 """Fit the material's response and fracture to strokes through it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +40,7 @@ from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.signals.sensors import inspect_sensors
+from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop, infer
@@ -54,10 +54,44 @@ Progress = Callable[[float, str], None]
 
 DRAWS = 2000
 STANDARD_BUDGET = 25_000
-"""Evaluations of the likelihood, a fifth of a millisecond each, that standard effort may take."""
+"""Evaluations of the likelihood (0.2 ms each) that standard effort may take."""
 FELT_SDS = 5.0
 FEWEST_FELT_RAD = 0.02
 KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99
+
+
+@dataclass(frozen=True)
+class _Data:
+    """What a fit is made of: recordings with their sensors and motions, geometry, friction."""
+
+    recordings: tuple[Recording, ...]
+    recipe: Recipe
+    friction: FitResult
+    edge: EdgeBelief | None
+    geometry: Geometry
+    known: KnownFriction
+    sensors: Sensors
+    motions: tuple[PathMotion, ...]
+
+    @classmethod
+    def of(
+        cls,
+        recordings: tuple[Recording, ...],
+        recipe: Recipe,
+        friction: FitResult,
+        edge: EdgeBelief | None,
+        prior: StatedPrior | None = None,
+    ) -> "_Data":
+        geometry = belief_geometry(recipe, edge or edge_of(recipe))
+        known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
+        sensors = inspect_sensors(recordings, "fit.cut")
+        motions = path_motion(recordings, known.inertia, sensors.usable)
+        return cls(recordings, recipe, friction, edge, geometry, known, sensors, motions)
+
+    @property
+    def names(self) -> str:
+        """The recordings' files, for messages."""
+        return ", ".join(recording.source or "the recording" for recording in self.recordings)
 
 
 def fit_cut(
@@ -77,29 +111,25 @@ def fit_cut(
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses), over their path.
 
-    A crack's law does not know time, so what is compared is the material's mean torque between
-    openings: of standing cracks that the blades load and let go, of running cracks, and of the
-    line that the teeth of a running crack leave in its own phase (docs/model.md). Friction,
-    inertia, cogging and noise are those of ``friction``; what the empty sweeps left open widens
-    what is said of the material.
+    Crack laws are rate-independent, so the fit compares the material's mean torque between
+    openings: of cracks at rest that the blades load and unload, of running cracks, and of the
+    spectral line of the teeth in a running crack's own phase (docs/model.md). Friction, inertia,
+    cogging and noise are those of ``friction``; its uncertainty widens the material's intervals.
 
     ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
-    friction, this fit fails too. ``checkpoint`` is a file from which a thorough fit that was
-    interrupted goes on. ``last_chosen`` is the law that draft effort fits where the recipe leaves
-    several, ``stop`` says whether the time allowed is used up. ``prior`` is one that a study of
-    simulated data states. Raises InputError where the blades hardly touched the material.
+    friction, this fit fails too. ``checkpoint`` is a file from which an interrupted thorough fit
+    continues. ``last_chosen`` is the law that draft effort fits where the recipe allows several,
+    ``stop`` says whether the time limit is reached. ``prior`` replaces the recipe's in a study of
+    simulated data. Raises InputError where the blades hardly touched the material.
     """
     tell = progress or (lambda done, sentence: None)
-    geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = replace(KnownFriction.of(friction), prior=prior)
-    sensors = inspect_sensors(recordings, "fit.cut")
-    motions = path_motion(recordings, known.inertia, sensors.usable)
-    _refuse_no_contact(motions, known, recordings)
+    data = _Data.of(recordings, recipe, friction, edge, prior)
+    _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
     laws = candidates_for(effort, allowed, last_chosen)
-    tell(0.05, "cut: finding where cracks wait and run")
-    scouted = _scouted(motions, known, recipe, geometry, laws, recordings)
-    compared = _fit_laws(scouted, geometry, recipe, laws, known, tell, stop)
+    tell(0.05, "cut: finding where cracks rest and run")
+    scouted = _scouted(data, laws)
+    compared = _fit_laws(scouted, data, laws, tell, stop)
     laws_used = by_load(choose([one for one, _ in compared]), compared)
 
     def infer_one(law: AveragedLaw) -> Inferred:
@@ -108,50 +138,90 @@ def fit_cut(
         return _infer(law, recipe, effort, rng, tell, checkpoint if first else None, stop)
 
     inferred = average(laws_used, infer_one, rng)
-    chosen, design = inferred.law.fitted, inferred.law.design
-    u = chosen.optimum.point
-    between = compare_cuts(design, u, recordings, rng)
-    fit = assemble(
-        what="cut",
-        effort=effort,
-        posterior=widened(inferred.posterior, between, rng),
-        compared=[one for one, _ in compared],
-        chosen=chosen,
-        structure=design.key,
-        bins=design.bins,
-        strokes=design.strokes,
-        measured=design.observed,
-        contact=design.contact(u),
-        recordings=recordings,
-        joint=recordings[0].joint,
-        inputs_hash=fit_inputs_hash(
-            "cut",
-            recordings,
-            settings_of(recipe),
-            effort,
-            cut_upstream(friction.inputs_hash, edge),
-        ),
-        nuisance=NUISANCE,
-        rng=rng,
-        critic=recipe.fit.cut.critic,
-        extra_verdicts=(
-            *cut_verdicts(friction, edge_verdicts, scouted, sensors, recordings),
-            *((between.verdict(),) if between else ()),
-        ),
-        extra_notes=(
-            *sensors.notes,
-            *line_notes(scouted, design, inferred.budget),
-            *load_note(laws_used),
-            *draft_note(effort, allowed, laws),
-            usage_sentence(recordings, usage_of_segments(recordings, scouted.segments)),
-            *between_notes(between, NUISANCE),
-        ),
-        extra_diagnostics={
-            **cut_diagnostics(scouted, design),
-            **(between.diagnostics() if between else {}),
-        },
-    )
+    notes = (*load_note(laws_used), *draft_note(effort, allowed, laws))
+    fit = _assembled(data, scouted, compared, inferred, effort, edge_verdicts, notes, rng)
     return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
+
+
+def cut_experiment(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    fit: FitResult,
+    edge: EdgeBelief | None = None,
+) -> CutExperiment:
+    """Give the design of a finished fit: its law and priors over its segments.
+
+    All but ``fit`` are what the fit was made of; its law is taken from ``fit.structure``. A search
+    over other outcomes begins where the fit ended.
+    """
+    data = _Data.of(recordings, recipe, friction, edge)
+    law = CutLaw.of(fit.structure)
+    scouted = _scouted(data, [law])
+    ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
+    ended |= {p.name: p.mean for p in fit.nuisance}
+    return make_experiment(
+        scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.accepted_line
+    )
+
+
+def settings_of(recipe: Recipe) -> str:
+    """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
+    return recipe.model_dump_json(
+        include={
+            "rig": {"joint", "moving", "handle_radius_mm", "edge", "opening_zero_sd_deg"},
+            "material": {"thickness_mm", "thickness_sd_mm"},
+            "scene": {"cut", "closure", *SCENE_OF_BOUNDS},
+            "fit": {"cut", "friction"},
+        }
+    )
+
+
+def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
+    fractures = ("none", "smooth", "rippled")
+    richest = max((law.fracture for law in laws), key=fractures.index)
+    try:
+        return scout(data.motions, data.known, data.recipe, data.geometry, richest)
+    except NoUnloadingError as error:
+        raise InputError(
+            f"{data.names}: no stroke shows the blades unloading the material, so its response "
+            "cannot be separated from friction. Check rig.edge and the sheet's place, and open "
+            "the blades wide in every stroke."
+        ) from error
+
+
+def _fit_laws(
+    scouted: Scouted,
+    data: _Data,
+    laws: Sequence[CutLaw],
+    tell: Progress,
+    stop: Stop | None,
+) -> list[tuple[FittedCandidate, CutExperiment]]:
+    """Fit every law to the same segments; each begins where the scouting ended."""
+    found: list[tuple[FittedCandidate, CutExperiment]] = []
+    values = dict(scouted.values)
+    for index, law in enumerate(laws):
+        tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
+        begin = dict(values)
+        if law.response != "power":
+            begin.pop("response_exponent", None)
+        if law.response == "spline":
+            law = replace(law, knots_m=_knots(scouted, data.geometry))
+            begin["response_exponent"] = values["response_exponent"]
+        if law.fracture == "smooth":
+            begin["fracture_energy"] *= 0.5 * (1.0 + begin.get("kappa", 1.0))
+        design = make_experiment(
+            scouted.segments,
+            data.geometry,
+            data.recipe,
+            law,
+            data.known,
+            begin,
+            scouted.accepted_line,
+        )
+        candidate = design.candidate(design.observed)
+        found.append((fit_candidate(candidate, design.series, design.strokes, stop), design))
+    return found
 
 
 def _infer(
@@ -180,94 +250,61 @@ def _infer(
     return Inferred(law, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
 
 
-def cut_experiment(
-    recordings: tuple[Recording, ...],
-    recipe: Recipe,
-    friction: FitResult,
-    fit: FitResult,
-    edge: EdgeBelief | None = None,
-) -> CutExperiment:
-    """Give the design of a finished fit: its law and priors over its own segments.
-
-    All but ``fit`` are what the fit was made of; its law is taken from ``fit.structure``. A search
-    over other outcomes begins where the fit ended.
-    """
-    geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = KnownFriction.of(friction)
-    motions = path_motion(recordings, known.inertia, inspect_sensors(recordings, "fit.cut").usable)
-    law = CutLaw.of(fit.structure)
-    scouted = _scouted(motions, known, recipe, geometry, [law], recordings)
-    ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    ended |= {p.name: p.mean for p in fit.nuisance}
-    return make_experiment(scouted.segments, geometry, recipe, law, known, ended, scouted.datum)
-
-
-def settings_of(recipe: Recipe) -> str:
-    """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
-    return recipe.model_dump_json(
-        include={
-            "rig": {"joint", "moving", "handle_radius_mm", "edge", "opening_zero_sd_deg"},
-            "material": {"thickness_mm", "thickness_sd_mm"},
-            "scene": {"cut", "closure", *SCENE_OF_BOUNDS},
-            "fit": {"cut", "friction"},
-        }
+def _assembled(
+    data: _Data,
+    scouted: Scouted,
+    compared: list[tuple[FittedCandidate, CutExperiment]],
+    inferred: Inferred,
+    effort: Effort,
+    edge_verdicts: tuple[Verdict, ...],
+    notes: tuple[str, ...],
+    rng: np.random.Generator,
+) -> FitResult:
+    """The result, with the differences between recordings in its posterior."""
+    chosen, design = inferred.law.fitted, inferred.law.design
+    recordings, point = data.recordings, chosen.optimum.point
+    between = compare_cuts(design, point, recordings, rng)
+    upstream = cut_upstream(data.friction.inputs_hash, data.edge)
+    return assemble(
+        what="cut",
+        effort=effort,
+        posterior=widened(inferred.posterior, between, rng),
+        compared=[one for one, _ in compared],
+        chosen=chosen,
+        structure=design.key,
+        bins=design.bins,
+        strokes=design.strokes,
+        measured=design.observed,
+        contact=design.contact(point),
+        recordings=recordings,
+        joint=recordings[0].joint,
+        inputs_hash=fit_inputs_hash("cut", recordings, settings_of(data.recipe), effort, upstream),
+        nuisance=NUISANCE,
+        rng=rng,
+        critic=data.recipe.fit.cut.critic,
+        extra_verdicts=(
+            *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
+            *((between.verdict(),) if between else ()),
+        ),
+        extra_notes=(
+            *data.sensors.notes,
+            *line_notes(scouted, design, inferred.budget),
+            *notes,
+            usage_sentence(recordings, usage_of_segments(recordings, scouted.segments)),
+            *between_notes(between, NUISANCE),
+        ),
+        extra_diagnostics={
+            **cut_diagnostics(scouted, design),
+            **(between.diagnostics() if between else {}),
+        },
     )
 
 
-def _scouted(
-    motions: tuple[PathMotion, ...],
-    known: KnownFriction,
-    recipe: Recipe,
-    geometry: Geometry,
-    laws: Sequence[CutLaw],
-    recordings: tuple[Recording, ...],
-) -> Scouted:
-    richest = max(("none", "smooth", "rippled").index(law.fracture) for law in laws)
-    try:
-        return scout(motions, known, recipe, geometry, ("none", "smooth", "rippled")[richest])
-    except NoUnloadingError as error:
-        raise InputError(
-            f"{_names(recordings)}: no stroke shows the blades letting go of the material again, "
-            "so its response cannot be told from friction. Check that rig.edge and the sheet's "
-            "place are right, and let every stroke open the blades wide."
-        ) from error
-
-
-def _fit_laws(
-    scouted: Scouted,
-    geometry: Geometry,
-    recipe: Recipe,
-    laws: Sequence[CutLaw],
-    known: KnownFriction,
-    tell: Progress,
-    stop: Stop | None,
-) -> list[tuple[FittedCandidate, CutExperiment]]:
-    """Fit every law to the same segments; each begins where the scouting ended."""
-    found: list[tuple[FittedCandidate, CutExperiment]] = []
-    values = dict(scouted.values)
-    for index, law in enumerate(laws):
-        tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
-        begin = dict(values)
-        if law.response != "power":
-            begin.pop("response_exponent", None)
-        if law.response == "spline":
-            law = replace(law, knots_m=_knots(scouted, geometry, values))
-            begin["response_exponent"] = values["response_exponent"]
-        if law.fracture == "smooth":
-            begin["fracture_energy"] *= 0.5 * (1.0 + begin.get("kappa", 1.0))
-        design = make_experiment(
-            scouted.segments, geometry, recipe, law, known, begin, scouted.datum
-        )
-        candidate = design.candidate(design.observed)
-        found.append((fit_candidate(candidate, design.series, design.strokes, stop), design))
-    return found
-
-
-def _knots(scouted: Scouted, geometry: Geometry, values: dict[str, float]) -> tuple[float, ...]:
+def _knots(scouted: Scouted, geometry: Geometry) -> tuple[float, ...]:
     """Knots (m) of a spline over the indentations that data reach, evenly in the logarithm.
 
-    Up to the deepest (the 99 % quantile of elastic segments) from an eighth of it: below, a
-    response bears little that is felt.
+    From an eighth of the deepest (the 99 % quantile of elastic segments) up to it: below, the force
+    is too small to be felt.
     """
     segments = scouted.segments
     depths = []
@@ -282,20 +319,17 @@ def _knots(scouted: Scouted, geometry: Geometry, values: dict[str, float]) -> tu
     return tuple(float(f"{knot:.4g}") for knot in np.geomspace(deepest / SPAN, deepest, KNOTS))
 
 
-def _refuse_no_contact(
-    motions: tuple[PathMotion, ...], known: KnownFriction, recordings: tuple[Recording, ...]
-) -> None:
-    """Refuse recordings in which no sheet is marked, or the blades met hardly any torque."""
-    names = _names(recordings)
-    if not any(np.any(motion.sheet >= 0) for motion in motions):
+def _refuse_no_contact(data: _Data) -> None:
+    """Refuse recordings without marked sheets, or with hardly any torque from the material."""
+    if not any(np.any(motion.sheet >= 0) for motion in data.motions):
         raise InputError(
-            f"{names}: no stroke through material is marked in it; capture cuts with "
+            f"{data.names}: no stroke through material is marked. Capture cuts with "
             "'scissorcal capture cut', or mark strokes and sheets when importing."
         )
-    least = FELT_SDS * float(np.hypot(known.noise.white_Nm, known.noise.slow_Nm))
+    least = FELT_SDS * float(np.hypot(data.known.noise.white_Nm, data.known.noise.slow_Nm))
     felt = 0.0
-    for motion in motions:
-        material = known.material(motion)
+    for motion in data.motions:
+        material = data.known.material(motion)
         stride = max(1, round(0.02 / motion.tick_s))
         path = np.diff(motion.opening[::stride])
         moved = np.abs(path) > 1e-3
@@ -303,11 +337,7 @@ def _refuse_no_contact(
         felt += float(np.abs(path[moved][torque > least]).sum())
     if felt < FEWEST_FELT_RAD:
         raise InputError(
-            f"{names}: the blades hardly touched the material (torque beyond friction over "
-            f"{felt:.2g} rad of closing). Check that the sheet lay between the blades and "
-            "that advance was zero at its near edge, then capture again."
+            f"{data.names}: the blades hardly touched the material (torque beyond friction over "
+            f"{felt:.2g} rad of closing). Check that the sheet lay between the blades and that "
+            "advance was zero at its near edge, then capture again."
         )
-
-
-def _names(recordings: tuple[Recording, ...]) -> str:
-    return ", ".join(recording.source or "the recording" for recording in recordings)

@@ -1,4 +1,4 @@
-"""The edge over the sheet, expanded about where a crack is thought to be."""
+"""The edge over the sheet, linearised about an estimate of the crack's place."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +21,9 @@ EDGE_STEP_SDS = 0.1
 class Spans:
     """Indentation at both ends of segments (k, 2), lever of each (k,), and their derivatives.
 
-    ``_dx`` are by the crack's place, ``_de`` (k, 2, q) and (k, q) by the believed parameters of the
-    edge. The lever times the response's mean over the depths between the ends is the mean torque.
-    ``sinking`` (k,) in m/s is how fast the edge sinks in.
+    ``_dx`` are by the crack's place, ``_de`` (k, 2, q) and (k, q) by the uncertain parameters of
+    the edge. The lever times the response's mean over the depths between the ends is the mean
+    torque. ``sinking`` (k,) in m/s is how fast the edge sinks in.
     """
 
     depth: Array
@@ -54,7 +54,7 @@ class Running:
 
 @dataclass(frozen=True)
 class Geometry:
-    """The believed edge, the sheet and which lever the closure has.
+    """The edge with its uncertainty, the sheet, and the lever of the closure.
 
     ``upper_face_m`` is y_top, ``reference_m`` the indentation that places are expanded about.
     """
@@ -67,7 +67,7 @@ class Geometry:
 
     @property
     def edge(self) -> Edge:
-        """The edge that is believed most."""
+        """The most probable edge."""
         return self.belief.edge
 
     def depth_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
@@ -107,7 +107,7 @@ class Geometry:
         behind = self._depths_and_lever(self.edge, opening, contact - STEP_M)
         pairs = [
             [self._depths_and_lever(self.edge_off(i, s), opening, contact) for s in (1, -1)]
-            for i in self._believed
+            for i in self._uncertain
         ]
         middle = 0.5 * opening.sum(axis=1) / self.moving_blades
         arm = edge_height(self.edge, 0.5 * contact.sum(axis=1), middle).lever
@@ -128,10 +128,10 @@ class Geometry:
         high = self._at_depth(self.edge, opening, self.reference_m + step)
         low = self._at_depth(self.edge, opening, self.reference_m - step)
         above = [
-            self._at_depth(self.edge_off(i, 1), opening, self.reference_m) for i in self._believed
+            self._at_depth(self.edge_off(i, 1), opening, self.reference_m) for i in self._uncertain
         ]
         below = [
-            self._at_depth(self.edge_off(i, -1), opening, self.reference_m) for i in self._believed
+            self._at_depth(self.edge_off(i, -1), opening, self.reference_m) for i in self._uncertain
         ]
         pairs = list(zip(above, below, strict=True))
         return Running(
@@ -146,7 +146,7 @@ class Geometry:
         )
 
     def edge_off(self, index: int, sign: int) -> Edge:
-        """The edge with one believed parameter off by a share of its standard deviation."""
+        """The edge with one parameter off by ``EDGE_STEP_SDS`` standard deviations."""
         values = self.belief.mean.copy()
         values[index] += sign * self._edge_steps[index]
         return self.belief.with_values(values)
@@ -156,7 +156,7 @@ class Geometry:
 
         Torque is -dE/d(theta) of the stored energy E = m G(delta), so that mean force times
         -m d(delta)/d(theta) is the mean torque; the difference is taken with the contact held, at
-        either end. Equation 4 has no energy: the mean of its two levers stands there.
+        either end. Equation 4 has no energy: its lever is the mean of those at both ends.
         """
         depth, lever = self.depth_and_lever(edge, opening, contact)
         if self.closure == "eq4":
@@ -166,7 +166,7 @@ class Geometry:
         return depth, -self.moving_blades * sunk / np.diff(opening)[:, 0]
 
     @property
-    def _believed(self) -> range:
+    def _uncertain(self) -> range:
         return range(len(self.belief.names))
 
     @cached_property

@@ -1,14 +1,14 @@
-"""A first estimate of response and fracture, good enough to find where cracks wait and run."""
+"""A first estimate of response and fracture, good enough to find where cracks rest and run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import Material, PathMotion, mean_torque
+from scissorcal.calibration.cut.path.runs import Run
 from scissorcal.model import Response
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ PROFILE_RAD = 1e-3
 LONGEST_PROFILE = 80
 RELEASED = 0.05
 LEAST_TORQUE = 4.0
-"""A turn counts from so many times the scatter of the free motion after it."""
+"""Least torque at a turn, over the scatter of the free motion after it."""
 RUNNING_PROFILE_RAD = 10e-3
 PLACE_M = 1e-4
 """Unit of the places' corrections in the least squares."""
@@ -28,7 +28,7 @@ PLACE_M = 1e-4
 
 @dataclass(frozen=True)
 class Guess:
-    """Response and mean fracture energy (J/m), with the peak's ratio to that mean.
+    """Response and mean fracture energy (J/m), with the ratio of its peak to the mean.
 
     ``mean_energy`` is what running costs on average; a crack starts at ``peak_ratio`` times that.
     ``load`` is the share of the torque that friction takes off while the blades open.
@@ -50,7 +50,8 @@ class Guess:
         """Standard deviation (J) of the work in a part of a tooth, less the part's mean work.
 
         A sawtooth of height H and period p: H p / sqrt(720), from the variance of (u^2 - 1/4) / 2
-        over a cycle. It is taken at the guess and held, so that kappa is never told by a variance.
+        over a cycle. It is evaluated at the guess and held fixed, so that no variance informs
+        kappa.
         """
         height, period = self.tooth(geometry, opening)
         return height * period / float(np.sqrt(720.0))
@@ -94,25 +95,14 @@ class Guess:
         return float(contact) + advance
 
 
-class Span(Protocol):
-    """Samples ``low`` to ``high`` of a motion between two turns."""
-
-    @property
-    def motion(self) -> int: ...
-    @property
-    def low(self) -> int: ...
-    @property
-    def high(self) -> int: ...
-
-
 class NoUnloadingError(ValueError):
-    """No stroke shows the blades letting go of the material, so that nothing tells its response."""
+    """No stroke shows the blades unloading the material, so the response is not identifiable."""
 
 
 def first_guess(
     motions: tuple[PathMotion, ...],
     materials: tuple[Material, ...],
-    runs: Sequence[Span],
+    runs: Sequence[Run],
     geometry: Geometry,
     *,
     cuts: bool,
@@ -121,7 +111,7 @@ def first_guess(
 ) -> Guess:
     """Response from unloading alone, mean fracture energy from what closing costs.
 
-    Where the blades release the sheet is seen without any model, and gives each crack's place;
+    The place where the blades release the sheet needs no model and gives each crack's place;
     force and exponent follow by least squares with those places free. Where nothing is cut the
     place is the sheet's edge. Raises NoUnloadingError where none was seen.
     """
@@ -162,7 +152,7 @@ def _profile(
 def _unloading(
     motions: tuple[PathMotion, ...],
     materials: tuple[Material, ...],
-    run: Span,
+    run: Run,
     geometry: Geometry,
     cuts: bool,
 ) -> _Pull | None:
@@ -222,7 +212,7 @@ def _power_law(
 def _running_energy(
     motions: tuple[PathMotion, ...],
     materials: tuple[Material, ...],
-    runs: Sequence[Span],
+    runs: Sequence[Run],
     geometry: Geometry,
 ) -> float:
     """Median of m t torque / lever over closing, where that is no small share of its largest."""

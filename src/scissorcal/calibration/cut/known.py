@@ -1,4 +1,4 @@
-"""What a cut's fit takes over from the friction's: levels, inertia, cogging, noise."""
+"""What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,14 @@ from scissorcal.calibration.cut.path import (
     material_of,
     torque_noise_of,
 )
-from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.recipe.priors import CutPriors
 
 Array = NDArray[np.float64]
 
-OFFSET_SD_FLOOR = 1e-4
-"""Least standard deviation (N m) of friction in one stroke: levels differ by stroke and speed by
-more than the empty sweeps' posterior says."""
 USUAL_RATE = 0.3
 RATES = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])
 """Rates (rad/s) at which two laws of friction are compared."""
@@ -31,13 +28,12 @@ WITHIN_SD = (0.1587, 0.8413)
 
 @dataclass(frozen=True)
 class KnownFriction:
-    """Friction as the empty sweeps left it.
+    """Friction as fitted to the empty sweeps.
 
-    ``law`` and ``offset`` (N m) are the posterior's mean or its highest point, whichever has the
-    torques in the middle of the posterior: where parameters trade against each other along a bend,
-    their means lie beside it. ``closing_sd`` and ``opening_sd``
-    (N m) are how well friction is known in either direction over all strokes, ``stroke_sd`` what
-    single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
+    ``law`` and ``offset`` (N m) are the posterior's mean or its mode, whichever has torques closer
+    to the posterior median: along a curved ridge the mean lies beside it. ``closing_sd`` and
+    ``opening_sd`` (N m) are how well friction is known in either direction over all strokes,
+    ``stroke_sd`` what single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
     what the motor adds to the measured drive. ``prior`` takes the recipe's place where a study of
     simulated data states one.
     """
@@ -53,26 +49,27 @@ class KnownFriction:
     prior: StatedPrior | None = None
 
     @classmethod
-    def of(cls, friction: FitResult) -> "KnownFriction":
-        """Take a finished fit of friction."""
+    def of(cls, friction: FitResult, priors: CutPriors | None = None) -> "KnownFriction":
+        """Take a finished fit of friction, with the recipe's priors of a cut or their defaults."""
+        floor = (priors or CutPriors()).friction_sd_floor_Nm
         centre = float(friction.structure["angle_center"])
         means = _middle(friction, centre)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
         # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
-            max(OFFSET_SD_FLOOR, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
+            max(floor, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
         )
-        stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", OFFSET_SD_FLOOR))
+        stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", floor))
         return cls(
-            law=friction_law(_of_law(means), centre),
+            law=FrictionLaw.of_fit(means, centre),
             offset=float(means.get("offset", 0.0)),
             inertia=float(means["inertia"]),
             cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
             noise=torque_noise_of(friction.diagnostics),
             closing_sd=closing,
             opening_sd=opening,
-            stroke_sd=max(OFFSET_SD_FLOOR, stroke),
+            stroke_sd=max(floor, stroke),
         )
 
     def material(self, motion: PathMotion) -> Material:
@@ -80,14 +77,8 @@ class KnownFriction:
         return material_of(motion, self.law, self.offset, self.cogging)
 
 
-def _of_law(values: dict[str, Array]) -> dict[str, Array]:
-    """Parameters that a friction law has, without those of the drive and the noise."""
-    others = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
-    return {name: value for name, value in values.items() if name not in others}
-
-
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
-    """Values by name: means, or the highest point where its torques are nearer to the middle."""
+    """Values by name: means, or the mode where its torques are closer to the median."""
     means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
     names = [p.name for p in friction.parameters]
     highest = {**means, **dict(zip(names, np.asarray(friction.map_point), strict=True))}
@@ -110,5 +101,5 @@ def _spread(friction: FitResult, centre: float, rate: float) -> float:
 
 def _level(values: dict[str, Array], centre: float, rate: float) -> Array:
     """Friction and offset together at one rate, of one set of values or of many draws."""
-    torque = friction_torque(friction_law(_of_law(values), centre), centre, rate)
+    torque = friction_torque(FrictionLaw.of_fit(values, centre), centre, rate)
     return np.asarray(torque + values.get("offset", np.asarray(0.0)))

@@ -1,4 +1,4 @@
-"""A stated budget of lack of fit, carried from the segments into the parameters."""
+"""A stated budget of lack of fit, propagated from the segments to the parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class Budget:
         return np.asarray(np.sqrt(np.sum(np.square(rows), axis=0)))
 
     def widen(self, draws: Array, rng: np.random.Generator) -> Array:
-        """Draws (n, p) with an error of every kind's own added to each."""
+        """Draws (n, p), each with an independent error of every kind added."""
         wider = draws.copy()
         for kind, shift in self.shifts.items():
             wider += self.shares[kind] * rng.standard_normal((len(draws), 1)) * shift
@@ -43,19 +43,16 @@ class Budget:
 
 
 def budget_of(design: CutExperiment, point: Array, covariance: Array, share: float) -> Budget:
-    """Work out what an error of each kind does to the optimum at ``point`` (p,).
+    """Compute how an error of each kind of segment moves the optimum at ``point`` (p,).
 
     A relative error e of a kind's torques (of the line's period) moves the optimum by
     C d(score)/de, with C the covariance (p, p) of the normal approximation. A law that is wrong in
-    the same way in every stroke leaves no trace in residuals, so no statistic of them could tell
-    its size: it is stated in the recipe.
+    the same way in every stroke leaves no trace in the residuals, so the recipe states its size.
     """
     problem = design.candidate(design.observed).problem(design.series)
     step = 0.1 * natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
     shifts = {}
     for kind, changed in _changed(design).items():
-        if changed is None:
-            continue
         other = changed.candidate(changed.observed).problem(changed.series)
 
         def gained(u: Array, other: object = other, problem: object = problem) -> Array:
@@ -69,11 +66,11 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
     return Budget(shares, shifts)
 
 
-def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
+def _changed(design: CutExperiment) -> dict[str, CutExperiment]:
     """Designs in which one kind of segment was measured larger by ``PERTURBATION``.
 
     Elastic segments may also be wrong in proportion to their torque, from less to more within a
-    piece: that is what the exponent is told by.
+    piece: the exponent follows from that.
     """
     segments = design.likelihood.segments
     none = np.zeros(0)
@@ -89,14 +86,12 @@ def _changed(design: CutExperiment) -> dict[str, CutExperiment | None]:
         "unloading, by its torque": np.concatenate([unloading * slope, rest]),
         "running": (np.arange(count) >= elastic).astype(np.float64),
     }
-    found: dict[str, CutExperiment | None] = {}
+    found = {}
     for kind, weight in weights.items():
-        measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
-        found[kind] = (
-            replace(design, likelihood=replace(design.likelihood, measured=measured), _last={})
-            if np.any(weight)
-            else None
-        )
+        if np.any(weight):
+            measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
+            likelihood = replace(design.likelihood, measured=measured)
+            found[kind] = replace(design, likelihood=likelihood, _last={})
     line = design.likelihood.line
     if line is not None:
         moved = replace(line, log_period=line.log_period + PERTURBATION)

@@ -9,27 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.parameters import Layout, Parameter
+from scissorcal.model.transforms import IDENTITY
+from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
-
-KAPPA_LOGIT = (0.85, 1.0)
-REST_PHASE = (0.65, 0.25)
-"""Where in the cycle cracks come to rest, 0 just after a jump and 1 before the next: blades that
-yield stall where the torque is highest."""
-REST_SPREAD = (0.2, 1.0)
-"""Spread of that in cycles, and the standard deviation of its logarithm: 0.29 is uniform,
-and blades that stall leave less. Wide: a narrow one would tell kappa by the scatter of rests."""
-VARIATION = (0.04, 0.7)
-VARIATION_LENGTH_M = (1.5e-3, 0.5)
-SHEET_VARIATION = (0.004, 1.0)
-"""Sheets differ in their mean toughness: 90 % within 0.08 to 2 % before data."""
-NOISE_SCALE_SD = 0.2
-LOAD_SHARE_SD = 0.1
-"""Share of the cut's torque by which friction of the pivot grows: up to 0.1 in jaw tools."""
-DELAY_TICKS = (0.08, 0.06)
-"""A motor whose lag is 0 to 2 ticks is late by 0 to 0.13 ticks; 0.08 for a lag of one tick."""
-SHAPE_SD = 0.5
 
 LOADED = "load-dependent friction"
 """What the name of a law says of a load share."""
@@ -140,73 +124,64 @@ def cut_layout(recipe: Recipe, law: CutLaw, offset_sd: tuple[float, float]) -> L
 
     ``offset_sd`` (N m) is how well friction is known while closing and while opening.
     """
-    settings = recipe.fit.cut
-    force, exponent = settings.response_force_N, settings.response_exponent
+    settings, priors = recipe.fit.cut, recipe.fit.cut.priors
     depth = f"force at {settings.reference_indentation_mm:g} mm of indentation"
     rows = [
-        _log("response_force", "N", force.median, force.log_sd, depth),
-        _log("response_exponent", "1", exponent.median, exponent.log_sd, "how force stiffens"),
+        _stated("response_force", "N", settings.response_force_N, depth),
+        _stated("response_exponent", "1", settings.response_exponent, "how force stiffens"),
     ]
+    steps = "logarithm by which the exponent changes from one interval of the spline to the next"
     rows += [
-        Parameter(
-            f"response_shape_{index}",
-            "1",
-            "identity",
-            0.0,
-            SHAPE_SD,
-            "logarithm by which the exponent changes from one interval of the spline to the next",
-        )
+        _stated(f"response_shape_{index}", "1", priors.response_shape, steps)
         for index in range(1, len(law.knots_m) - 1)
     ]
     if law.damped:
-        damping, meaning = settings.rate_damping_s_per_m, "share by which sinking in adds force"
-        rows.append(_log("rate_damping", "s/m", damping.median, damping.log_sd, meaning))
+        meaning = "share by which sinking in adds force"
+        rows.append(_stated("rate_damping", "s/m", settings.rate_damping_s_per_m, meaning))
     if law.fracture != "none":
         rows += _fracture(recipe, law)
+    words = "friction offset while"
     rows += [
-        _plain("offset_closing", "N m", 0.0, offset_sd[0], "friction offset while closing"),
-        _plain("offset_opening", "N m", 0.0, offset_sd[1], "friction offset while opening"),
-        _log("noise_scale", "1", 1.0, NOISE_SCALE_SD, "noise of elastic segments over expected"),
-        _plain("torque_delay", "1", *DELAY_TICKS, "ticks by which torque is measured late"),
+        Parameter(f"offset_{way}", "N m", IDENTITY, 0.0, sd, f"{words} {way}")
+        for way, sd in zip(("closing", "opening"), offset_sd, strict=True)
+    ]
+    late = "ticks by which torque is measured late"
+    rows += [
+        _stated("noise_scale", "1", priors.noise_scale, "noise of elastic segments over expected"),
+        _stated("torque_delay", "1", priors.torque_delay_ticks, late),
     ]
     if law.loaded:
         meaning = "share of the cut's torque that friction adds"
-        rows.append(_plain("load_share", "1", 0.0, LOAD_SHARE_SD, meaning))
+        rows.append(_stated("load_share", "1", priors.load_share, meaning))
     return (RippleLayout if law.fracture == "rippled" else Layout)(tuple(rows))
 
 
 def _fracture(recipe: Recipe, law: CutLaw) -> list[Parameter]:
     """Toughness and unevenness; the energy's prior is that of its mean over a cycle."""
-    toughness = recipe.fit.cut.toughness_J_per_m2
+    toughness, priors = recipe.fit.cut.toughness_J_per_m2, recipe.fit.cut.priors
     assert toughness is not None
-    energy = toughness.median * recipe.material.thickness_mm * 1e-3
-    rows = [
-        _log(
-            "fracture_energy",
-            "J/m",
-            energy,
-            toughness.log_sd,
-            "toughness times thickness: energy per length of cut",
-        )
-    ]
+    thickness = recipe.material.thickness_mm * 1e-3
+    energy = "toughness times thickness: energy per length of cut"
+    rows = [_stated("fracture_energy", "J/m", toughness, energy, thickness)]
     if law.fracture == "rippled":
         share = "share of the fracture energy at which a running crack stops"
         rows += [
-            Parameter("kappa", "1", "logit", *KAPPA_LOGIT, share),
-            _plain("rest_phase", "1", *REST_PHASE, "where in the cycle cracks come to rest"),
-            _log("rest_spread", "1", *REST_SPREAD, "spread of that, in cycles"),
+            _stated("kappa", "1", priors.kappa, share),
+            _stated("rest_phase", "1", priors.rest_phase, "where in the cycle cracks come to rest"),
+            _stated("rest_spread", "1", priors.rest_spread, "spread of that, in cycles"),
         ]
+    within = "unevenness of the toughness within a sheet"
+    length = priors.toughness_variation_length_mm
     return [
         *rows,
-        _log("variation", "1", *VARIATION, "unevenness of the toughness within a sheet"),
-        _log("variation_length", "m", *VARIATION_LENGTH_M, "length over which it is even"),
-        _log("sheet_variation", "1", *SHEET_VARIATION, "unevenness between sheets"),
+        _stated("variation", "1", priors.toughness_variation, within),
+        _stated("variation_length", "m", length, "length over which it is even", 1e-3),
+        _stated("sheet_variation", "1", priors.sheet_variation, "unevenness between sheets"),
     ]
 
 
-def _log(name: str, unit: str, median: float, sd: float, meaning: str) -> Parameter:
-    return Parameter(name, unit, "log", float(np.log(median)), sd, meaning)
-
-
-def _plain(name: str, unit: str, mean: float, sd: float, meaning: str) -> Parameter:
-    return Parameter(name, unit, "identity", mean, sd, meaning)
+def _stated(name: str, unit: str, prior: AnyPrior, meaning: str, factor: float = 1.0) -> Parameter:
+    """A parameter with a prior of the recipe, whose median is multiplied by ``factor``."""
+    mean, sd = prior.normal()
+    shift = float(np.log(factor)) if factor != 1.0 else 0.0
+    return Parameter(name, unit, prior.transform, mean + shift, sd, meaning)

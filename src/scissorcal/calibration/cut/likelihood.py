@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.calibration.cut.segments import Segments
+from scissorcal.calibration.cut.teeth import Line
 from scissorcal.kernel import (
     CutFitData,
     CutFitParameters,
@@ -23,8 +24,8 @@ Array = NDArray[np.float64]
 
 TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)
-"""Knots of the response's table, evenly in the logarithm of the indentation from and to so many
-times the reference: an exponential is within 1e-8 of its value. A power law needs two."""
+"""Number of knots of the response's table, and its range in multiples of the reference, evenly in
+the logarithm: an exponential is within 1e-8 of its value. A power law needs two knots."""
 
 
 class Evaluation(NamedTuple):
@@ -42,15 +43,6 @@ class Evaluation(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LineDatum:
-    """What the line says: mean logarithm of the period over stretches, and its error."""
-
-    log_period: float
-    sd: float
-    stretches: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class CutLikelihood:
     """Segments with their geometry, ready to be compared with parameters by name.
 
@@ -62,7 +54,7 @@ class CutLikelihood:
     segments: Segments
     geometry: Geometry
     fracture: str
-    line: LineDatum | None = None
+    line: Line | None = None
     measured: Array | None = field(default=None, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -27,7 +27,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class CutCandidate(Candidate):
-    """A law of a cut over its segments: whitened, so that its terms are taken as independent.
+    """A candidate law of a cut; its segments are whitened, so that terms count as independent.
 
     ``log_likelihoods`` gives the likelihood over all segments at points (k, p), shape (k,).
     """
@@ -35,7 +35,7 @@ class CutCandidate(Candidate):
     log_likelihoods: Callable[[Array], Array] | None = None
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> CandidateProblem:
-        """The posterior of this rung, over the segments that ``keep`` selects."""
+        """The posterior of this candidate, over the segments that ``keep`` selects."""
         many = self.log_likelihoods
 
         def log_posteriors(points: Array) -> Array:
@@ -141,7 +141,7 @@ class CutExperiment:
 
     @cached_property
     def bins(self) -> Bins:
-        """The segments as a report draws them: mean motion over each, in the likelihood's order."""
+        """Mean motion over each segment, for reports, in the likelihood's order."""
         segments = self.likelihood.segments
         rows: list[dict[str, Array]] = []
         parts = [(p.motion, p.ends, segments.rests[p.rest].sheet) for p in segments.pieces]
@@ -174,7 +174,7 @@ class CutExperiment:
         )
 
     def contact(self, u: Array) -> Array:
-        """Where the crack stands from the pivot (m) over each segment (n,)."""
+        """Distance (m) of the crack from the pivot over each segment (n,)."""
         segments, geometry = self.likelihood.segments, self.likelihood.geometry
         places = self.evaluate(u).places
         advance = self.bins.advance

@@ -1,4 +1,4 @@
-"""From a first guess to segments and a line that a fit can rest on."""
+"""Preliminary fits: segments and the line of the teeth, from a first estimate."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,10 +11,11 @@ from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess, NoUnloadingError, first_guess
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
-from scissorcal.calibration.cut.likelihood import CutLikelihood, LineDatum
+from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.segments import Segments, cut_into_segments, find_runs
+from scissorcal.calibration.cut.path.runs import find_runs
+from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.inference import Optimum, find_optimum
@@ -25,33 +26,32 @@ Array = NDArray[np.float64]
 
 ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)
-DISAGREE = 4.0
-"""A line is refused where it costs the rest of the data as much as so many standard deviations."""
+MOST_SDS = 4.0
+"""A line is rejected where it lies more standard deviations from the rest of the data."""
 
 
 @dataclass(frozen=True)
 class Scouted:
-    """Segments by a fit that placed them, and the line, with why it is or is not believed.
+    """Segments placed by a preliminary fit, and the line of the teeth, accepted or rejected.
 
-    ``values`` are that fit's parameters by name, ``line`` is what was found, ``believed`` whether
-    it is used; ``without`` is kappa where the line is left out. ``evaluations`` counts likelihoods.
+    ``values`` are that fit's parameters by name, ``line`` is what was found, ``accepted`` whether
+    it is used, ``reason`` why not; ``without`` is kappa without the line. ``evaluations`` counts
+    likelihoods.
     """
 
     segments: Segments
     materials: tuple[Material, ...]
     values: Mapping[str, float]
     line: Line | None
-    believed: bool
+    accepted: bool
     without: float
     reason: str
     evaluations: int
 
     @property
-    def datum(self) -> LineDatum | None:
-        """The line as the likelihood takes it."""
-        if self.line is None or not self.believed:
-            return None
-        return LineDatum(self.line.log_period, self.line.sd, self.line.stretches)
+    def accepted_line(self) -> Line | None:
+        """The line if it is used."""
+        return self.line if self.accepted else None
 
 
 def scout(
@@ -61,7 +61,7 @@ def scout(
     geometry: Geometry,
     fracture: str,
 ) -> Scouted:
-    """Fit a power law twice, cutting the recordings anew by its result, and look for the teeth.
+    """Fit a power law twice, segment the recordings by its result, and look for the teeth.
 
     Raises NoUnloadingError where none was seen.
     """
@@ -85,7 +85,7 @@ def scout(
                 motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
             )
             if not segments.pieces:
-                raise NoUnloadingError("no unloading was seen")
+                raise NoUnloadingError("no stroke shows unloading")
             design = make_experiment(segments, geometry, recipe, law, known, values)
             optimum = find_optimum(design.candidate(design.observed).problem(design.series))
             evaluations += optimum.evaluations
@@ -104,7 +104,7 @@ def make_experiment(
     law: CutLaw,
     known: KnownFriction,
     values: Mapping[str, float],
-    line: LineDatum | None = None,
+    line: Line | None = None,
 ) -> CutExperiment:
     """One law over segments, with priors from the recipe; a search begins at ``values``."""
     layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
@@ -166,21 +166,24 @@ def _with_line(
     known: KnownFriction,
     geometry: Geometry,
 ) -> Scouted:
-    """Look for the teeth, ask whether they agree with the rest, and fit again with them."""
+    """Look for the teeth, test whether they agree with the rest, and fit again with them."""
     first = _line(found, geometry, design)
     found = replace(found, without=found.values["kappa"])
     if first is None:
-        return replace(found, reason="No stroke shows the teeth of a running crack as a line.")
+        return replace(
+            found, reason="no stroke shows the teeth of a running crack as a spectral line."
+        )
     if not first.at_two_speeds:
         return replace(
-            found, line=first, reason="The line of the teeth does not show at two stroke speeds."
+            found,
+            line=first,
+            reason="the teeth's line appears at one stroke speed only; two are needed.",
         )
     alone = design.candidate(design.observed).problem(design.series)
     values, line, evaluations = dict(found.values), first, found.evaluations
     for _ in range(ROUNDS):
         values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        datum = LineDatum(line.log_period, line.sd, line.stretches)
-        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, datum)
+        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, line)
         with_line = find_optimum(design.candidate(design.observed).problem(design.series))
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
@@ -190,13 +193,13 @@ def _with_line(
         line = again
     lost = optimum.value - alone.log_posterior(with_line.point)
     away = float(np.sqrt(max(2.0 * lost, 0.0)))
-    if away > DISAGREE:
+    if away > MOST_SDS:
         reason = (
-            f"The line's period lies {away:.1f} standard deviations from what the rest of the "
-            "data say, as encoder counts that alias with the samples do."
+            f"the line's period is {away:.1f} standard deviations (limit {MOST_SDS:g}) from the "
+            "rest of the data, as for encoder counts that alias with the samples."
         )
         return replace(found, line=line, reason=reason, evaluations=evaluations)
-    return replace(found, values=values, line=line, believed=True, evaluations=evaluations)
+    return replace(found, values=values, line=line, accepted=True, evaluations=evaluations)
 
 
 def _line(
@@ -266,7 +269,7 @@ def _natural(design: CutExperiment, point: Array) -> dict[str, float]:
 
 
 def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
-    """The geometry that a recipe and a believed edge give."""
+    """The geometry of a recipe and an edge with its uncertainty."""
     return Geometry(
         belief,
         recipe.upper_face_m,

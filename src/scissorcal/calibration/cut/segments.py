@@ -1,12 +1,11 @@
-"""A recording of cuts in pieces: cracks that wait, and cracks that run.
+"""Segments of a recording of cuts: cracks at rest, and running cracks.
 
 On each sheet the blades close and open again. While they open, and until they have closed far
-enough again, the crack stands: what is measured then is elastic, and one place of the crack (a
-rest) serves the way back and the way in. Beyond, the crack runs.
+enough again, the crack rests: the torque is elastic, and one place of the crack (a rest) holds for
+unloading and loading. Beyond, the crack runs.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,45 +18,45 @@ from scissorcal.calibration.cut.path import (
     mean_torque,
     sums_between,
     torque_covariance,
-    turning_points,
 )
-from scissorcal.calibration.cut.swings import swings_unseen
+from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, Run, find_runs, split
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-TURN_RAD = 3e-3
-"""A turn that is undone within so much is a tremor."""
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
-"""An elastic segment spans at least so many steps of the encoder; so many in a piece that would
-else have too few segments."""
+"""Least encoder steps of an elastic segment; the second in a piece with too few segments."""
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
-"""Running segments hold so many teeth at least: in shorter ones the teeth themselves pass for
-unevenness of a short range, which takes the long range's place and makes intervals too narrow."""
+"""Least length and least teeth of running segments: in shorter ones the teeth are
+fitted as short-range unevenness in place of the long-range one, and intervals get too narrow."""
 LOADING_END = 0.88
-"""Share of the critical indentation at which loading ends: weak places start the crack sooner."""
+"""Share of the critical indentation at which loading ends, since weak places crack earlier."""
 RUNNING_FROM = 1.6
-"""Indentation, in critical ones, a standing crack would have where a running one is trusted."""
+"""Indentation over the critical one, for a crack at rest, from which running segments count."""
 FREE_SHARE = 0.4
-"""What a piece has of the way without contact, in lengths of its contact: it tells the offset."""
+"""Path without contact in a piece over its contact's length: it identifies the offset."""
 TURN_SHARE, STANDING_SHARE = 0.03, 0.25
-"""Shares of the contact's length that are left out after a turn: in any case, and where the blades
-stand, whose friction may have either sign."""
-FEWEST_SEGMENTS = 5
+"""Shares of the contact's length that are left out after a turn: always, and where the blades
+rest, since friction may have either sign there."""
 LEAST_TORQUE_SDS = 5.0
 LEAST_RANGE_RAD = 1e-3
+COUNTS_A_TOOTH = 10.0
+"""Encoder steps per tooth from which the motion within a tooth is resolved."""
+SWINGING = 0.5
+"""Standard deviation of the rate over its mean from which blades may turn back: 0.8 to 1 where they
+did, 0.2 at most where they did not."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A place at which a crack stands: ``place`` (m, sheet's frame) is a first estimate.
+    """A crack at rest: ``place`` (m, sheet's frame) is a first estimate.
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
-    cut yet, whose crack stands at 0.
+    cut yet, whose crack is at 0.
     """
 
     sheet: int
@@ -111,43 +110,12 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Segments:
-    """Everything that a likelihood of cuts is made from."""
+    """The data of a likelihood of cuts."""
 
     motions: tuple[PathMotion, ...]
     rests: tuple[Rest, ...]
     pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
-
-
-@dataclass(frozen=True)
-class Run:
-    """Samples ``low`` to ``high`` of a motion between two turns of the blades."""
-
-    motion: int
-    sheet: int
-    low: int
-    high: int
-
-    def closing(self, motion: PathMotion) -> bool:
-        return bool(motion.opening[self.high] < motion.opening[self.low])
-
-
-def find_runs(motions: tuple[PathMotion, ...]) -> list[Run]:
-    """Stretches between turns on each sheet, in order of time."""
-    runs: list[Run] = []
-    for index, motion in enumerate(motions):
-        bounds = np.flatnonzero(np.diff(motion.sheet)) + 1
-        edges = [0, *bounds.tolist(), len(motion.sheet)]
-        for low, high in pairwise(edges):
-            sheet = int(motion.sheet[low])
-            if sheet < 0 or high - low < 2 * FEWEST_SEGMENTS:
-                continue
-            turns = [low + t for t in turning_points(motion.opening[low:high], TURN_RAD)]
-            ends = [low, *turns, high - 1]
-            runs += [
-                Run(index, sheet, a, b) for a, b in pairwise(ends) if b - a >= 2 * FEWEST_SEGMENTS
-            ]
-    return sorted(runs, key=lambda run: (motions[run.motion].recording, run.motion, run.low))
 
 
 def cut_into_segments(
@@ -162,7 +130,7 @@ def cut_into_segments(
     """Cut motions with what the material did (see :func:`material_of`) into segments.
 
     ``guess`` says where cracks wait and how deep the edge may sink before they run; ``cuts`` is
-    false where nothing is cut. Samples that a sensor spoilt take their segment with them.
+    false where nothing is cut. A segment with an invalid sample is left out.
     """
     builder = _Builder(motions, materials, geometry, guess, noise, offset_sd, cuts)
     sheet: tuple[int, int] | None = None
@@ -178,41 +146,22 @@ def cut_into_segments(
     return Segments(motions, tuple(builder.rests), tuple(builder.pieces), tuple(builder.stretches))
 
 
-def split(path: Array, low: int, high: int, step: float) -> Integers:
-    """Samples from ``low`` on, each ``step`` further along the path than the last."""
-    if not step > 0.0:
-        raise ValueError(f"segments need a positive length, not {step}")
-    away = np.sign(path[high] - path[low]) * (path[low : high + 1] - path[low])
-    farthest = np.maximum.accumulate(away)
-    ends, at = [low], 0.0
-    while True:
-        index = int(np.searchsorted(farthest, at + step))
-        if index >= len(away):
-            return np.array(ends, dtype=np.int64)
-        ends.append(low + index)
-        at = float(away[index])
-
-
+@dataclass
 class _Builder:
-    """Collects rests, pieces and stretches run by run."""
+    """Collects rests, pieces and stretches, run by run."""
 
-    def __init__(
-        self,
-        motions: tuple[PathMotion, ...],
-        materials: tuple[Material, ...],
-        geometry: Geometry,
-        guess: Guess,
-        noise: TorqueNoise,
-        offset_sd: float,
-        cuts: bool,
-    ) -> None:
-        self.motions, self.materials, self.geometry = motions, materials, geometry
-        self.guess, self.noise, self.offset_sd, self.cuts = guess, noise, offset_sd, cuts
-        self.rests: list[Rest] = []
-        self.pieces: list[Piece] = []
-        self.stretches: list[Stretch] = []
-        self.sheets = 0
-        self.sheet = -1
+    motions: tuple[PathMotion, ...]
+    materials: tuple[Material, ...]
+    geometry: Geometry
+    guess: Guess
+    noise: TorqueNoise
+    offset_sd: float
+    cuts: bool
+    rests: list[Rest] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)
+    stretches: list[Stretch] = field(default_factory=list)
+    sheets: int = 0
+    sheet: int = -1
 
     def new_sheet(self, sheet: int) -> None:
         self.sheet = self.sheets
@@ -272,7 +221,7 @@ class _Builder:
         self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
 
     def _place_at_turn(self, run: Run) -> float | None:
-        """Where the crack stands by the unloading alone, at the guessed response."""
+        """The crack's place by the unloading alone, at the guessed response."""
         motion, geometry = self.motions[run.motion], self.geometry
         work = self.materials[run.motion].work
         opening, low = motion.opening, run.low
@@ -321,13 +270,13 @@ class _Builder:
         self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
 
     def _stretch(self, run: Run, low: int) -> None:
-        """Running segments; those with a spoilt sample part a stretch in two."""
+        """Running segments; one with an invalid sample splits a stretch in two."""
         motion, geometry = self.motions[run.motion], self.geometry
         _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
         step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
         every = split(motion.opening, low, run.high, step)
-        spoilt = np.concatenate([[0], np.cumsum(~motion.usable)])
-        for ends in _parts(every, spoilt):
+        invalid = np.concatenate([[0], np.cumsum(~motion.usable)])
+        for ends in _parts(every, invalid):
             material = self.materials[run.motion]
             path, work = free_path(motion, material, geometry, ends)
             turned = np.diff(motion.opening[ends])
@@ -353,16 +302,28 @@ class _Builder:
 
 
 def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
-    """First sample at which blades that turned at the first one have left it, and stay away.
+    """First sample from which blades that turned at the first one stay away from it.
 
-    ``length`` (rad) is that of the contact; blades that stand within its first quarter are at the
-    turn still.
+    ``length`` (rad) is that of the contact; blades that rest within its first quarter are
+    still at the turn.
     """
     stop = int(np.argmax(opening > opening[0] + length)) or None
     away = opening[:stop] - opening[0]
     there = (away < TURN_SHARE * length) | (standing[:stop] & (away < STANDING_SHARE * length))
     last = np.flatnonzero(there)
     return int(last[-1]) + 1 if len(last) else 0
+
+
+def _parts(ends: Integers, invalid: Integers) -> list[Integers]:
+    good = invalid[ends[1:] + 1] == invalid[ends[:-1]]
+    parts: list[Integers] = []
+    begin = 0
+    for index in range(len(good) + 1):
+        if index == len(good) or not good[index]:
+            if index - begin >= FEWEST_SEGMENTS:
+                parts.append(ends[begin : index + 1])
+            begin = index + 1
+    return parts
 
 
 def free_path(
@@ -372,8 +333,7 @@ def free_path(
 
     A tooth loads by d(delta) = -(lever d(theta) - m t d(advance)) / m, whether blades close or the
     sledge moves on, so the path of a running crack is d(eta) = d(theta) - (m t / lever) d(advance).
-    What the sledge's part contributes to the sum of torque over that path is torque that the
-    opening's own work does not hold.
+    The torque times the sledge's part of that path is not part of the opening's work.
     """
     low, high = int(ends[0]), int(ends[-1])
     share = sledge_share(motion, geometry, low, high)
@@ -390,7 +350,7 @@ def mean_direction(
 ) -> Array:
     """Mean direction (k,) of friction between samples ``ends`` (k + 1,), weighed by the path.
 
-    With ``by_torque`` also by the material's torque: blades that swing back do so while it is high.
+    With ``by_torque`` also by the material's torque: blades move back while it is high.
     """
     low, high = int(ends[0]), int(ends[-1])
     step = np.diff(motion.opening[low : high + 1])
@@ -409,13 +369,14 @@ def sledge_share(motion: PathMotion, geometry: Geometry, low: int, high: int) ->
     return np.asarray(np.interp(np.arange(low, high), knots, share))
 
 
-def _parts(ends: Integers, spoilt: Integers) -> list[Integers]:
-    good = spoilt[ends[1:] + 1] == spoilt[ends[:-1]]
-    parts: list[Integers] = []
-    begin = 0
-    for index in range(len(good) + 1):
-        if index == len(good) or not good[index]:
-            if index - begin >= FEWEST_SEGMENTS:
-                parts.append(ends[begin : index + 1])
-            begin = index + 1
-    return parts
+def swings_unseen(motion: PathMotion, ends: Integers, period: float) -> bool:
+    """Whether blades may move back between teeth by less than the encoder resolves.
+
+    Slow blades stop or turn at each tooth. Friction then acts over a longer path than the net one:
+    with 4 counts a tooth (``period``, rad) it was 0.7 to 1.0 mN m, or 4 %, more than smoothed
+    positions say.
+    """
+    if period > COUNTS_A_TOOTH * motion.resolution:
+        return False
+    rate = motion.rate[ends[0] : ends[-1] + 1]
+    return bool(np.std(rate) > SWINGING * abs(float(np.mean(rate))))

@@ -1,4 +1,4 @@
-"""Sheets that were cut before, or were never there: most of their strokes cut nothing."""
+"""Sheets that were cut before, or were missing: most of their strokes cut nothing."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.segments import find_runs
+from scissorcal.calibration.cut.path.runs import find_runs
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge
 
@@ -38,9 +38,9 @@ def count_empty(
     materials: tuple[Material, ...],
     recordings: tuple[Recording, ...],
 ) -> tuple[SheetStrokes, ...]:
-    """Count by sheet the closing strokes in which the material resists, and those in which none is.
+    """Count by sheet the closing strokes, and those in which the material's torque is missing.
 
-    What a stroke shows is the material's work over its path: its mean torque.
+    The torque of a stroke is the material's work over its path.
     """
     work: dict[tuple[int, int, int], float] = {}
     path: dict[tuple[int, int, int], float] = {}
@@ -71,13 +71,13 @@ def stale_verdict(rows: tuple[SheetStrokes, ...]) -> Verdict:
     """Judge whether every sheet was there, and fresh, for most of its strokes."""
     stale = [row for row in rows if row.share > MOST]
     worst = max((row.share for row in rows), default=0.0)
-    good = f"{worst:.0%} at most of a sheet's closing strokes cut nothing."
+    good = f"At most {worst:.0%} of a sheet's closing strokes cut nothing (limit {MOST:.0%})."
     named = "; ".join(
         f"sheet {row.sheet} of {row.recording}: {row.empty} of {row.strokes}" for row in stale
     )
     bad = (
         f"Closing strokes that cut nothing: {named}. The sheet was cut before, or had ended, and "
-        "the fit takes the missing material for weak material. Put fresh material in, with its "
-        "near edge where advance is 0, and capture again."
+        "the fit takes the gap for weak material. Insert fresh material with its near edge at "
+        "advance 0, and capture again."
     )
     return judge("fit.cut", "stale sheets", worst, MOST, good, bad)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model import Cutting, Edge, EdgeBelief, Response
+from scissorcal.model.transforms import IDENTITY
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def edge_layout(belief: EdgeBelief) -> Layout:
             Parameter(
                 f"edge_{name}",
                 units.get(name, "m"),
-                "identity",
+                IDENTITY,
                 float(mean),
                 float(sd),
                 "the blade's edge, as photographs or the recipe tell it",

@@ -1,8 +1,8 @@
 """The teeth of a running crack: a periodic torque in the crack's own phase.
 
 Between two jumps the edge sinks in by the same depth, so in the phase d(eta) / period the torque
-repeats once a cycle, whatever the speed. How far the phase really advances from cycle to cycle is
-read off the signal: it is the ratio of the true period to the one that the parameters give.
+repeats once per cycle at any speed. The signal's phase advance per cycle gives the ratio of the
+true period to that of the parameters.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ Complex = NDArray[np.complex128]
 SUBDIVISIONS = 32
 HALF_CYCLE = SUBDIVISIONS // 2
 WINDOW_CYCLES = 5
-"""Hann windows of so many cycles; their phases are compared one whole window apart, so that they
-share no sample and what is not periodic adds nothing on average."""
+"""Cycles of the Hann windows. Phases are compared one window apart, so that they share no sample
+and aperiodic parts cancel on average."""
 LOCAL_CYCLES = 6.0
 LEAST_TICKS = 3.5
-"""A stroke counts from so many samples a tooth; below, teeth and samples alias."""
+"""Least samples per tooth of a stroke; below, teeth and samples alias."""
 FASTEST_RATIO = (0.7, 1.4)
 SCAN = (0.25, 2.5)
 SCAN_STEP = 0.04
@@ -48,8 +48,7 @@ SAME_PERIOD = 0.03
 HARMONICS = (2, 3)
 HARMONIC_POWER = 0.25
 PERIOD_SD = 0.003
-"""The law of the period against a crack that is stepped exactly, and what unevenness within a tooth
-adds: 0.3 % covers what the virtual rigs showed."""
+"""Relative error of the period's formula and of unevenness within a tooth, from simulated rigs."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class PhaseSignal:
 
 @dataclass(frozen=True)
 class Line:
-    """A line that was found: the true period is ``ratio`` times the expected one, +- ``sd``.
+    """A detected line: the true period is ``ratio`` times the expected one, with ``sd``.
 
     ``log_period`` is the mean logarithm of the period (rad) over the stretches ``stretches``,
     ``gain`` the power that keeps its phase over what noise would leave. ``speeds`` has rows of
@@ -88,7 +87,7 @@ class Line:
 
     @property
     def at_two_speeds(self) -> bool:
-        """Whether two speeds that differ show the line at one period: counts would move."""
+        """Whether two different speeds show the line at one period, unlike aliased counts."""
         shown = [(speed, ratio) for speed, ratio, gain in self.speeds if gain > COHERENT]
         return any(
             a[0] > SPEEDS_DIFFER * b[0] and abs(np.log(a[1] / b[1])) < SAME_PERIOD
@@ -132,7 +131,7 @@ def find_line(
     paths: Sequence[Array],
     near: bool = False,
 ) -> Line | None:
-    """Look for the teeth; None where no stroke shows them.
+    """Detect the teeth; None where no stroke shows them.
 
     The phase's true advance is searched over ``SCAN`` of the expected one, by the power that keeps
     its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1979,
@@ -283,8 +282,8 @@ def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
 def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """The frequency, or one that gains whole cycles more or less between two windows.
 
-    The coherence tells them apart where noise has more power at the wrong one, the power where a
-    harmonic keeps its phase as well.
+    The coherence decides where noise has more power at the wrong one, the power where a harmonic
+    keeps its phase as well.
     """
     best, highest = frequency, -np.inf
     for _ in range(FURTHEST_ALIAS):
@@ -300,7 +299,7 @@ def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
 
 
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
-    """The frequency, or a half or a third of it where that has teeth of its own."""
+    """The frequency, or a half or a third of it where that has enough power."""
     frequency = _strongest(signals, frequency)
     own = coherent_power(signals, frequency)
     for order in HARMONICS:

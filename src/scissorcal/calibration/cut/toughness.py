@@ -6,6 +6,7 @@ import numpy as np
 
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
+from scissorcal.model.transforms import LOG
 from scissorcal.recipe.schema import Recipe
 
 MEANING = "fracture energy over thickness: energy per area of cut"
@@ -29,7 +30,6 @@ def with_toughness(fit: FitResult, recipe: Recipe, rng: np.random.Generator) -> 
     centre = float(np.log(material.thickness_mm * 1e-3)) - 0.5 * variance
     thickness = centre + np.sqrt(variance) * rng.standard_normal(len(fit.draws))
     u = np.log(fit.column("fracture_energy")) - thickness
-    mean = float(np.log(prior.median))
-    row = Layout((Parameter("toughness", "J/m^2", "log", mean, prior.log_sd, MEANING),))
+    row = Layout((Parameter("toughness", "J/m^2", LOG, *prior.normal(), MEANING),))
     draws = u[:, None]
     return replace(fit, derived=row.fitted(draws), derived_draws=row.columns(draws))

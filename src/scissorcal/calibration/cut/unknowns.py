@@ -1,11 +1,11 @@
-"""What nobody measured, as a bound on the torque of the scene: zeros, edge, friction by load."""
+"""Bounds on the scene's torque from quantities that were not measured: zeros, edge, load."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.laws import LOAD_SHARE_SD, LOADED
+from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
@@ -18,7 +18,7 @@ from scissorcal.verdicts import Status, Verdict
 Array = NDArray[np.float64]
 
 BY_EYE_M = 0.5e-3
-"""A blade's tip is rounded and worn: by eye or ruler its line is known to half a millimetre
+"""A blade's tip is rounded and worn: by eye or ruler its line is known to 0.5 mm
 (docs/decisions/062-the-centreline-halves-the-blade.md)."""
 OPENINGS, CONTACTS = 9, 7
 SCENE_OF_BOUNDS = (
@@ -28,18 +28,18 @@ SCENE_OF_BOUNDS = (
     "tolerance_percent",
     "render_friction",
 )
-"""What of a recipe's scene the bounds depend on."""
+"""Fields of a recipe's scene that the bounds depend on."""
 SURE = 2.0
-"""Standard deviations up to which a measured zero or a fitted share counts."""
+"""Standard deviations of a measured zero or a fitted share that a bound includes."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """One thing that was not measured: the torque it may cost, and what removes it.
+    """One quantity that was not measured: the torque error it may cause, and the remedy.
 
     ``torque_Nm`` bounds the error of the mean torque over the scene, ``share`` is that over the
-    mean itself. ``spread`` says how far the unknown may be off and where that is from;
-    ``removed_by`` is empty where nothing is unknown.
+    mean itself. ``spread`` says how far the quantity may be off, and on what grounds;
+    ``removed_by`` is the remedy, empty where nothing is unknown.
     """
 
     name: str
@@ -100,12 +100,12 @@ class SceneMean:
 def with_unknowns(
     fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
 ) -> FitResult:
-    """Give a cut's fit its verdicts on what was not measured, and the bounds as diagnostics.
+    """Add verdicts on what was not measured to a cut's fit, and the bounds as diagnostics.
 
-    Each bound is the change of the scene's mean torque at the fitted parameters. A fit to another
-    edge would follow by parameters of its own and end nearer, so it is never too small where the
-    scene lies within the data. Bounds are no errors that were seen: a large one rejects nothing,
-    the check counts as not evaluated and says what to measure.
+    Each bound is the change of the scene's mean torque at the fitted parameters. A fit with another
+    edge would adapt its parameters and come closer, so the bound is conservative where the scene
+    lies within the data. A bound is no observed error: a large one rejects nothing; the check
+    counts as not evaluated and names what to measure.
     """
     found = find_unknowns(fit, recipe, friction, recordings)
     limit = recipe.scene.tolerance_percent / 100.0
@@ -137,51 +137,54 @@ def find_unknowns(
 
 def _verdict(one: Unknown, limit: float) -> Verdict:
     status: Status = "pass" if one.share <= limit else "not_evaluated"
-    size = f"Up to {one.torque_Nm:.2g} N m ({one.share:.1%}) of the scene's mean torque"
+    size = f"Error up to {one.share:.1%} of the scene's mean torque ({one.torque_Nm:.2g} N m)"
     if one.torque_Nm == 0.0:
-        size = "Nothing of the scene's torque is open"
+        size = "No torque error"
     why = f"{size}: {one.spread} {one.removed_by}".rstrip()
     return Verdict("fit.cut", one.name, status, one.share, limit, why)
 
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:
-    cure = "Zero the opening with the centrelines together, and state rig.opening_zero_sd_deg."
+    cure = "Zero the opening with the centrelines together and state rig.opening_zero_sd_deg."
     spread = recipe.rig.moving_blades * BY_EYE_M / (recipe.rig.edge.length_mm * 1e-3)
     stated = recipe.rig.opening_zero_sd_deg
     if stated is not None:
         spread, cure = SURE * float(np.radians(stated)), ""
-        said = f"the recipe has the zero of the opening known to {stated:.2g} deg (sd)."
+        said = f"the opening's zero has a standard deviation of {stated:.2g} deg (recipe)."
     else:
-        said = f"the zero of the opening may be off by {spread:.2g} rad, half a millimetre a tip."
+        said = (
+            f"the opening's zero may be off by {np.degrees(spread):.2g} deg, 0.5 mm at each "
+            "blade tip."
+        )
     return scene.change(spread), said, cure
 
 
 def _torque_zero(
     recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
 ) -> tuple[float, str, str]:
-    """A zero is alike in friction and cut; it is felt where unequal levels are rendered."""
+    """The torque sensor's zero: it matters where friction with unequal levels is rendered."""
     if not recipe.scene.render_friction:
-        return 0.0, "friction, into which a zero goes, is not rendered.", ""
+        return 0.0, "friction, which contains the torque's zero, is not rendered.", ""
     levels = [p.mean for p in friction.parameters if p.name in ("coulomb_pos", "coulomb_neg")]
     if len(levels) < 2:
-        return 0.0, "friction's fit has an offset of its own, which is not rendered.", ""
+        return 0.0, "the friction fit has an offset parameter, which is not rendered.", ""
     known = idle_zero(recordings)
     if known is not None:
-        said = f"an idle second shows {known.mean:.2g} N m (sd {known.sd:.1g}) of drive."
+        said = f"the drive torque at idle is {known.mean:.2g} N m (sd {known.sd:.1g})."
         return abs(known.mean) + SURE * known.sd, said, ""
     half = 0.5 * abs(levels[0] - levels[1])
     said = (
-        f"friction differs by {2 * half:.2g} N m between the directions, and a zero of the torque "
-        "or force sensor would look the same."
+        f"friction differs by {2 * half:.2g} N m between the directions, and a zero offset of the "
+        "torque or force sensor would look the same."
     )
-    cure = "Record an idle second, motors off and hands off, to tell them apart."
+    cure = "Record one second at idle, motors and hands off, to separate the two."
     return half, said, cure
 
 
 def _edge_shape(scene: SceneMean, fit: FitResult, recipe: Recipe) -> tuple[float, str, str]:
     fitted = {p.name.removeprefix("edge_") for p in fit.parameters if p.name.startswith("edge_")}
     if recipe.rig.edge.source == "photographs" or {"offset_m", "taper_rad"} <= fitted:
-        said = "photographs or the recipe say how well the edge is known; the intervals hold it."
+        said = "the intervals include the edge's uncertainty, from photographs or the recipe."
         return 0.0, said, ""
     length = scene.cutting.edge.length_m
     bend = 8.0 * BY_EYE_M / length**2
@@ -191,12 +194,12 @@ def _edge_shape(scene: SceneMean, fit: FitResult, recipe: Recipe) -> tuple[float
     if "taper_rad" not in fitted:
         changes.append(scene.change(taper_rad=BY_EYE_M / length))
     said = (
-        "the recipe does not say how well offset and taper of the edge are known: what it leaves "
-        "open of offset, tip and middle may each be off by half a millimetre."
+        "the recipe states no standard deviation for the edge's offset or taper, so edge offset, "
+        "tip and middle may each be off by 0.5 mm."
     )
     cure = (
-        'Photograph the blade (rig.edge.source = "photographs"), or state offset_sd_mm and '
-        "taper_sd_deg."
+        'Photograph the blade (rig.edge.source = "photographs"), or state rig.edge.offset_sd_mm '
+        "and taper_sd_deg."
     )
     return float(np.linalg.norm(changes)), said, cure
 
@@ -204,17 +207,18 @@ def _edge_shape(scene: SceneMean, fit: FitResult, recipe: Recipe) -> tuple[float
 def _load(
     mean: float, fit: FitResult, recipe: Recipe, friction: FitResult
 ) -> tuple[float, str, str]:
-    cure = "Record loaded sweeps, motor and handle against each other, to know it."
+    cure = "Record loaded sweeps, with motor and handle against each other, to measure it."
     share = next((p for p in fit.nuisance if p.name == "load_share"), None)
     if share is not None:
         said = (
-            f"friction of the pivot took {share.mean:.2g} (sd {share.sd:.1g}) of the cut's torque, "
-            "which is not rendered."
+            f"the pivot's load-dependent friction is {share.mean:.2g} (sd {share.sd:.1g}) of the "
+            "cut's torque, and it is not rendered."
         )
         return (abs(share.mean) + SURE * share.sd) * mean, said, cure
     if any(parameter.name == "load_share" for parameter in friction.parameters):
-        return 0.0, "the empty sweeps were loaded, and friction's fit has it.", ""
+        return 0.0, "loaded sweeps were recorded, and the friction fit includes it.", ""
     if any(LOADED in str(row["name"]) for row in fit.rungs):
-        return 0.0, "laws with and without it were compared, and the strokes show none.", ""
-    said = f"jaw tools have up to {LOAD_SHARE_SD:g} of the load as friction, and none was fitted."
-    return LOAD_SHARE_SD * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'
+        return 0.0, "candidates with and without it were compared; the strokes show none.", ""
+    usual = recipe.fit.cut.priors.load_share.sd
+    said = f"jaw tools lose up to {usual:.0%} of the load to friction, and none was fitted."
+    return usual * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'

@@ -1,10 +1,10 @@
-"""What of a cut's recordings enters its fit, by stroke and speed, and why the rest does not."""
+"""Which samples of a cut's recordings the fit uses, by stroke and speed, and why not the others."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.segments import Segments
-from scissorcal.calibration.signals.usage import GAP, SPOILT, Usage, count_usage
+from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording
 
 Mask = NDArray[np.bool_]
@@ -16,18 +16,18 @@ FREE = "blades free of the material"
 def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> Usage:
     """Count the samples that elastic and running segments span.
 
-    Between the end of loading and where a running crack is trusted a crack is about to start, and
-    no segment can say when. The rest of a stroke is spent free of the material, or on the turn.
+    Between the end of loading and the first running segment the crack starts at an unknown sample.
+    In the rest of a stroke the blades are free of the material, or turn.
     """
     sizes = [len(recording.samples) for recording in recordings]
     masks = {
         name: tuple(np.zeros(size, dtype=bool) for size in sizes)
-        for name in ("used", "inside", SPOILT, STARTING)
+        for name in ("used", "inside", INVALID, STARTING)
     }
     for motion in segments.motions:
         span = slice(motion.start, motion.start + len(motion.opening))
         masks["inside"][motion.recording][span] = True
-        masks[SPOILT][motion.recording][span] = ~motion.usable
+        masks[INVALID][motion.recording][span] = ~motion.usable
     loaded: dict[int, list[int]] = {}
     for piece in segments.pieces:
         _mark(masks["used"], segments, piece.motion, int(piece.ends[0]), int(piece.ends[-1]))
@@ -42,7 +42,7 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
             _mark(masks[STARTING], segments, run.motion, before, low)
     reasons = {
         GAP: tuple(~inside for inside in masks["inside"]),
-        SPOILT: masks[SPOILT],
+        INVALID: masks[INVALID],
         STARTING: masks[STARTING],
         FREE: masks["inside"],
     }
@@ -50,7 +50,7 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
 
 
 def usage_sentence(recordings: tuple[Recording, ...], usage: Usage) -> str:
-    """How much of the closing strokes is used, and of which speed least: opening ones are free."""
+    """How much of the closing strokes is used, and of which speed least."""
     kinds = [stroke.kind for recording in recordings for stroke in recording.strokes]
     closing = [row for row in usage.rows if row.stroke >= 0 and kinds[row.stroke] != "opening"]
     if not closing:

@@ -1,12 +1,13 @@
-"""What a blade's fit ends in: its edge with covariance, bands along it, nicks, verdicts."""
+"""What a blade fit results in: the edge with its covariance, bands along it, nicks, verdicts."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.edge.cells import FoundNick
+from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.errors import InputError
 from scissorcal.model import EdgeBelief
 from scissorcal.verdicts import Verdict
@@ -26,11 +27,12 @@ class Band:
 
 @dataclass(frozen=True)
 class RungRow:
-    """One family of edges as it was compared.
+    """One family of edges in the model comparison.
 
-    ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` over
-    ``roughness_length_m`` is what is left of the edge beyond its family, ``noise_factor`` how much
-    noisier points are than the picture's light says, ``between_m`` how much photographs disagree.
+    ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` is the standard
+    deviation of the edge about its family and ``roughness_length_m`` its correlation length,
+    ``noise_factor`` the noise of points over that expected from the picture's light, ``between_m``
+    the standard deviation between photographs.
     """
 
     family: str
@@ -44,11 +46,11 @@ class RungRow:
 
 @dataclass(frozen=True)
 class PhotographRow:
-    """What one photograph gave: its points, its blur, and how far it lies from the joint fit.
+    """One photograph: its points, its blur, and its distance from the joint fit.
 
-    ``away`` is its mean residual, ``away_sd`` what that may be by its own pivot, centreline and
-    mapping. ``station`` and ``residual`` are its points, averaged over short cells, and how far
-    they lie from the joint edge.
+    ``away`` is its mean residual, ``away_sd`` the standard deviation of that from its own pivot,
+    centreline and mapping. ``station`` and ``residual`` are its points, averaged over short cells,
+    and their residuals.
     """
 
     source: str
@@ -64,37 +66,42 @@ class PhotographRow:
     residual: tuple[float, ...] = ()
 
 
+_STATION = Stored(("station",))
+
+
 @dataclass(frozen=True)
 class BladeFit:
     """One blade fitted to all its photographs.
 
-    ``belief`` is what a cut's fit takes as prior, ``draws`` (n, k) are of its parameters. Lengths
+    ``belief`` is the prior of a cut's fit, ``draws`` (n, k) are of its parameters. Lengths
     are metres where ``metric``, else blade lengths. ``station`` (n,) are places along the edge with
     the bands ``offset`` (e) and ``taper`` (alpha, rad). ``opening`` (i,) and ``contact`` (j,) span
-    the scene, ``height`` (i, j) is phi there; None without a scale. ``length_sd`` is the spread of
-    the length over the photographs, ``pivot_sd`` what the pivot's uncertainty moves the edge by.
+    the scene, ``height`` (i, j) is phi there; None without a scale. ``length_sd`` is the standard
+    deviation of the length over the photographs, ``pivot_sd`` that of the edge from the pivot's
+    uncertainty.
     """
 
     name: str
     belief: EdgeBelief
-    draws: Array
+    draws: Annotated[Array, by_name("posterior", "belief.names")]
     rungs: tuple[RungRow, ...]
-    station: Array
-    offset: Band
-    taper: Band
+    station: Annotated[Array, _STATION]
+    offset: Annotated[Band, _STATION]
+    taper: Annotated[Band, _STATION]
     nicks: tuple[FoundNick, ...]
     photographs: tuple[PhotographRow, ...]
     length_sd: float
     pivot_sd: float
     metric: bool
-    opening: Array
-    contact: Array
-    height: Band | None
+    opening: Annotated[Array, Stored(("opening",))]
+    contact: Annotated[Array, Stored(("contact",))]
+    height: Annotated[Band | None, Stored(("opening", "contact"))]
     verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...]
 
     @property
     def family(self) -> str:
+        """The chosen family of edges."""
         return next(rung.family for rung in self.rungs if rung.chosen)
 
 
@@ -106,10 +113,14 @@ class SeenOpening:
     opening_rad: float
 
 
-@dataclass(frozen=True)
-class BladeResult:
-    """All that photographs of blades gave: one fit for a blade that lay alone, or one for each
-    blade of a pair ("left" and "right" as seen from the handles)."""
+@dataclass(frozen=True, repr=False)
+class BladeResult(Result):
+    """The fit of photographs of blades: one for a blade that lay alone, or one for each blade of a
+    pair ("left" and "right" as seen from the handles)."""
+
+    title = "blade fit"
+    command = "scissorcal fit blade"
+    what = "blade"
 
     blades: tuple[BladeFit, ...]
     openings: tuple[SeenOpening, ...]
@@ -119,7 +130,7 @@ class BladeResult:
 
     @property
     def belief(self) -> EdgeBelief:
-        """The edge for a cut's fit, which takes both blades to be alike: that of the first one.
+        """The edge for a cut's fit, which assumes that both blades are alike: the first one's.
 
         Raises InputError where no photograph had a scale.
         """
@@ -132,12 +143,18 @@ class BladeResult:
         )
 
     @property
+    def model(self) -> str:
+        """The chosen family of each blade's edge."""
+        return ", ".join(blade.family for blade in self.blades)
+
+    @property
     def verdicts(self) -> tuple[Verdict, ...]:
+        """The verdicts on all blades."""
         return tuple(verdict for blade in self.blades for verdict in blade.verdicts)
 
 
 def blade_facts(fit: BladeFit) -> dict[str, Any]:
-    """What people and programs read of a fit: plain numbers, units in the names."""
+    """The results of a fit as plain numbers, units in the names."""
     unit = "mm" if fit.metric else "per_length"
     size = 1e3 if fit.metric else 1.0
     middle = len(fit.station) // 2

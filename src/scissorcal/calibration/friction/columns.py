@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.kernel import presliding_path
-from scissorcal.model.terms import TERMS, Motion, evaluate
+from scissorcal.model.friction_terms import PARAMETERS, side_of
+from scissorcal.model.terms import Motion, Role, Term
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -18,7 +19,9 @@ Product = tuple[float, tuple[str, ...]]
 Cell = tuple[tuple[int, ...], tuple[int, ...]]
 """Nodes of Stribeck's speed and of Dahl's length that parameters lie between, four or one each."""
 
-SCALES = ("stribeck_rate", "presliding_length")
+_SCALED = next(one for one in PARAMETERS.values() if one.role is Role.DRY and one.scale)
+_SHARE = next(one for one in PARAMETERS.values() if one.role is Role.BUILD_UP)
+SCALES = (_SCALED.scale, "presliding_length")
 
 RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
 """Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
@@ -31,8 +34,8 @@ COARSER = 2
 """Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
 2.5 % of what Stribeck friction lacks at worst, by 0.1 % of its level (rms) over empty sweeps."""
 
-RIGID = 5
-"""Columns of what is no friction: acceleration, constant, slope of the drive, cogging's two."""
+DRIVE = ("inertia", "offset", "delay", "cogging_cos", "cogging_sin")
+"""The first columns: what is added to the drive and is no friction."""
 
 
 class FrictionBasis:
@@ -49,20 +52,23 @@ class FrictionBasis:
         self,
         windows: Windows,
         angle_center: float,
+        terms: tuple[Term, ...],
         *,
-        angle: bool,
-        terms: tuple[str, ...] = (),
         cogging: float = 0.0,
     ) -> None:
-        """``angle`` has friction depend on the place, ``terms`` are named ones that it adopted.
+        """``terms`` are rows of the table; those of the load are left where none was measured.
 
         ``cogging`` is the number of periods a turn of a torque that repeats, 0 where there is none.
         """
-        self.windows, self.cogging = windows, cogging
-        self._center, self._count = angle_center, 3 if angle else 1
-        self._loaded = windows.load is not None
-        self.levels = tuple(name for name in terms if TERMS[name].of_rate_only)
-        self.others = tuple(name for name in terms if not TERMS[name].of_rate_only)
+        self.windows, self.cogging, self._center = windows, cogging, angle_center
+        rows = [one for one in terms if windows.load is not None or not one.needs_load]
+        place = sorted((one for one in rows if one.role is Role.PLACE), key=lambda one: one.power)
+        self._place = tuple(one.name for one in place)
+        self._plain = tuple(one for one in rows if one.role is Role.PLAIN)
+        self._dry = tuple(one for one in rows if one.role is Role.DRY and not one.scale)
+        self._sliding = tuple(one for one in rows if one.role is Role.SLIDING)
+        load = np.zeros_like(windows.rate) if windows.load is None else windows.load
+        self.motion = Motion(windows.opening, windows.rate, np.zeros_like(windows.rate), load)
         self.fixed = np.column_stack([*self._rigid(), *self._free(), *self._levels()])
         self._places: dict[tuple[str, ...], list[tuple[Array, Integers, Integers, Integers]]] = {}
         self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
@@ -73,7 +79,7 @@ class FrictionBasis:
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
         fixed, *scaled = self.coefficients(values)
-        own = np.concatenate([np.zeros(RIGID), fixed[RIGID:]])
+        own = np.concatenate([np.zeros(len(DRIVE)), fixed[len(DRIVE) :]])
         return self._total([own, *scaled], values)
 
     def drive(self, values: Mapping[str, Array]) -> Array:
@@ -83,8 +89,7 @@ class FrictionBasis:
     def coupled(self, rate: int, length: int) -> Array:
         """What Stribeck friction still lacks after a reversal, at every other node of a scale."""
         if (rate, length) not in self._coupled:
-            scale = self.stribeck.scale_of(COARSER * rate)
-            bell = np.exp(-((self.windows.rate / scale) ** 2))
+            bell = _SCALED.column(self.motion, self.stribeck.scale_of(COARSER * rate))
             late = self._late_at(COARSER * length)
             self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
         return self._coupled[rate, length]
@@ -137,20 +142,20 @@ class FrictionBasis:
         A parameter of both directions stands for either side where a law has no sides; one that a
         law lacks is zero.
         """
-        place: list[tuple[str, ...]] = [(), ("angle_slope",), ("angle_curvature",)]
-        dry = ["coulomb_pos", "coulomb_neg", *(["load_share"] if self._loaded else [])]
-        sliding = ["viscous_pos", "viscous_neg", *self.levels]
-        rigid = ("inertia", "offset", "delay", "cogging_cos", "cogging_sin")
-        plain = (*rigid, "load_gain", *self.others)
+        share, level = _SHARE.name, _SCALED.name
+        place = [(), *((name,) for name in self._place)]
+        dry = [name for term in self._dry for name in term.names(symmetric=False)]
+        sliding = [name for term in self._sliding for name in term.names(symmetric=False)]
 
-        def placed(sign: float, names: tuple[str, ...]) -> list[Product]:
-            return [(sign, (*names, *one)) for one in place[: self._count]]
+        def placed(sign: float, *names: str) -> list[Product]:
+            return [(sign, (*names, *one)) for one in place]
 
-        fixed: list[Product] = [(-1.0 if name == "delay" else 1.0, (name,)) for name in plain]
-        fixed += [one for name in (*dry, *sliding) for one in placed(1.0, (name,))]
-        late = [one for name in dry for one in placed(-1.0, ("presliding_share", name))]
-        coupled = placed(-1.0, ("presliding_share", "stribeck"))
-        return tuple(fixed), tuple(placed(1.0, ("stribeck",))), tuple(late), tuple(coupled)
+        fixed: list[Product] = [(-1.0 if name == "delay" else 1.0, (name,)) for name in DRIVE]
+        fixed += [(1.0, (term.name,)) for term in self._plain]
+        fixed += [one for name in (*dry, *sliding) for one in placed(1.0, name)]
+        late = [one for name in dry for one in placed(-1.0, share, name)]
+        coupled = placed(-1.0, share, level)
+        return tuple(fixed), tuple(placed(1.0, level)), tuple(late), tuple(coupled)
 
     def _total(self, factors: list[Array], values: Mapping[str, Array]) -> Array:
         fixed, stribeck, late, coupled = factors
@@ -176,34 +181,28 @@ class FrictionBasis:
         return [bins.acceleration, np.ones(len(windows.first)), windows.slope, *waves]
 
     def _free(self) -> list[Array]:
-        windows = self.windows
-        load = np.zeros_like(windows.rate) if windows.load is None else windows.load
-        motion = Motion(windows.opening, windows.rate, np.zeros_like(windows.rate), load)
-        named = [evaluate((name,), motion)[:, 0] for name in self.others]
-        return [windows.average(column) for column in (load, *named)]
+        return [self.windows.average(term.column(self.motion)) for term in self._plain]
 
     def _levels(self) -> list[Array]:
-        rate = self.windows.rate
-        sign = np.sign(rate)
-        columns = [sign * side for side in self._sides()]
-        columns += [np.where(rate > 0, rate, 0.0), np.where(rate < 0, rate, 0.0)]
-        motion = Motion(self.windows.opening, rate, np.zeros_like(rate), self.windows.load)
-        columns += [evaluate((name,), motion)[:, 0] for name in self.levels]
-        return self._weigh(columns)
+        sign = self.motion.direction
+        columns = [sign * one for one in self._levels_of(self._dry)]
+        return self._weigh([*columns, *self._levels_of(self._sliding)])
 
-    def _sides(self) -> list[Array]:
-        rate, load = self.windows.rate, self.windows.load
-        sides = [(rate > 0).astype(float), (rate < 0).astype(float)]
-        return sides if load is None else [*sides, np.abs(load)]
+    def _levels_of(self, terms: tuple[Term, ...]) -> list[Array]:
+        """What each parameter of some terms multiplies (m,): one column for each direction."""
+        rate, columns = self.windows.rate, []
+        for term in terms:
+            value = term.column(self.motion)
+            columns += [value * (rate > 0), value * (rate < 0)] if term.sided else [value]
+        return columns
 
     def _stribeck_at(self, rate: float) -> Array:
-        moving = self.windows.rate
-        bell = np.sign(moving) * np.exp(-((moving / rate) ** 2))
-        return np.column_stack(self._weigh([bell]))
+        bell = _SCALED.column(self.motion, rate)
+        return np.column_stack(self._weigh([self.motion.direction * bell]))
 
     def _lag_at(self, length: float) -> Array:
         late = self._late(length)
-        return np.column_stack(self._weigh([late * side for side in self._sides()]))
+        return np.column_stack(self._weigh([late * one for one in self._levels_of(self._dry)]))
 
     def _late_at(self, node: int) -> Array:
         if node not in self._lateness:
@@ -230,21 +229,11 @@ class FrictionBasis:
         away = self.windows.opening - self._center
         weighed = []
         for column in columns:
-            for power in range(self._count):
+            for power in range(len(self._place) + 1):
                 weighed.append(self.windows.average(column))
-                if power + 1 < self._count:
+                if power < len(self._place):
                     column = column * away
         return weighed
-
-
-def side_of(name: str, known: Container[str]) -> str | None:
-    """The parameter among ``known`` that stands for ``name``: itself, or that of both directions.
-
-    >>> side_of("coulomb_pos", {"coulomb"}), side_of("viscous_pos", {"coulomb"})
-    ('coulomb', None)
-    """
-    stem = name.removesuffix("_pos").removesuffix("_neg")
-    return name if name in known else stem if stem in known else None
 
 
 class ScaledColumns:

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
+    BetweenRecordings,
     compare_recordings,
     jackknife,
     widened,
@@ -30,7 +33,6 @@ from scissorcal.calibration.friction.noise import (
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.friction.terms import NUISANCE, LawParts
 from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
@@ -40,22 +42,13 @@ from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, Stop, infer, tails_of
-from scissorcal.model.terms import TERMS
+from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, TERMS, needs_load, terms_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
 
 Progress = Callable[[float, str], None]
 
-LAWS = (
-    "coulomb",
-    "coulomb+viscous",
-    "stribeck",
-    "stribeck+angle",
-    "stribeck+angle+load",
-    "stribeck+angle+presliding",
-    "stribeck+angle+load+presliding",
-)
 DRAFT_LAWS = {
     "rotary": "stribeck + angle, asymmetric",
     "linear": "coulomb + viscous, symmetric",
@@ -84,61 +77,30 @@ def fit_friction(
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
-    drive = inertia * acceleration + F(opening, rate) + offset + noise, over the candidates coulomb,
-    + viscous, + Stribeck, + angle, + load (where one was measured), + presliding, each symmetric or
-    not. An asymmetric law has no offset of its
-    own: an offset and unequal Coulomb levels cannot be told apart. Where both explain the data
-    alike, a linear joint gets the offset, and scissors the unequal levels: those are felt through
-    the handles, and an offset of a sensor is not. The simplest candidate that held-out strokes do
-    not distinguish from the best is taken, unless ``settings`` name one. Works for a rotary joint
-    and for a linear one; units follow the recordings' joint. Two or more
-    recordings are also fitted each by itself, and draws widened by what they differ in.
+    drive = inertia * acceleration + F(opening, rate) + offset + noise. The simplest candidate law
+    is taken whose error on held-out strokes is not distinguishable from the best, unless
+    ``settings`` name one. Units follow the recordings' joint. Two or more recordings are also
+    fitted each by itself, and draws widened by what they differ in.
 
-    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on. Raises
-    InputError where the recordings hold too little motion, and says what is missing.
-    ``last_chosen`` is the law that draft effort fits where the recipe leaves several; ``stop`` says
-    whether the time allowed is used up. ``prior`` is one that a study of simulated data states.
+    ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
+    of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
+    ``stop`` says whether the time is used up. Raises InputError where there is too little motion.
     """
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
-    every = weigh(recordings, settings.cutoff_Hz, sensors.usable)
+    again = partial(weigh, recordings, settings.cutoff_Hz, sensors.usable)
+    every = again()
     windows = every.where(every.bins.moving)
-    bins = windows.bins
-    _refuse_poor_motion(bins, every.bins, recordings, joint, sensors)
-    _refuse_terms(settings, windows, joint)
-    strokes = _strokes(bins)
-    every_law, cogging = _designs(windows, strokes, settings, joint, prior)
-    designs = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    compared: list[FittedCandidate] = []
-    for index, one in enumerate(designs):
-        tell(0.6 * index / len(designs), f"friction: trying {one.name}")
-        compared.append(fit_candidate(one.candidate(bins.drive), bins.series, strokes, stop))
-    chosen = choose(compared, float(np.sqrt(np.mean(bins.drive**2))))
-    chosen = _with_tails(chosen, compared, designs, bins, strokes)
-    law = next(design for design in designs if design.name == chosen.candidate.name)
-    tell(0.6, f"friction: inferring {chosen.candidate.name}")
-    posterior = infer(
-        chosen.candidate.problem(bins.series),
-        effort,
-        rng,
-        checkpoint=checkpoint,
-        optimum=chosen.optimum,
-        stop=stop,
-        progress=lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}"),
-    )
+    _refuse(recordings, settings, every, windows, sensors)
+    every_law, cogging = _laws(windows, settings, joint, prior)
+    laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
+    compared, chosen = _compare(laws, stop, tell)
+    law = next(design for design in laws if design.name == chosen.candidate.name)
+    infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
+    problem = chosen.candidate.problem(law.series)
+    posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
-    noise = sample_noise(law, chosen.optimum.point)
-    diagnostics = {
-        "window_lengthening": windows.lengthening,
-        "jackknife_sd": jackknife(law, chosen.optimum.point, NUISANCE),
-        **(between.diagnostics() if between else {}),
-        **noise_diagnostics(noise),
-        "stroke_offset_sd_Nm": stroke_offsets(
-            chosen.candidate.likelihood.residuals(chosen.optimum.point), strokes, windows, noise
-        ),
-    }
-    usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
         what="friction",
         effort=effort,
@@ -146,10 +108,10 @@ def fit_friction(
         compared=compared,
         chosen=chosen,
         structure={**chosen.candidate.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
-        bins=bins,
-        strokes=strokes,
-        measured=bins.drive,
-        contact=np.full(len(bins.drive), np.nan),
+        bins=law.bins,
+        strokes=law.strokes,
+        measured=law.observed,
+        contact=np.full_like(law.observed, np.nan),
         recordings=recordings,
         joint=joint,
         inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
@@ -159,19 +121,18 @@ def fit_friction(
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
-            _bandwidth(recordings, settings, sensors, law, chosen, posterior, effort),
+            _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(
             *sensors.notes,
-            *_notes(every, windows, posterior, joint),
-            *draft_note(effort, every_law, designs),
-            *cogging_notes(cogging, posterior, joint),
-            usage.sentence,
+            *_notes(every, windows, posterior, joint, cogging),
+            *draft_note(effort, every_law, laws),
+            usage_of_windows(recordings, every, sensors.usable).sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
-        extra_diagnostics=diagnostics,
+        extra_diagnostics=_diagnostics(law, chosen, between),
     )
 
 
@@ -189,43 +150,68 @@ def friction_experiment(
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
-    found = design(windows, _strokes(windows.bins), law, symmetric, joint, adopt, cogging)
+    strokes = _strokes(windows.bins)
+    found = design(windows, strokes, law, symmetric, joint, settings.priors, adopt, cogging)
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
 
 
-def _with_tails(
-    chosen: FittedCandidate,
-    compared: list[FittedCandidate],
-    designs: list[FrictionExperiment],
-    bins: Bins,
-    strokes: NDArray[np.int64],
-) -> FittedCandidate:
-    """Fit the chosen law again with a Student-t noise where its residuals have outliers.
+def _compare(
+    laws: list[FrictionExperiment], stop: Stop | None, tell: Progress
+) -> tuple[list[FittedCandidate], FittedCandidate]:
+    """Fit every candidate law and choose one.
 
-    The fit takes the place of the chosen one in ``compared``.
+    The chosen law is fitted again with a Student-t noise where its residuals have outliers; that
+    fit takes the place of the first.
     """
+    compared: list[FittedCandidate] = []
+    for index, law in enumerate(laws):
+        tell(0.6 * index / len(laws), f"friction: trying {law.name}")
+        compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
+    chosen = choose(compared, float(np.sqrt(np.mean(laws[0].observed ** 2))))
     tails = tails_of(chosen.candidate.likelihood.standardised(chosen.optimum.point), chosen.share)
     if tails > OUTLIERS:
-        return chosen
+        return compared, chosen
     place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
-    robust = replace(designs[place], tails=tails).candidate(bins.drive)
-    again = fit_candidate(
-        replace(robust, starts=chosen.optimum.point[None, :]), bins.series, strokes
-    )
+    law = laws[place]
+    robust = replace(law, tails=tails).candidate(law.observed)
+    starts = chosen.optimum.point[None, :]
+    again = fit_candidate(replace(robust, starts=starts), law.series, law.strokes)
     compared[place] = replace(again, equivalent=chosen.equivalent)
-    return compared[place]
+    return compared, compared[place]
+
+
+def _last_part(tell: Progress) -> Progress:
+    """The progress of inference, as the last part of the fit's."""
+    return lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}")
+
+
+def _diagnostics(
+    law: FrictionExperiment, chosen: FittedCandidate, between: BetweenRecordings | None
+) -> dict[str, Any]:
+    """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
+    point = chosen.optimum.point
+    noise = sample_noise(law, point)
+    residuals = chosen.candidate.likelihood.residuals(point)
+    return {
+        "window_lengthening": law.windows.lengthening,
+        "jackknife_sd": jackknife(law, point, NUISANCE),
+        **(between.diagnostics() if between else {}),
+        **noise_diagnostics(noise),
+        "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),
+    }
 
 
 def _bandwidth(
-    recordings: tuple[Recording, ...],
-    settings: FitFriction,
-    sensors: Sensors,
+    weighed: Callable[..., Windows],
     law: FrictionExperiment,
     chosen: FittedCandidate,
     posterior: Posterior,
     effort: Effort,
 ) -> Verdict:
-    """Fit the same law once more over shorter windows, from where the fit ended."""
+    """Fit the same law over shorter windows, starting from the optimum.
+
+    ``weighed`` (window_Hz) weighs the recordings over windows that pass half there.
+    """
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
         return not_evaluated("fit.friction", "bandwidth", why)
@@ -233,7 +219,7 @@ def _bandwidth(
     if other_Hz is None:
         why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
         return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
-    every = weigh(recordings, settings.cutoff_Hz, sensors.usable, window_Hz=other_Hz)
+    every = weighed(window_Hz=other_Hz)
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
@@ -252,32 +238,46 @@ def _bandwidth(
     return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
 
 
-def _notes(every: Windows, windows: Windows, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
-    """What was left out near rest, and how late torque was measured."""
+def _notes(
+    every: Windows, windows: Windows, posterior: Posterior, joint: Joint, cogging: Cogging
+) -> tuple[str, ...]:
+    """Notes on the time that is left out, window length, delay of the torque and cogging."""
     left = 1.0 - len(windows.first) / len(every.first)
     notes = [
-        f"{left:.1%} of the time the joint rests or turns, or moves by less than "
-        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps leave the "
-        "direction open, or a sensor is spoilt: friction there may be anything up to its level, so "
-        "it is left out."
+        f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
+        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
+        "show the direction), or a sensor is faulty."
     ]
     if windows.lengthening > 1.0:
         notes.append(
             f"The encoder's steps are coarse: windows pass half at {windows.half_at:.3g} Hz, "
-            "below fit.friction.cutoff_Hz, so that the steps do not lower the inertia."
+            "below fit.friction.cutoff_Hz, to keep the steps from biasing the inertia."
         )
     if "delay" in posterior.names:
         delays = posterior.draws[:, posterior.names.index("delay")]
         notes.append(
             f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
-            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms), which the fit takes into account."
+            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
         )
-    return tuple(notes)
+    return (*notes, *cogging_notes(cogging, posterior, joint))
 
 
 def _tails_if_heavy(chosen: FittedCandidate) -> dict[str, float]:
     tails = chosen.candidate.likelihood.tails
     return {"tails": tails} if np.isfinite(tails) else {}
+
+
+def _refuse(
+    recordings: tuple[Recording, ...],
+    settings: FitFriction,
+    every: Windows,
+    windows: Windows,
+    sensors: Sensors,
+) -> None:
+    """Raise InputError where the moving windows cannot determine what ``settings`` ask for."""
+    joint = recordings[0].joint
+    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
+    _refuse_terms(settings, windows, joint)
 
 
 def _refuse_poor_motion(
@@ -287,12 +287,12 @@ def _refuse_poor_motion(
     if len(bins.rate) < FEWEST_BINS:
         travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
         if sensors.verdict.status == "fail":
-            raise InputError(f"{names}: hardly a sample is left to fit. {sensors.verdict.why}")
+            raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
         if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
             raise InputError(
                 f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
-                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder's steps "
-                "leave its direction open: record faster sweeps, or lower fit.friction.cutoff_Hz."
+                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder does not "
+                "show its direction: record faster sweeps, or lower fit.friction.cutoff_Hz."
             )
         raise InputError(
             f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
@@ -304,32 +304,32 @@ def _refuse_poor_motion(
         missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
         raise InputError(
             f"{names}: the motion has one direction only; the {missing} one is missing. "
-            "Friction cannot be told from an offset: capture sweeps in both directions."
+            "Friction and an offset are not distinguishable: capture sweeps in both directions."
         )
     if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
         raise InputError(
-            f"{names}: the drive torque is constant although the joint moves; check the "
+            f"{names}: the drive torque is constant while the joint moves; check the "
             "motor_torque column or the sensor's connection."
         )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
-    """Refuse what cannot be fitted to these recordings: loads where none was measured, angles."""
+    """Refuse terms that these recordings cannot determine: of a load or angle that they lack."""
     named = "" if settings.rung == "auto" else settings.rung
-    wanted = [f'fit.friction.rung = "{named}"'] if LawParts.of(named).load else []
+    own = terms_of(named) if named else ()
+    wanted = [f'fit.friction.rung = "{named}"'] if any(one.needs_load for one in own) else []
     wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
     if wanted and not windows.bears_load:
         raise InputError(
             f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
             "one that hardly varies: record sweeps in which motor and handle work against each "
             "other by various amounts (motor_torque and handle_force, with handle_radius), or "
-            "choose a rung without load."
+            "choose a law without load."
         )
     angles = [name for name in settings.adopt if TERMS[name].rotary]
     if angles and joint.kind == "linear":
-        raise InputError(f'The term "{angles[0]}" is of an angle; this joint is a linear one.')
-    known = {"sign", "1", *(("rate",) if "viscous" in named or "stribeck" in named else ())}
-    known |= {"load", "load*sign"} if LawParts.of(named).load else set()
+        raise InputError(f'The term "{angles[0]}" needs an angle, and this joint is linear.')
+    known = {name for one in own or terms_of("coulomb") for name in one.covers}
     for name in settings.adopt:
         if name in known or settings.adopt.count(name) > 1:
             raise InputError(
@@ -347,34 +347,37 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
     return np.where(bins.stroke >= 0, bins.stroke, planned + runs).astype(np.int64)
 
 
-def _designs(
-    windows: Windows,
-    strokes: NDArray[np.int64],
-    settings: FitFriction,
-    joint: Joint,
-    prior: StatedPrior | None,
+def _laws(
+    windows: Windows, settings: FitFriction, joint: Joint, prior: StatedPrior | None
 ) -> tuple[list[FrictionExperiment], Cogging]:
-    """The laws to be compared, over columns that they share, with cogging where there is any."""
-    laws = _laws(windows) if settings.rung == "auto" else (settings.rung,)
+    """The candidate laws, simplest first, over columns that they share, and the cogging found.
+
+    Laws of the load only where one was measured; each symmetric or not. An asymmetric law has no
+    offset: unequal Coulomb levels contain it. Where both explain the data alike, a linear joint
+    gets the offset, and scissors the unequal levels: those are felt through the handles, and an
+    offset of a sensor is not.
+    """
+    names = [law for law in CANDIDATES if windows.bears_load or not needs_load(law)]
+    names = names if settings.rung == "auto" else [settings.rung]
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
-    plain = design(windows, strokes, laws[0], False, joint, settings.adopt)
-    steady = windows.without_turns
-    clear = plain
-    if not np.all(steady):
-        some = windows.where(steady), strokes[steady]
-        clear = design(*some, laws[0], False, joint, settings.adopt)
-    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(clear.moments)
+    strokes = _strokes(windows.bins)
+
+    def one(law: str, symmetric: bool, periods: float = 0.0) -> FrictionExperiment:
+        priors, adopt = settings.priors, settings.adopt
+        return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior)
+
+    plain = one(names[0], False)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(_clear_of_turns(plain).moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
-    first, *others = (
-        design(windows, strokes, law, symmetric, joint, settings.adopt, periods, prior)
-        for law in laws
-        for symmetric in both[settings.symmetry]
-    )
-    first = first if periods else replace(first, shared=plain.moments)
-    return [first, *(replace(other, shared=first.moments) for other in others)], cogging
+    laws = [one(law, symmetric, periods) for law in names for symmetric in both[settings.symmetry]]
+    shared = laws[0].moments if periods else plain.moments
+    return [replace(law, shared=shared) for law in laws], cogging
 
 
-def _laws(windows: Windows) -> tuple[str, ...]:
-    """Laws to be compared, cheapest first: those of the load only where one was measured."""
-    return LAWS if windows.bears_load else tuple(law for law in LAWS if not LawParts.of(law).load)
+def _clear_of_turns(law: FrictionExperiment) -> FrictionExperiment:
+    """The same law over the windows that hold no turn."""
+    steady = law.windows.without_turns
+    if np.all(steady):
+        return law
+    return replace(law, windows=law.windows.where(steady), strokes=law.strokes[steady])

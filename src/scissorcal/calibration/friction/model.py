@@ -9,16 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
-from scissorcal.calibration.friction.columns import FrictionBasis
+from scissorcal.calibration.friction.columns import SCALES, FrictionBasis
+from scissorcal.calibration.friction.layout import Drive, friction_layout
 from scissorcal.calibration.friction.moments import ReducedLaw, StrokeMoments
 from scissorcal.calibration.friction.search import search
-from scissorcal.calibration.friction.terms import NUISANCE, friction_layout
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.model import FrictionLaw
-from scissorcal.model.terms import TERMS
+from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
+from scissorcal.model.terms import Role, Term
+from scissorcal.model.transforms import LOG
+from scissorcal.recipe.priors import JointPriors
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
@@ -27,6 +29,9 @@ Integers = NDArray[np.int64]
 BESIDE = 1.02
 """A search begins a little beside least squares: for the simplest law they are its optimum, and a
 parameter that has not moved is one that the data do not know."""
+
+SHORT = 0.03
+"""Share of the range that is travelled, at which a search for Dahl's length begins."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +88,14 @@ class FrictionExperiment:
         """Products of the law's columns by stroke, with what was measured."""
         if self.shared is not None:
             return self.shared
-        adopt, center = tuple(self.key["adopt"]), float(self.key["angle_center"])
-        cogging = float(self.key.get("cogging_periods_per_turn", 0.0))
-        basis = FrictionBasis(self.windows, center, angle=True, terms=adopt, cogging=cogging)
+        law, adopt = str(self.key["law"]), tuple(self.key["adopt"])
+        shared = [term for name in CANDIDATES for term in terms_of(name)]
+        basis = FrictionBasis(
+            self.windows,
+            float(self.key["angle_center"]),
+            tuple(dict.fromkeys([*shared, *terms_of(law, adopt)])),
+            cogging=float(self.key.get("cogging_periods_per_turn", 0.0)),
+        )
         return StrokeMoments(basis, self.observed, self.strokes)
 
     @property
@@ -138,34 +148,59 @@ class FrictionExperiment:
         return ReducedLaw(self.layout, moments)
 
     def _starts(self, measured: Array) -> Array:
-        """Starts from linear least squares of Coulomb, viscous, inertia and offset."""
+        """Starts from linear least squares of Coulomb, viscous, inertia and offset.
+
+        Other levels begin where they are a tenth of the drive, scales at two places within the
+        motion, the rest at the prior's mean.
+        """
         bins, layout = self.bins, self.layout
         sign = np.sign(bins.rate)
         columns = np.stack([bins.acceleration, np.ones_like(sign), sign, bins.rate], axis=1)
         inertia, offset, coulomb, viscous = np.linalg.lstsq(columns, measured, rcond=None)[0]
-        effort = float(np.std(measured))
+        effort, rate = float(np.std(measured)), float(np.sqrt(np.mean(bins.rate**2)))
+        least = effort / float(np.sqrt(np.mean(bins.acceleration**2)))
         begin = {
-            "inertia": BESIDE * max(inertia, 1e-3 * float(np.exp(layout.mean[0]))),
+            **{term.name: 0.1 * effort / self._size(term) for term in self._levels},
+            "inertia": BESIDE * max(inertia, 1e-3 * least),
             "offset": BESIDE * offset,
             "coulomb": BESIDE * max(coulomb, 1e-2 * effort),
-            "viscous": BESIDE * max(viscous, 1e-2 * effort / float(np.sqrt(np.mean(bins.rate**2)))),
-            "stribeck": 0.1 * effort,
+            "viscous": BESIDE * max(viscous, 1e-2 * effort / rate),
             "noise": 0.1 * effort,
+            SCALES[0]: self.slow_rate,
+            SCALES[1]: SHORT * float(np.ptp(bins.opening)),
         }
-        scales = [name for name in ("stribeck_rate", "presliding_length") if name in layout.names]
+        scaled = any(name in layout.names for name in SCALES)
         rows = []
-        for factor in (0.4, 1.5) if scales else (1.0,):
+        for factor in (0.4, 1.5) if scaled else (1.0,):
             point = []
             for parameter in layout.parameters:
-                stem = parameter.name.removesuffix("_pos").removesuffix("_neg")
-                if stem in begin:
-                    point.append(float(parameter.unconstrained(np.asarray(begin[stem]))))
-                else:
-                    point.append(parameter.mean + (np.log(factor) if stem in scales else 0.0))
+                stem = side_of(parameter.name, begin)
+                start = parameter.mean
+                if stem is not None:
+                    value = begin[stem] * (factor if stem in SCALES else 1.0)
+                    start = float(parameter.transform.unconstrained(np.asarray(value)))
+                point.append(start)
             u = np.array(point)
             u[-1] = np.log(max(float(np.std(measured - self.mean(u))), 1e-6 * effort))
             rows.append(u)
         return np.stack(rows)
+
+    @property
+    def slow_rate(self) -> float:
+        """A slow rate of the motion: its lower quartile."""
+        return float(np.quantile(np.abs(self.bins.rate), 0.25))
+
+    @property
+    def _levels(self) -> list[Term]:
+        """Rows of the law whose parameter is a positive level."""
+        rows = terms_of(str(self.key["law"]))
+        return [t for t in rows if t.role in (Role.DRY, Role.SLIDING) and t.transform == LOG]
+
+    def _size(self, term: Term) -> float:
+        """Usual size of what a level multiplies; 1 for one that depends on a scale."""
+        if term.scale or term.value is None:
+            return 1.0
+        return max(float(np.sqrt(np.mean(term.column(self.basis.motion) ** 2))), 1e-12)
 
 
 def design(
@@ -174,11 +209,12 @@ def design(
     law: str,
     symmetric: bool,
     joint: Joint,
+    priors: JointPriors,
     adopt: tuple[str, ...] = (),
     cogging: float = 0.0,
     prior: StatedPrior | None = None,
 ) -> FrictionExperiment:
-    """One law over windows, with priors of the data's own size, or ``prior`` where it states them.
+    """One law over windows, with the recipe's priors, or those of ``prior`` where it states them.
 
     ``cogging`` is the number of its periods a turn, 0 where there is none.
     """
@@ -192,38 +228,10 @@ def design(
     }
     if cogging:
         key["cogging_periods_per_turn"] = cogging
-    layout = friction_layout(windows, law, symmetric, joint, adopt, cogging=bool(cogging))
+    drive = Drive(bool(cogging), windows.tick_s if windows.held else None)
+    layout = friction_layout(law, symmetric, joint, priors.of(joint.kind), adopt, drive)
     precision = None
     if prior is not None:
         precision = prior.precision(layout, np.diag(1 / layout.sd**2))
         layout = prior.layout(layout)
     return FrictionExperiment(windows, strokes, key, layout, joint, prior_precision=precision)
-
-
-def friction_law(values: dict[str, Array], angle_center: float) -> FrictionLaw:
-    """Friction law from a fit's parameters by name; those a rung lacks are zero.
-
-    ``values`` may hold scalars or arrays that broadcast (posterior draws); names of
-    :data:`scissorcal.model.terms.TERMS` among them are adopted terms.
-    """
-    terms = tuple(name for name in values if name in TERMS)
-    zero = np.asarray(0.0)
-    coulomb = values.get("coulomb")
-    viscous = values.get("viscous", zero)
-    return FrictionLaw(
-        coulomb_pos=values["coulomb_pos"] if coulomb is None else coulomb,
-        coulomb_neg=values["coulomb_neg"] if coulomb is None else coulomb,
-        viscous_pos=values.get("viscous_pos", viscous),
-        viscous_neg=values.get("viscous_neg", viscous),
-        stribeck=values.get("stribeck", zero),
-        stribeck_rate=values.get("stribeck_rate", np.asarray(1.0)),
-        angle_slope=values.get("angle_slope", zero),
-        angle_curvature=values.get("angle_curvature", zero),
-        angle_center=angle_center,
-        load_share=values.get("load_share", zero),
-        load_gain=values.get("load_gain", zero),
-        presliding_share=values.get("presliding_share", zero),
-        presliding_length=values.get("presliding_length", np.asarray(1.0)),
-        terms=terms,
-        coefficients=tuple(values[name] for name in terms),
-    )

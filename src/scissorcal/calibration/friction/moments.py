@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
+from scissorcal.model.transforms import IDENTITY, Transform
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -199,8 +200,8 @@ class ReducedLaw:
         """Factors of a cell's columns (..., q) at ``u`` (..., p): 1 of what was measured, first."""
         known = np.ones((*u.shape[:-1], u.shape[-1] + 2))
         known[..., :-2] = u
-        known[..., self._logs] = np.exp(u[..., self._logs])
-        known[..., self._logits] = 1.0 / (1.0 + np.exp(-u[..., self._logits]))
+        for transform, places in self._transformed:
+            known[..., places] = transform.natural(u[..., places])
         known[..., -1] = 0.0
         fixed, stribeck, late, coupled = (
             -signs * known[..., first] * known[..., second] * known[..., third]
@@ -232,16 +233,11 @@ class ReducedLaw:
         return rate, length
 
     @cached_property
-    def _logs(self) -> Integers:
-        return self._of("log")
-
-    @cached_property
-    def _logits(self) -> Integers:
-        return self._of("logit")
-
-    def _of(self, transform: str) -> Integers:
-        parameters = enumerate(self.layout.parameters)
-        return np.array([i for i, one in parameters if one.transform == transform], dtype=np.int64)
+    def _transformed(self) -> list[tuple[Transform, Integers]]:
+        """Each transform but the identity, with the places of its parameters."""
+        own = [one.transform for one in self.layout.parameters]
+        kinds = [one for one in dict.fromkeys(own) if one != IDENTITY]
+        return [(kind, np.flatnonzero([one == kind for one in own])) for kind in kinds]
 
     @cached_property
     def _weights(self) -> Array:

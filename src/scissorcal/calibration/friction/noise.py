@@ -1,4 +1,4 @@
-"""What a fitted friction law leaves: the torque's noise at its samples, strokes that lie apart."""
+"""Residuals of a fitted friction law: noise by sample, offsets by stroke."""
 
 from typing import Any
 
@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.cogging import Cogging
-from scissorcal.calibration.friction.model import FrictionExperiment, friction_law
+from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.signals.segments import stretches
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.inference import Posterior
 from scissorcal.kernel import presliding_path
-from scissorcal.model import friction_torque
+from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ def sample_noise(law: FrictionExperiment, point: Array) -> TorqueNoise | None:
     """
     windows = law.windows
     values = law.layout.natural(point)
-    friction = friction_law(values, float(law.key["angle_center"]))
+    friction = FrictionLaw.of_fit(values, float(law.key["angle_center"]))
     state = None
     if "presliding_length" in values:
         length = float(values["presliding_length"])
@@ -95,16 +95,16 @@ def noise_diagnostics(noise: TorqueNoise | None) -> dict[str, Any]:
 
 
 def cogging_notes(cogging: Cogging, posterior: Posterior, joint: Joint) -> tuple[str, ...]:
-    """What was found of cogging, and that it is fitted and not rendered."""
+    """A note on cogging, if any was found."""
     if not cogging.found:
         return ()
     columns = [posterior.names.index(f"cogging_{wave}") for wave in ("cos", "sin")]
     size = np.hypot(*posterior.draws[:, columns].T)
     return (
-        f"The motor cogs: {size.mean():.2g} {joint.effort_unit} (sd {size.std(ddof=1):.1g}) repeat "
-        f"{cogging.periods_per_turn:.1f} times a turn of the opening, with a power of "
-        f"{cogging.power:.0f} where noise has 1 and {cogging.threshold:.0f} is the limit. The fit "
-        "takes it out; it is the rig's, so packages do not render it.",
+        f"Cogging of {size.mean():.2g} {joint.effort_unit} (sd {size.std(ddof=1):.1g}) repeats "
+        f"{cogging.periods_per_turn:.1f} times a turn of the opening (power {cogging.power:.0f} "
+        f"times the noise, limit {cogging.threshold:.0f}). The fit removes it; it belongs to the "
+        "rig, so packages do not render it.",
     )
 
 

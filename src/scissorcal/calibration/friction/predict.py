@@ -1,4 +1,4 @@
-"""What a friction fit predicts of a new stroke or recording, with a band that held-out ones set."""
+"""Predictions of a friction fit for new motion, with a band calibrated on held-out data."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -13,6 +13,7 @@ from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.errors import InputError
+from scissorcal.model.friction_terms import terms_of
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -44,14 +45,14 @@ class Band:
     def sentence(self) -> str:
         """What the band promises, in one sentence."""
         ground = (
-            f"by the errors on {self.count} {self.unit}s, each predicted without itself"
+            f"its width is from the errors on {self.count} held-out {self.unit}s"
             if self.conformal
-            else f"by the errors on {self.count} {self.unit}s, each predicted without itself, and "
-            "widened by Student's t as these are few"
+            else f"its width is from the errors on {self.count} held-out {self.unit}s, widened by "
+            "Student's t because these are few"
         )
         return (
-            f"A measured sample of a new {self.unit}, made as those of the fit were, lies in the "
-            f"band with a probability of {self.level:.0%}, {ground}."
+            f"{self.level:.0%} of the samples of a new {self.unit}, recorded like those of the "
+            f"fit, lie in the band: {ground}."
         )
 
 
@@ -146,11 +147,11 @@ def predict_effort(
     """
     windows = weigh(recordings, cutoff_Hz)
     bins = windows.bins
+    adopt = tuple(fit.structure.get("adopt", ()))
     basis = FrictionBasis(
         windows,
         float(fit.structure["angle_center"]),
-        angle=True,
-        terms=tuple(fit.structure.get("adopt", ())),
+        terms_of(str(fit.structure["law"]), adopt),
         cogging=float(fit.structure.get("cogging_periods_per_turn", 0.0)),
     )
     values = _values(fit)
@@ -167,7 +168,7 @@ def predict_far_load(
 ) -> Prediction:
     """Predict the load at the passive end from torque and motion at the driven one.
 
-    See :func:`scissorcal.calibration.friction.transmission.predict_load` for the law.
+    See :mod:`scissorcal.calibration.friction.transmission` for the law.
     """
     windows = two_ended(fit, recordings, cutoff_Hz)
     assert windows.load is not None
@@ -225,8 +226,8 @@ class _Folds:
         labels = np.unique(index)
         if len(labels) < 2:
             raise InputError(
-                "A band needs strokes that the law has not seen, and there is only one: record "
-                "several strokes, or two recordings, and fit again."
+                "A band needs held-out strokes, and there is only one stroke: record several "
+                "strokes, or two recordings, and fit again."
             )
         values = {name: float(value) for name, value in _values(fit).items()}
         return cls(normal, design.layout.unconstrained(values), unit, index, labels)

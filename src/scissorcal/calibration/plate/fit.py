@@ -1,7 +1,8 @@
-"""Where the plate stands: its target in photographs of a camera at rest, in the rig's frame too."""
+"""The plate's pose from photographs of its target, before the camera and in the rig's frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.boards import PRINT_SCALE_SD
 from scissorcal.vision.targets.detect import Detection
+
+if TYPE_CHECKING:
+    from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
@@ -43,8 +47,8 @@ def fit_plate(
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
 
     ``plate_target`` says how the target lies on the plate; the plate's frame has x along the cut
-    from its near edge, z out of its upper face. The camera and the plate stay where they are; a
-    photograph that shows them elsewhere is noticed by its own pose. Both poses that a plane allows
+    from its near edge, z out of its upper face. Camera and plate are taken to be at rest; a
+    photograph of another pose is detected by fitting it alone. Both poses that a plane allows
     are refined and kept. ``rig`` takes the pose into the rig's frame.
 
     Raises MissingError without a photograph, InputError where photographs show different targets,
@@ -92,14 +96,22 @@ def fit_plate(
     )
 
 
+def plate_target(recipe: "Recipe") -> Pose:
+    """T_plate_target of the recipe: printed y runs down and z into the sheet, hence the half turn
+    about x."""
+    x, y = (1e-3 * value for value in recipe.plate.place_mm)
+    turn = Pose.from_rotation_vector([0.0, 0.0, np.radians(recipe.plate.turn_deg)], [x, y, 0.0])
+    return turn.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
+
+
 def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose:
     try:
         return locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
     except ValueError as error:
         names = ", ".join(photo.name for photo in photos)
         raise VerdictError(
-            f"{names}: {error}, so the plate's pose cannot be told. Have the whole "
-            f"{photos[0].detection.board.name} in the picture, in good light, or leave it out."
+            f"{names}: {error}, so the plate's pose is undetermined. Show the whole "
+            f"{photos[0].detection.board.name} in good light, or leave the photograph out."
         ) from None
 
 
@@ -117,9 +129,9 @@ def _halves(corners: Corners, camera: Camera) -> Halves | None:
     """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
 
     Every other group of four corners (a marker's, or neighbours on a chessboard, which err
-    together) shows errors of single corners; the left and the right half show a bent target and a
-    lens that was fitted badly. What is unknown of the camera and of the print counts in what they
-    claim only as far as it moves them differently.
+    together) shows errors of single corners; the left and the right half show a bent target and
+    a poor fit of the lens. The covariances of camera and print count as far as they move the two
+    halves differently.
     """
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))

@@ -1,7 +1,8 @@
-"""What the fit of a plate's pose ends in."""
+"""What the fit of a plate's pose results in."""
 
 from dataclasses import dataclass
 
+from scissorcal.calibration.result import Result
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
 
@@ -27,22 +28,27 @@ class PlateView:
 
 @dataclass(frozen=True)
 class Halves:
-    """How far poses of two halves of the corners lie apart, and ``square``, that difference in
-    units of what both claim: a chi-square of six degrees of freedom where the claims are honest."""
+    """Difference of the poses fitted to two halves of the corners. ``square`` is its squared
+    Mahalanobis length by their covariances: chi-square with six degrees of freedom where these are
+    right."""
 
     rotation_deg: float
     translation_mm: float
     square: float
 
 
-@dataclass(frozen=True)
-class PlateFit:
-    """The plate's pose before the camera and in the rig's frame, with covariance.
+@dataclass(frozen=True, repr=False)
+class PlateFit(Result):
+    """The plate's pose in the camera's and in the rig's frame, with covariance.
 
     ``other`` is the second pose that a plane allows, ``odds`` those of the first against it,
-    ``ambiguity`` the ratio of their rms errors. ``rig_plate`` is None where the rig's frame is not
-    known. ``halves`` is None where too few corners were seen to part them.
+    ``ambiguity`` the ratio of their rms errors (infinite without a second pose). ``rig_plate`` is
+    None where the rig's frame is not known, ``halves`` where too few corners were seen.
     """
+
+    title = "plate fit"
+    command = "scissorcal fit plate"
+    what = "plate"
 
     target: str
     camera_plate: Pose

@@ -1,4 +1,4 @@
-"""Bins of motion and drive, and the filter and the rate's noise that windows of them share."""
+"""Bins of motion and drive, the low-pass filter, and the noise of the rate."""
 
 from dataclasses import dataclass, fields
 
@@ -50,7 +50,7 @@ class Bins:
 
 
 def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
-    """Low-pass forwards and backwards (4th-order Butterworth), so that nothing is late."""
+    """Low-pass forwards and backwards (4th-order Butterworth), without delay."""
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(4, min(cutoff_Hz, 0.4 * rate_Hz) / (rate_Hz / 2), output="sos")

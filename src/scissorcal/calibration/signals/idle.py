@@ -1,4 +1,4 @@
-"""Idle seconds: motors off and blades at rest, where the drive shows its zero."""
+"""The drive's zero from idle periods: motors off and blades at rest."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from scissorcal.recording.recording import Recording
 Array = NDArray[np.float64]
 
 IDLE_S = 1.0
-"""A rest that lasts so long, motors off, tells a zero."""
+"""Least duration of an idle period."""
 STILL_STEPS = 2.0
 """Steps of the encoder by which an opening at rest may differ."""
 
 
 @dataclass(frozen=True)
 class Zero:
-    """What a sensor shows while nothing acts on it: its mean, and how well that is known."""
+    """A sensor's mean at idle, with its standard error."""
 
     mean: float
     sd: float
@@ -27,10 +27,10 @@ class Zero:
 
 
 def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
-    """What the drive (N m) shows over idle seconds; None without any.
+    """The drive (N m) over idle periods; None without any.
 
-    Idle is where nothing is commanded, the blades stand and no stroke is under way, for
-    ``IDLE_S``. Recordings without a single command say nothing of when motors were off.
+    Idle means no command, blades at rest and no stroke for ``IDLE_S``. Recordings without any
+    command do not show when motors were off, and are skipped.
     """
     found: list[Array] = []
     seconds = 0.0

@@ -1,4 +1,4 @@
-"""What splits a recording: gaps of its clock, the sheets in place, runs of samples alike."""
+"""Divisions of a recording: pieces without gaps, sheets, runs of equal samples."""
 
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ Mask = NDArray[np.bool_]
 EDGE_S = 0.05
 """Time left out at both ends of a piece, where a zero-phase filter sees no neighbours."""
 EDGES = 4
-"""A piece is longer than so many edges, so that at least half of it can be used."""
+"""Least length of a piece in edges, so that at least half of it can be used."""
 FEWEST_SAMPLES = 20
 """Samples that a piece must exceed for a 4th-order filter and a window of one knot to fit in."""
 GAP_FACTOR = 1.5
@@ -49,7 +49,7 @@ def edge_samples(rate_Hz: float) -> int:
 
 
 def still_clock(recording: Recording) -> InputError:
-    """Say that the clock of a recording stands still, so that nothing has a rate."""
+    """The error of a recording whose clock stands still."""
     return InputError(
         f"{recording.source or 'The recording'}: its clock does not advance; "
         "check the time column or the device's clock."
@@ -57,7 +57,7 @@ def still_clock(recording: Recording) -> InputError:
 
 
 def no_piece(recordings: tuple[Recording, ...]) -> InputError:
-    """Say that no piece of these recordings is long enough for a rate."""
+    """The error of recordings without a piece that is long enough for a rate."""
     names = ", ".join(recording.source or "recording" for recording in recordings)
     return InputError(
         f"{names}: no stretch without gaps is longer than {EDGES * EDGE_S:g} s and "

@@ -1,4 +1,4 @@
-"""What the sensors did to a recording: steps, ends of range, dead bands, silence."""
+"""Sensor faults in a recording: quantisation, saturation, dead bands, constant channels."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,33 +16,33 @@ Mask = NDArray[np.bool_]
 
 Scope = Literal["fit.friction", "fit.cut"]
 
-SPOILT_LIMIT = 0.05
-"""Share of samples that a sensor may have spoilt before a fit is no calibration."""
+INVALID_LIMIT = 0.05
+"""Share of invalid samples above which a fit fails."""
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
-"""A run of equal values is one that lasts so long, and has so many samples at any rate of them."""
-FEWEST_SPOILT_S = 0.02
+"""Least duration and least samples of a run of equal values."""
+FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
-"""The joint moves where its position changes more than twice within so long before and after."""
+"""The joint moves where its position changes more than twice within this time before and after."""
 NOISY = 0.2
-"""A channel whose neighbouring samples are equal less often than this has noise, and then chance
-alone does not hold a value."""
+"""A channel has noise where neighbouring samples are equal less often; then values do not repeat by
+chance."""
 WIGGLES = 0.2
-"""Noise turns at so many of its values at least (white noise at two of three), motion at few."""
+"""Least share of values at which noise turns (two of three for white noise)."""
 REGULAR = 0.9
-"""A sensor that is read faster than it measures holds this share of its values equally long."""
+"""An oversampled sensor holds at least this share of its values equally long."""
 UNUSUAL = 3.0
-"""Where a channel has no noise, a run at an end counts from so many times its usual length."""
+"""Without noise, a run at an end counts from this multiple of the usual length."""
 BAND_STEPS = 4.0
 FLAT = 3.0
-"""Such a run is flat if it lasts so many times longer than the way in and out of it, through the
-last few levels. A parabola's turn lasts 0.81 times as long, a fourth power's twice."""
+"""Such a run is flat if it lasts longer than entering and leaving it, through the last few levels,
+by this factor. A parabola's turn lasts 0.81 times as long, a fourth power's twice."""
 LONGEST = 1.5
 STANDS_OUT = 2.0
-"""A flat run must last so many times longer than any within the range, or all flat runs at an end
-so many times longer than the longer runs at any level within."""
+"""A flat run must last longer by these factors than any within the range, or all flat runs at an
+end than the longer runs at any level within."""
 WITHIN = 0.5
-"""Share of moving samples that must lie within the range for its ends to stand out from them."""
+"""Least share of moving samples within the range, without which its ends are not judged."""
 STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
 """Flags of a device's state frame (docs/protocol.md)."""
@@ -67,7 +67,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Sensors:
-    """All sensors over all recordings: which samples may be used, sentences, and a verdict."""
+    """All sensors of all recordings: usable samples, sentences, and a verdict."""
 
     usable: tuple[Mask, ...]
     notes: tuple[str, ...]
@@ -75,24 +75,23 @@ class Sensors:
 
 
 def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.friction") -> Sensors:
-    """Look for what sensors do to data, and mark the samples that they spoilt.
+    """Find saturation and dead bands, and mark the invalid samples.
 
     Saturation is a stretch of equal values at a channel's largest or smallest one, a dead band
-    such a stretch at zero while the joint moves. In a channel with noise chance does not hold a
-    value. A channel without any (quantised, or slow) holds values by itself: there a stretch at an
-    end is saturation if it is flat, unlike a turn, and if no level within the range is held as
-    long, unlike a plateau. A sample that is spoilt is no measurement and is left out of the
-    likelihood; where more than ``SPOILT_LIMIT`` are, what is left cannot stand for the whole, and
-    the verdict, on the fit that ``scope`` names, fails.
+    such a stretch at zero while the joint moves. In a channel with noise, values do not
+    repeat by chance. A channel without noise (quantised, or slow) repeats values: there a stretch
+    at an end is saturation if it is flat, unlike a turn, and if no level within the range is held
+    as long, unlike a plateau. Invalid samples are left out of the likelihood; where their share
+    exceeds ``INVALID_LIMIT`` the verdict, on the fit that ``scope`` names, fails.
     """
     usable, notes = [], []
     worst, named = 0.0, ""
     for recording in recordings:
         channels = channels_of(recording)
-        spoilt = _flagged(recording)
+        invalid = _flagged(recording)
         source = recording.source or "the recording"
         for channel in channels:
-            spoilt |= channel.saturated | channel.dead
+            invalid |= channel.saturated | channel.dead
             notes += [f"{source}: {said}" for said in _sentences(channel, recording)]
             for share, what in (
                 (float(channel.saturated.mean()), "is at the end of its range"),
@@ -100,7 +99,7 @@ def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.frict
             ):
                 if share > worst:
                     worst, named = share, f"{channel.name} of {source} {what}"
-        usable.append(~spoilt)
+        usable.append(~invalid)
     return Sensors(tuple(usable), tuple(notes), _verdict(scope, worst, named))
 
 
@@ -145,7 +144,7 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     if constant or name == "opening":
         return Channel(name, constant, step, none, none, low, high)
     long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
-    fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_SPOILT_S / tick_s))
+    fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_INVALID_S / tick_s))
     hold, alike = _repetition(values)
     dead, ends = none, tuple[float, ...]()
     if alike < NOISY:
@@ -241,7 +240,7 @@ def _moves(opening: Array, reach: int) -> Mask:
 
 
 def _flagged(recording: Recording) -> Mask:
-    """Samples that the device itself says it could not measure."""
+    """Samples that the device flags as not measured."""
     flags = np.asarray(recording.samples["flags"], dtype=np.int64)
     wrong = ENCODER_FAULT
     if np.isfinite(recording.handle_radius_m):
@@ -256,9 +255,9 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
     )
     said = []
     if channel.constant:
-        said.append(f"{channel.name} is {channel.low:.6g} {unit} throughout.")
+        said.append(f"{channel.name} is constant at {channel.low:.6g} {unit}.")
     elif np.isfinite(channel.step):
-        said.append(f"{channel.name} comes in steps of {channel.step:.3g} {unit}.")
+        said.append(f"{channel.name} has a resolution of {channel.step:.3g} {unit}.")
     if channel.saturated.any():
         said.append(
             f"{channel.name} is at an end of its range ({channel.low:.3g} to {channel.high:.3g} "
@@ -274,11 +273,8 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
 
 def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
     if worst == 0.0:
-        why = "No sensor reached an end of its range, and none was silent around zero."
-        return judge(scope, "sensors", 0.0, SPOILT_LIMIT, why)
-    why = f"{named} in {worst:.1%} of the samples; they are left out."
-    remedy = (
-        " Too few samples are left to stand for the whole: record again with a sensor of a larger "
-        "range, or slower and with gentler turns."
-    )
-    return judge(scope, "sensors", worst, SPOILT_LIMIT, why, why + remedy)
+        why = "No sensor saturated, and none has a dead band around zero."
+        return judge(scope, "sensors", 0.0, INVALID_LIMIT, why)
+    why = f"{named} in {worst:.1%} of the samples (limit {INVALID_LIMIT:.0%}); they are left out."
+    remedy = " Record again with a sensor of larger range, or slower and with gentler turns."
+    return judge(scope, "sensors", worst, INVALID_LIMIT, why, why + remedy)

@@ -1,4 +1,4 @@
-"""The noise of the drive's torque at its samples: white, and one that lasts."""
+"""The noise of the drive's torque: a white and a correlated part."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ class TorqueNoise:
     slow_time_error_s: float = float("nan")
 
     def variance_of_mean(self, ticks: int, tick_s: float) -> float:
-        """Variance of the mean of so many successive samples.
+        """Variance of the mean of ``ticks`` successive samples.
 
         >>> round(TorqueNoise(1e-3, 0.0, 0.01).variance_of_mean(4, 1e-3) * 1e6, 3)
         0.25
@@ -46,7 +46,7 @@ def torque_noise(
     momenta: tuple[Array, ...] | None = None,
     momentum_sd: float = 0.0,
 ) -> TorqueNoise | None:
-    """Tell the noise's two time scales apart by the variance of sums over 4 to 128 ticks.
+    """Separate the noise's two time scales by the variance of sums over 4 to 128 ticks.
 
     ``stretches`` hold the torque's residuals (k,) at successive samples of uninterrupted motion,
     without inertia; ``momenta`` inertia times rate (k,) at the same samples. A sum over n ticks
@@ -55,8 +55,8 @@ def torque_noise(
         B n + C sum_ij exp(-|i - j| tick / time) + 2 (momentum_sd / tick)^2,
 
     ``momentum_sd`` being the momenta's own noise, from the encoder's steps. B and C, both positive,
-    are fitted for each of a range of times. Stretches' own means are taken out. None where there is
-    less than 128 ticks 20 times over.
+    are fitted for each of a range of times. Stretches' own means are taken out. None where there
+    are fewer than 20 sums over 128 ticks.
     """
     kept = [k for k, one in enumerate(stretches) if len(one) > 2 * LENGTHS[0]]
     if not kept:

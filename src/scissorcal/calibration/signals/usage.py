@@ -1,4 +1,4 @@
-"""What was recorded and is not used: seconds by stroke and speed, each with its reason."""
+"""Recorded time that a fit does not use, by stroke and speed, with the reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from scissorcal.recording.recording import Recording
 Mask = NDArray[np.bool_]
 Masks = tuple[Mask, ...]
 
-GAP, EDGE, SPOILT = "gap", "edge of a piece", "sensor spoilt"
+GAP, EDGE, INVALID = "gap", "edge of a piece", "invalid sensor value"
 SLOW, OTHER = "rest or too slow", "no window"
 LITTLE = 0.5
-"""A stroke of which a smaller share is used is named."""
+"""Speeds of which a smaller share is used are named."""
 
 
 @dataclass(frozen=True)
@@ -130,18 +130,18 @@ def count_usage(
 
 
 def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: Masks) -> Usage:
-    """Count what moving windows use of their recordings, each the bin that it stands for.
+    """Count what moving windows use of their recordings, each for its bin.
 
     ``every`` are all windows of the recordings, ``usable`` the masks (m,) of samples that no sensor
-    spoilt.
+    invalid.
     """
     width = max(1, round(every.bins.bin_s / every.tick_s))
     length = len(every.weights)
-    used, gap, edge, spoilt, slow = ([], [], [], [], [])
+    used, gap, edge, invalid, slow = ([], [], [], [], [])
     windows = start = 0
     for recording, good in zip(recordings, usable, strict=True):
         size = len(recording.samples)
-        masks = {name: np.zeros(size, dtype=bool) for name in ("used", SPOILT, SLOW)}
+        masks = {name: np.zeros(size, dtype=bool) for name in ("used", INVALID, SLOW)}
         inside, covered = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
         bad = np.concatenate([[0], np.cumsum(~good)])
         for low, high in pieces_of(recording):
@@ -153,7 +153,7 @@ def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: 
             begin = first + (length - width) // 2
             for name, chosen in (
                 ("used", moving),
-                (SPOILT, ~moving & touched),
+                (INVALID, ~moving & touched),
                 (SLOW, ~moving & ~touched),
             ):
                 masks[name][(begin[chosen, None] + np.arange(width)).ravel()] = True
@@ -162,9 +162,9 @@ def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: 
         used.append(masks["used"])
         gap.append(~inside)
         edge.append(inside & ~covered)
-        spoilt.append(masks[SPOILT])
+        invalid.append(masks[INVALID])
         slow.append(masks[SLOW])
-    reasons = {GAP: gap, EDGE: edge, SPOILT: spoilt, SLOW: slow}
+    reasons = {GAP: gap, EDGE: edge, INVALID: invalid, SLOW: slow}
     return count_usage(
         recordings, tuple(used), {name: tuple(masks) for name, masks in reasons.items()}
     )

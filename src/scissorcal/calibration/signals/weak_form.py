@@ -1,4 +1,4 @@
-"""Motion and drive weighed over short windows, so that filtering treats both sides alike."""
+"""Weak form: motion and drive weighted over short windows, with the same filter for both."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -37,10 +37,10 @@ Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 RATE_BAND = 2.0
-"""The rate that friction is taken at is low-passed at this many times the cutoff."""
+"""The rate in the friction law is low-passed at this many times the cutoff."""
 HELD = 1 / 6
-"""What a neighbouring sample counts in a mean over two ticks of a signal with corners at its
-samples, as a held drive has."""
+"""Weight of a neighbouring sample in a mean over two ticks of a signal with corners at its samples,
+as a held drive has."""
 TURN_S = 5e-3
 STICK_SLIP_S = 0.5
 SWIFT = 8.0
@@ -50,7 +50,7 @@ LOADED = 0.1
 
 @dataclass(frozen=True)
 class Windows:
-    """A recording as weighed by short windows, and the samples beneath.
+    """A recording weighted by short windows, and its samples.
 
     ``bins`` (n,) hold weighted means: of the drive, and of the acceleration exactly, by moving both
     derivatives from the position to the weight. ``opening``, ``rate``, ``load`` and ``drive`` (m,)

@@ -1,4 +1,4 @@
-"""How long a window is: as the cutoff asks, or longer where the encoder is too coarse for it."""
+"""Length of the windows: by the cutoff, or longer for a coarse encoder."""
 
 from dataclasses import dataclass, replace
 
@@ -17,15 +17,15 @@ Mask = NDArray[np.bool_]
 HALF_AT = 0.365
 """Frequency times knot distance at which a quadratic B-spline passes half: sinc^3 = 1 / 2."""
 ENCODER_SHARE = 2.5e-3
-"""Share of the acceleration's mean square that the encoder's steps may make up: a fit of the
-inertia is too low by as much."""
+"""Largest share of the encoder's steps in the acceleration's mean square; a fitted inertia is too
+low by the same share."""
 LONGEST_S = 0.1
 """Windows are not lengthened beyond this."""
 LEAST_LEFT = 0.5
 """Lengthened windows leave at least this share of those that hold no rest."""
 MUCH_LONGER = 2.0
 SMOOTH = 1 / 12
-"""What a neighbouring sample counts in a mean over two ticks of a signal that is smooth
+"""Weight of a neighbouring sample in a mean over two ticks of a smooth signal
 (Numerov 1924, doi:10.1093/mnras/84.8.592)."""
 
 
@@ -34,37 +34,37 @@ class Motion:
     """One piece of a recording without a gap, before it is weighed; arrays (m,) by sample.
 
     ``position`` is as measured, ``opening`` and ``rate`` are low-passed, ``floor`` is the speed
-    below which the rate's sign is noise, ``spoilt`` marks samples of rest, of any turn, and those
-    that a sensor spoilt; ``resting`` the same without quick turns.
+    below which the rate's sign is noise, ``invalid`` marks samples of rest, of any turn, and those
+    that a sensor invalidated; ``resting`` the same without quick turns.
     """
 
     position: Array
     opening: Array
     rate: Array
     floor: float
-    spoilt: Mask
+    invalid: Mask
     resting: Mask
     rate_Hz: float
 
     def places(self, length: int) -> Integers:
-        """First samples of windows of so many samples, one for each bin."""
+        """First samples of windows of ``length`` samples, one per bin."""
         edge, width = edge_samples(self.rate_Hz), max(1, round(BIN_S * self.rate_Hz))
         return np.arange(edge, len(self.position) - edge - length, width)
 
     def moving(self, first: Integers, length: int) -> Mask:
-        """Which windows from ``first`` (n,) on hold no spoilt sample."""
-        spoilt = np.concatenate([[0], np.cumsum(self.spoilt)])
-        return np.asarray(spoilt[first + length] == spoilt[first])
+        """Which windows from ``first`` (n,) on hold no invalid sample."""
+        invalid = np.concatenate([[0], np.cumsum(self.invalid)])
+        return np.asarray(invalid[first + length] == invalid[first])
 
 
 def with_turns(pieces: list[Motion], shortest: int) -> list[Motion]:
     """Pieces whose quick turns count, where windows of ``MUCH_LONGER`` knots need them.
 
-    A turn spoils windows that hold it, as friction jumps there at a time that is not known well
-    enough. But windows that are long because the encoder is coarse hardly leave anything near a
-    turn without them, and nothing else tells how friction builds up.
+    A window with a turn is invalid, as friction jumps there at an uncertain time. But long windows,
+    for a coarse encoder, would leave hardly any data near a turn, and only those identify how
+    friction builds up.
     """
-    turning = [replace(piece, spoilt=piece.resting) for piece in pieces]
+    turning = [replace(piece, invalid=piece.resting) for piece in pieces]
     return turning if longer_knot(turning, shortest) >= MUCH_LONGER * shortest else pieces
 
 

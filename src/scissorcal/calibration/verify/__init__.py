@@ -1,4 +1,4 @@
-"""The trust check: are intervals right, do halves of the data agree, what does the prior do?"""
+"""The trust check: coverage of the intervals, agreement of two halves, prior sensitivity."""
 
 from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import (
@@ -19,7 +19,6 @@ from scissorcal.calibration.verify.simulator import (
     cut_simulator,
     friction_simulator,
 )
-from scissorcal.calibration.verify.store import load_verify, save_verify
 from scissorcal.calibration.verify.study import Study, Task, run
 
 __all__ = [
@@ -40,9 +39,7 @@ __all__ = [
     "assess",
     "cut_simulator",
     "friction_simulator",
-    "load_verify",
     "make_study",
     "run",
-    "save_verify",
     "tasks_of",
 ]

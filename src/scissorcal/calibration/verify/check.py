@@ -1,4 +1,4 @@
-"""The trust check as a whole: what has to be fitted, and what it says when it is done."""
+"""The trust check as a whole: the fits that it needs, and their assessment."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,11 +22,11 @@ from scissorcal.calibration.verify.verdicts import FALSE_ALARM, RANKS_SHARE, ver
 Array = NDArray[np.float64]
 
 FEWEST_DRAWS = 600
-"""Draws of each posterior where importance weights are even: a rank takes 199 of them."""
+"""Draws of each posterior where importance weights are even; a rank takes 199 of them."""
 
 EVEN_WEIGHTS = 0.5
-"""Share of draws that count as independent from which they are; below it, fits take as many draws
-as the fit itself."""
+"""Weights are even from this share of independent draws; below it, fits take as many draws as the
+fit under test."""
 
 _HALVES_STREAM = 11
 
@@ -41,11 +41,11 @@ def make_study(
     spread: float = 3.0,
     sheets: Mapping[int, int] | None = None,
 ) -> Study:
-    """Say what data are simulated from and how they are parted, for a finished fit.
+    """Define the simulations and the two halves for a finished fit.
 
-    ``experiment`` is the fit's own design, ``simulator`` makes raw recordings over its motion and
-    fits them. ``sheets`` gives the piece of material of each stroke,
-    where there are several. Raises MissingError where the fit does not hold the draws it takes.
+    ``experiment`` is the fit's design, ``simulator`` makes raw recordings over its motion and fits
+    them. ``sheets`` gives the sheet of each stroke, where there are several. Raises MissingError
+    where the fit does not hold the draws it takes.
     """
     draws = unconstrained_draws(experiment, fit)
     generating = generating_prior(experiment, draws, prior, spread)
@@ -90,11 +90,11 @@ def assess(
             study, by_kind["simulated"], [*units, fit.effort_unit], RANKS_SHARE
         )
         if calibration is None:
-            not_done += _broken(by_kind["simulated"][:1], "Every simulated fit broke")
+            not_done += _broken(by_kind["simulated"][:1], "Every simulated fit failed")
     if "halves" in checks:
         broken = _broken(by_kind["half"], "A half could not be fitted")
         if study.split is None:
-            not_done.append("There are too few strokes to part into two halves: record more.")
+            not_done.append("Too few strokes for two halves: record more.")
         elif broken:
             not_done += broken
         else:
@@ -121,7 +121,7 @@ def assess(
 
 
 def _even(fit: FitResult) -> bool:
-    """Whether the weights of a fit were even, as those of its like will be."""
+    """Whether the weights of a fit were even; those of similar fits will be too."""
     return float(fit.diagnostics["effective_samples"]) >= EVEN_WEIGHTS * len(fit.draws)
 
 
@@ -141,7 +141,7 @@ def _facts(fit: FitResult, sheets: Mapping[int, int]) -> tuple[StrokeFacts, ...]
 
 
 def _between(experiment: Experiment, fit: FitResult) -> Array | None:
-    """Variance between recordings (p,) that the fit's own draws contain; None where they do not."""
+    """Variance between recordings (p,) that the fit's draws contain; None without any."""
     found = fit.diagnostics.get("between_recordings_sd")
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""What truths are drawn from: parameters around a posterior, or a recipe's prior."""
+"""The distribution that true parameters are drawn from: around a posterior, or the prior."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from scissorcal.calibration.verify.result import PriorKind
 Array = NDArray[np.float64]
 
 NOISE_SIZES = ("noise", "noise_scale")
-"""Parameters that only say how loud the noise is, in the terms of the likelihood."""
+"""Parameters that scale the noise of the likelihood's terms."""
 
 
 @dataclass(frozen=True)
 class Generating:
     """A normal distribution of unconstrained parameters, for truths and as the refits' prior.
 
-    ``mean`` (p,), ``precision`` (p, p); ``kind`` and ``spread`` say where it comes from.
+    ``mean`` (p,), ``precision`` (p, p); see `generating_prior` for ``kind`` and ``spread``.
     """
 
     kind: PriorKind
@@ -29,7 +29,7 @@ class Generating:
 
     @property
     def words(self) -> str:
-        """Where it comes from, for people."""
+        """Its description, for people."""
         if self.kind == "recipe":
             return "the recipe's prior"
         return (
@@ -46,16 +46,15 @@ class Generating:
 def generating_prior(
     experiment: Experiment, draws: Array, kind: PriorKind, spread: float
 ) -> Generating:
-    """Say what truths are drawn from, given the posterior's unconstrained ``draws`` (n, p).
+    """The distribution of truths, given the posterior's unconstrained ``draws`` (n, p).
 
     "local": the recipe's prior times the likelihood raised to 1 / ``spread``^2, as a normal
-    distribution. It is ``spread`` times as wide as the posterior where the data speak and never
-    wider than the prior where they do not, so that calibration is asked for where it is needed: a
-    recipe's prior spans factors of 100, and most of what it would draw is absurd, or would be
-    refused. Because the same distribution is the refits' prior, ranks are uniform for a calibrated
-    inference all the same. Posterior calibration (Säilynoja et al. 2025, arXiv:2502.03279)
-    conditions on the data in the same way; it gives them their full weight, which leaves the
-    simulated data little to say.
+    distribution. It is ``spread`` times as wide as the posterior where the data are informative and
+    never wider than the prior, so that calibration is tested near the posterior: a recipe's prior
+    spans factors of 100, and most of its draws are far from any material. The same distribution is
+    the refits' prior, so ranks are uniform for a calibrated inference. Posterior calibration
+    (Säilynoja et al. 2025, arXiv:2502.03279) conditions on the data in the same way, but with their
+    full weight, so that the simulated data add little.
 
     "recipe": the recipe's own prior, for simulated fits and refits.
     """
@@ -72,11 +71,10 @@ def generating_prior(
 
 
 def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
-    """The prior that simulated data are refitted with: what their truths are drawn from.
+    """The prior of fits to simulated data: the distribution of their truths.
 
-    But for the sizes of the noise, which keep the recipe's prior: what the noise of samples amounts
-    to in the terms of the likelihood is not known beforehand. Thousands of bins tell it well,
-    whatever the prior.
+    Noise scales keep the recipe's prior: the noise of the likelihood's terms that given noise of
+    samples causes is not known beforehand, and thousands of bins determine it.
     """
     own = experiment.candidate(experiment.observed)
     names = experiment.layout.names
@@ -92,7 +90,7 @@ def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
 
 
 def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Labels (n,) of the stretches that stay whole where only ``kept`` bins of ``series`` are used.
+    """Labels (n,) of the contiguous stretches where only ``kept`` bins of ``series`` are used.
 
     >>> unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
     array([0, 0, 1, 2, 3])

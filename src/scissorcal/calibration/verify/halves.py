@@ -1,4 +1,4 @@
-"""Two halves of the data, fitted apart: do they differ by no more than they claim?"""
+"""Two halves of the data, fitted separately, and the test of their difference."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,20 +12,17 @@ Integers = NDArray[np.int64]
 PIECES = 4
 
 BY_RECORDING = "whole recordings"
-"""How the words of a split begin that parts recordings."""
+"""Start of the description of a split by recordings."""
 
 SILENT = 0.02
-"""Share of the variance of two unrelated halves below which they only repeat their prior."""
+"""Share of the variance of two independent halves below which both only repeat their prior."""
 
 MIXTURE_DRAWS = 50_000
 
 
 @dataclass(frozen=True)
 class StrokeFacts:
-    """What a split needs to know of a stroke.
-
-    Its label, kind, speed, piece of material, and the index of its recording.
-    """
+    """A stroke's label, kind, speed, sheet, and the index of its recording."""
 
     label: int
     kind: str
@@ -36,9 +33,9 @@ class StrokeFacts:
 
 @dataclass(frozen=True)
 class Split:
-    """Two disjoint halves of the bins (n,), and how they were parted.
+    """Two disjoint halves of the bins (n,), and a description of the split.
 
-    ``recordings`` are how many each half has where whole recordings were parted, else None.
+    ``recordings`` are their numbers in each half where whole recordings were split, else None.
     """
 
     first: NDArray[np.bool_]
@@ -61,10 +58,10 @@ class HalfFit:
 
 @dataclass(frozen=True)
 class Difference:
-    """Second minus first half (p,), its claimed covariance (p, p), and the test of both.
+    """Second minus first half (p,), its covariance (p, p), and the test of both.
 
     ``z`` (p,) is NaN where the halves repeat their prior. ``statistic`` over ``dimensions`` is
-    F distributed with ``independent`` observations; ``p_value`` is NaN where nothing can be told.
+    F distributed with ``independent`` observations; ``p_value`` is NaN where no test is possible.
     """
 
     difference: Array
@@ -77,7 +74,7 @@ class Difference:
 
 
 def split_strokes(strokes: Integers, facts: Sequence[StrokeFacts]) -> Split | None:
-    """Part bins (n,), labelled by ``strokes`` (n,), into two halves of whole strokes.
+    """Split bins (n,), labelled by ``strokes`` (n,), into two halves of whole strokes.
 
     Where there are two recordings or more, whole recordings alternate: halves that share recordings
     cannot show a change between them. Else, where strokes belong to two sheets or more, whole
@@ -119,10 +116,10 @@ def split_strokes(strokes: Integers, facts: Sequence[StrokeFacts]) -> Split | No
 
 
 def compare(first: HalfFit, second: HalfFit, prior_precision: Array) -> Difference:
-    """Difference two posteriors that share a prior but no data.
+    """Compare two posteriors that share a prior but no data.
 
     With a common normal prior of precision P0 and posteriors of covariances A and B the difference
-    of the means has the covariance A + B - A P0 B - B P0 A: what both owe to the prior cancels.
+    of the means has the covariance A + B - A P0 B - B P0 A: the common part from the prior cancels.
     Directions in which hardly anything of A + B is left are taken out. The squared Mahalanobis
     length of the p others is compared with Hotelling's distribution for covariances that rest on
     n independent observations, T^2 (n - p + 1) / (n p) ~ F(p, n - p + 1)
@@ -137,18 +134,18 @@ def compare(first: HalfFit, second: HalfFit, prior_precision: Array) -> Differen
     shared = A @ prior_precision @ B
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ (A + B - shared - shared.T) @ inverse.T)
-    told = values > SILENT
+    informed = values > SILENT
     axes = root @ vectors
-    covariance = (axes * np.where(told, values, 0.0)) @ axes.T
+    covariance = (axes * np.where(informed, values, 0.0)) @ axes.T
     difference = second.mean - first.mean
     along = vectors.T @ inverse @ difference
     spread = np.sqrt(np.diag(covariance))
     z = np.where(spread**2 > SILENT * size**2, difference / np.maximum(spread, 1e-300), np.nan)
-    independent, p = min(first.independent, second.independent), int(told.sum())
+    independent, p = min(first.independent, second.independent), int(informed.sum())
     statistic, probability = float("nan"), float("nan")
     freedom = independent - p + 1
     if p and freedom > 0:
-        squared = float(np.sum(along[told] ** 2 / values[told]))
+        squared = float(np.sum(along[informed] ** 2 / values[informed]))
         statistic = squared / p
         probability = float(f.sf(squared * freedom / (independent * p), p, freedom))
     return Difference(difference, covariance, z, statistic, p, float(independent), probability)

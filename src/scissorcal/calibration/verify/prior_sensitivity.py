@@ -1,4 +1,4 @@
-"""What posteriors owe to their prior: sensitivity to raising prior or likelihood to a power."""
+"""Prior sensitivity: how posteriors change when prior or likelihood are raised to a power."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from scissorcal.calibration.verify.result import Diagnosis
 Array = NDArray[np.float64]
 
 STEP = 1.01
-"""Power to which, and to whose reciprocal, a component is raised."""
+"""A component is raised to this power and to its reciprocal."""
 
 SENSITIVE = 0.05
 """Sensitivity from which a component matters: a normal's mean then moves by about 0.3 standard
@@ -38,7 +38,7 @@ def cumulative_distance(draws: Array, weights: Array) -> float:
 
     Nguyen and Vreeken 2015, doi:10.1007/978-3-319-23525-7_11; symmetric, normalised by its upper
     bound, and the larger one of the draws and their negatives, as the measure is not symmetric
-    about zero. Draws that are all alike have no distance.
+    about zero. Equal draws have no distance.
     """
     order = np.argsort(draws)
     x, weighted = draws[order], weights[order] / weights.sum()
@@ -54,7 +54,7 @@ def cumulative_distance(draws: Array, weights: Array) -> float:
 
 
 def diagnose(prior: float, likelihood: float) -> Diagnosis:
-    """Say what two sensitivities mean together.
+    """Diagnosis of the two sensitivities.
 
     >>> diagnose(0.2, 0.3), diagnose(0.2, 0.01), diagnose(0.01, 0.3)
     ('prior-data conflict', 'weak likelihood', 'fine')

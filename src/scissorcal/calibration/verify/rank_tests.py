@@ -1,10 +1,11 @@
-"""Are ranks uniform? Simultaneous bands and exact p-values for their empirical distribution."""
+"""Tests of uniform ranks: simultaneous bands and exact p-values of their distribution."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.calibration.verify.result import RankBand
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -15,21 +16,6 @@ POINTS = 100
 SEARCH_STEPS = 40
 LEAST_EXPECTED = 5
 """Ranks expected in each bin of the chi-square test."""
-
-
-@dataclass(frozen=True)
-class EcdfBand:
-    """Band in which the empirical distribution of ``count`` uniform ranks stays as a whole.
-
-    ``z`` (k,) are shares of the ranks' range, ``low`` and ``high`` (k,) the shares of ranks below
-    it that are still in agreement; the band is left with probability ``alpha`` at most.
-    """
-
-    count: int
-    alpha: float
-    z: Array
-    low: Array
-    high: Array
 
 
 def rank_among(draws: Array, truth: Array, rng: np.random.Generator) -> Integers:
@@ -65,7 +51,7 @@ def ecdf_p_value(ranks: Integers, levels: int) -> float:
 
 
 @lru_cache(maxsize=64)
-def ecdf_band(count: int, alpha: float) -> EcdfBand:
+def ecdf_band(count: int, alpha: float) -> RankBand:
     """Simultaneous band of level 1 - ``alpha`` for the ECDF of ``count`` uniform ranks.
 
     The pointwise binomial intervals are widened alike until the whole curve stays inside with at
@@ -83,18 +69,12 @@ def ecdf_band(count: int, alpha: float) -> EcdfBand:
         else:
             high = middle
     inside = [np.flatnonzero(row > low) for row in tails]
-    return EcdfBand(
-        count=count,
+    return RankBand(
         alpha=alpha,
-        z=np.arange(1, POINTS) / POINTS,
-        low=np.array([row[0] for row in inside]) / count,
-        high=np.array([row[-1] for row in inside]) / count,
+        z=tuple((np.arange(1, POINTS) / POINTS).tolist()),
+        low=tuple(float(row[0]) / count for row in inside),
+        high=tuple(float(row[-1]) / count for row in inside),
     )
-
-
-def ecdf(ranks: Integers, levels: int) -> Array:
-    """Share of ranks (n,) below each place z of a band, shape (POINTS - 1,)."""
-    return np.asarray(_counts(ranks, levels) / len(ranks))
 
 
 def chi_square_p_value(ranks: Integers, levels: int) -> float:
@@ -116,7 +96,7 @@ def chi_square_p_value(ranks: Integers, levels: int) -> float:
 
 
 def acceptance(count: int, probability: float, alpha: float) -> tuple[float, float]:
-    """Shares that a binomial of ``count`` trials stays between, but for ``alpha`` of the times.
+    """Shares between which a binomial of ``count`` trials lies with probability 1 - ``alpha``.
 
     >>> acceptance(400, 0.9, 0.05)
     (0.87, 0.9275)

@@ -1,12 +1,12 @@
-"""What the trust check ends in: calibration, halves, prior sensitivity, verdicts."""
+"""What the trust check results in: calibration, halves, prior sensitivity, verdicts."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from scissorcal.calibration.result import Effort
+from scissorcal.calibration.result import Effort, Result
 from scissorcal.verdicts import Verdict
 
-FORMAT = "scissorcal-verify/1"
+FORMAT: Literal["scissorcal-verify/1"] = "scissorcal-verify/1"
 
 Check = Literal["sbc", "halves", "prior"]
 Diagnosis = Literal["fine", "prior-data conflict", "weak likelihood"]
@@ -15,10 +15,10 @@ PriorKind = Literal["local", "recipe"]
 
 @dataclass(frozen=True)
 class Coverage:
-    """How often the central interval of probability ``level`` held the truth.
+    """Coverage: the share of central intervals of probability ``level`` that contain the truth.
 
-    ``share`` stays between ``low`` and ``high`` where intervals are right, for all quantities and
-    levels of one check at once.
+    Where intervals are right, ``share`` is between ``low`` and ``high`` for all quantities and
+    levels of one check simultaneously.
     """
 
     level: float
@@ -29,7 +29,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class RankedQuantity:
-    """One parameter, or the effort that all of them predict, over all simulated fits.
+    """One parameter, or the predicted effort, over all simulated fits.
 
     ``ranks`` and ``truths`` (fits,) are the truth's rank among the posterior's draws and its value
     in ``unit``. ``ecdf_p`` and ``chi_square_p`` test the ranks' uniformity, by their empirical
@@ -64,14 +64,14 @@ class RankBand:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Simulation-based calibration of a whole fit over its own motion, with its own noise.
+    """Simulation-based calibration of a whole fit, with its motion and its noise.
 
-    Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` say in words what truths and
-    data were drawn from; ``spread`` is the factor by which the local prior is wider than the
-    posterior. ``escalated`` is the share of fits that went to a higher effort by themselves,
-    ``unreliable`` that of fits whose posterior failed its own diagnostics, ``broken`` the
-    sentences of fits that gave none or refused the data; ``other_law`` the share that took another
-    law, whose ranks count for the quantities that both laws have. ``effective`` is the median
+    Ranks run from 0 to ``levels`` - 1. ``generating`` and ``noise`` name the distributions of
+    truths and data; ``spread`` is the factor by which the local prior is wider than the posterior.
+    ``escalated`` is the share of fits that continued at a higher effort, ``unreliable`` that of
+    fits whose posterior failed its own diagnostics, ``broken`` the error messages of fits without
+    a result; ``other_law`` the share that chose another model, whose ranks count for the
+    quantities that both models have. ``effective`` is the median
     number of independent draws of a posterior, ``seconds`` the median time of a fit.
     """
 
@@ -109,14 +109,15 @@ class HalvesRow:
 
 @dataclass(frozen=True)
 class Halves:
-    """Two fits to disjoint strokes, differenced against the uncertainty that they claim.
+    """Two fits to disjoint strokes: their difference over its standard error.
 
-    ``first_strokes`` and ``second_strokes`` label the strokes, ``split`` says how they were
-    parted. ``statistic`` is the difference's squared Mahalanobis length over ``dimensions``,
-    ``p_value`` its probability, from an F distribution with ``independent`` observations.
+    ``first_strokes`` and ``second_strokes`` label the strokes, ``split`` names the rule by
+    which they were divided. ``statistic`` is the difference's squared Mahalanobis length over
+    ``dimensions``, ``p_value`` its probability, from an F distribution with ``independent``
+    observations.
     ``effort_difference`` is the rms difference of the predicted effort over all the motion, as a
-    share of its rms; ``effort_expected`` what the claimed uncertainty makes one expect, and
-    ``effort_p_value`` the probability of so large a one.
+    share of its rms; ``effort_expected`` is its expected value by the stated uncertainty, and
+    ``effort_p_value`` the probability of at least this difference.
     """
 
     split: str
@@ -144,22 +145,26 @@ class SensitivityRow:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Power-scaling sensitivities, the predicted effort's last; above ``threshold`` they matter."""
+    """Power-scaling sensitivities, the predicted effort's last; relevant above ``threshold``."""
 
     threshold: float
     rows: tuple[SensitivityRow, ...]
 
 
-@dataclass(frozen=True)
-class VerifyResult:
+@dataclass(frozen=True, repr=False)
+class VerifyResult(Result):
     """The trust check of one fit, as stored in fits/<what>.verify.json.
 
-    ``fit_hash`` is the inputs hash of the fit it is about. Checks that were not asked for are None;
-    ``not_done`` says why one that was asked for could not be made. ``false_alarm`` is the
-    probability that any statistical verdict fails although the fit is right.
+    ``fit_hash`` is the inputs hash of the fit that was checked, ``fit_content`` the SHA-256 of its
+    file. Checks that were not requested are None; ``not_done`` gives the reason for each requested
+    check that could not be made. ``false_alarm`` is the probability that any statistical verdict
+    fails although the fit is right.
     """
 
-    format: str
+    title = "trust check"
+    command = "scissorcal verify"
+
+    format: Literal["scissorcal-verify/1"]
     what: Literal["friction", "cut"]
     fit_hash: str
     rung: str
@@ -171,3 +176,4 @@ class VerifyResult:
     not_done: tuple[str, ...]
     false_alarm: float
     verdicts: tuple[Verdict, ...]
+    fit_content: str = ""

@@ -1,4 +1,4 @@
-"""Who makes raw recordings of a known truth, and fits them as a day's recordings are fitted."""
+"""Simulators: raw recordings of known parameters, and the whole fit of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut import fit_cut
-from scissorcal.calibration.cut.known import OFFSET_SD_FLOOR, KnownFriction
+from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import torque_noise_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.parameters import Layout
@@ -24,6 +24,7 @@ from scissorcal.calibration.verify.simulation import (
     simulate_friction,
 )
 from scissorcal.model import EdgeBelief
+from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording
 
@@ -31,11 +32,11 @@ Array = NDArray[np.float64]
 
 
 class Simulator(Protocol):
-    """Data of a known truth, and the whole fit of them. Picklable, for worker processes.
+    """Data of known parameters, and the whole fit of them. Picklable, for worker processes.
 
-    ``noise`` says in words what is added to the law, by samples. ``simulate`` takes unconstrained
-    parameters (p,) of the fit's own layout; ``refit`` takes what it gave, with the prior that
-    truths are drawn from.
+    ``noise`` describes the noise that is added to the samples. ``simulate`` takes unconstrained
+    parameters (p,) of the fit's own layout; ``refit`` fits its result, with the distribution
+    of truths as prior.
     """
 
     @property
@@ -50,7 +51,7 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True)
 class FrictionSimulator:
-    """Empty motion of a rig with other friction (see :class:`Simulator`)."""
+    """Empty sweeps of a rig with other friction (see :class:`Simulator`)."""
 
     motions: tuple[Motion, ...]
     settings: FitFriction
@@ -62,7 +63,7 @@ class FrictionSimulator:
 
     @property
     def noise(self) -> str:
-        """What is added to each sample, in words."""
+        """Description of the noise of the samples."""
         return noise_in_words(self.torque_noise, self.stroke_sd, self._unit)
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
@@ -78,7 +79,7 @@ class FrictionSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, windows, cogging, ladder, posterior."""
+        """The whole fit: sensors, windows, cogging, model comparison, posterior."""
         return fit_friction(
             data, self.settings, effort=effort, rng=rng, last_chosen=self.rung, prior=prior
         )
@@ -102,14 +103,14 @@ class CutSimulator:
 
     @property
     def noise(self) -> str:
-        """What is added to each sample, in words."""
-        known = KnownFriction.of(self.friction)
+        """Description of the noise of the samples."""
+        known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
         return noise_in_words(known.noise, known.stroke_sd, "N m")
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion through sheets of the truth's material."""
         tick_s = self.motions[0].pieces[0].tick_s
-        known = KnownFriction.of(self.friction)
+        known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
         values = _plain(self.layout, truth)
         return simulate_cut(self.motions, cut_truth(values, self.structure, known, tick_s), rng)
 
@@ -120,7 +121,7 @@ class CutSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, segments, scouting, teeth, ladder, posterior."""
+        """The whole fit: sensors, segments, preliminary fit, teeth, model comparison, posterior."""
         return fit_cut(
             data,
             self.recipe,
@@ -171,7 +172,7 @@ def cut_simulator(
 
 
 def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
-    """Describe what is added to simulated samples, for people.
+    """Describe the noise of simulated samples, for people.
 
     >>> noise_in_words(TorqueNoise(1e-3, 5e-4, 0.02), 1e-4, "N m")
     'white 0.001, over 20 ms 0.0005, by stroke 0.0001 N m'
@@ -185,4 +186,4 @@ def _plain(layout: Layout, u: Array) -> dict[str, float]:
 
 
 def _finite(value: Any) -> float:
-    return float(value) if np.isfinite(value) else OFFSET_SD_FLOOR
+    return float(value) if np.isfinite(value) else CutPriors().friction_sd_floor_Nm

@@ -1,4 +1,4 @@
-"""The fits of a trust check, each one by itself: picklable in, plain numbers out."""
+"""The fits of a trust check, one task each: picklable input, plain numbers as output."""
 
 import json
 import time
@@ -27,7 +27,7 @@ LEVELS = 200
 """Possible ranks: central intervals of 50 % and 90 % are whole numbers of them."""
 
 EFFORT = "effort_rms"
-"""Name of what all parameters predict together: the rms of the expected effort over the motion."""
+"""Name of the predicted effort: its rms over the motion, which depends on all parameters."""
 
 _KINDS: tuple[Kind, ...] = ("simulated", "half", "whole")
 
@@ -42,12 +42,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Study:
-    """All that any fit of a trust check needs.
+    """The input of every fit of a trust check.
 
     ``generating`` gives truths, ``simulator`` raw data of them and their whole fit; ``start`` (p,)
-    is where the fit ended, ``draws`` how many are taken of the posteriors of halves and whole;
-    ``split`` parts the data (None where it cannot be parted). ``between`` (p,) is the variance
-    between recordings that the fit claims, if any.
+    is the fit's posterior mean, ``draws`` the number of draws of the posteriors of halves and
+    whole; ``split`` gives the halves (None where there are none). ``between`` (p,) is the fit's
+    variance between recordings, if any.
     """
 
     experiment: Experiment
@@ -80,8 +80,8 @@ class Study:
 def run(study: Study, task: Task) -> Record:
     """Do one fit; the same numbers for the same study and task, wherever it runs.
 
-    The result holds plain finite numbers alone, so that it can stand as one line of JSON. A fit
-    that breaks on its numbers, or refuses the data with a stated error, yields ``{"broken":
+    The result holds plain finite numbers alone, for one line of JSON. A fit
+    that fails numerically, or refuses the data with an error of scissorcal, yields ``{"broken":
     sentence}``; other errors are raised.
     """
     key = (_KINDS.index(task.kind), task.index)
@@ -100,8 +100,7 @@ def run(study: Study, task: Task) -> Record:
 def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     """Draw a truth, simulate raw recordings of it, fit them as a whole, and rank it.
 
-    Where the refit took another law, quantities that this law lacks, or that mean something else
-    in it, have no rank.
+    Where the refit chose another law, quantities without the same meaning in it have no rank.
     """
     truth = study.generating.draw(rng)
     data = study.simulator.simulate(truth, rng)

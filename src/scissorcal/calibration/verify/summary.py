@@ -1,4 +1,4 @@
-"""From the records of single fits to calibration, difference of halves and sensitivity."""
+"""Summaries of the tasks' records: calibration, difference of halves, sensitivity."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,6 @@ from scissorcal.calibration.verify.result import (
     Coverage,
     Halves,
     HalvesRow,
-    RankBand,
     RankedQuantity,
     Sensitivity,
     SensitivityRow,
@@ -39,10 +38,10 @@ SLOPE_STEP = 1e-3
 def summarise_simulated(
     study: Study, records: Sequence[Record], units: Sequence[str], alpha: float
 ) -> Calibration | None:
-    """Judge the ranks of simulated fits; None where all of them broke.
+    """Summarise the ranks of simulated fits; None where all of them failed.
 
     ``alpha`` is the probability that any calibrated quantity leaves the band, or any coverage its
-    limits: it is shared out evenly (Bonferroni).
+    limits, divided evenly (Bonferroni).
     """
     sound = [record for record in records if "broken" not in record]
     if not sound:
@@ -57,7 +56,6 @@ def summarise_simulated(
         for i, (name, unit) in enumerate(zip(names, units, strict=True))
         if ranked[:, i].any()
     )
-    band = ecdf_band(len(sound), each)
     higher = RUNGS.index(study.effort)
     reached = [RUNGS.index(record["effort"]) for record in sound]
     return Calibration(
@@ -68,7 +66,7 @@ def summarise_simulated(
         generating=study.generating.words,
         noise=study.simulator.noise,
         quantities=quantities,
-        band=RankBand(each, _plain(band.z), _plain(band.low), _plain(band.high)),
+        band=ecdf_band(len(sound), each),
         escalated=float(np.mean([rung > higher for rung in reached])),
         other_law=float(np.mean([record["law"] != study.law for record in sound])),
         unreliable=float(np.mean([_unreliable(record) for record in sound])),
@@ -79,7 +77,7 @@ def summarise_simulated(
 
 
 def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Generator) -> Halves:
-    """Difference the two halves' fits, in parameters and in the effort that they predict."""
+    """Compare the two halves' fits, in their parameters and their predicted effort."""
     experiment, layout = study.experiment, study.experiment.layout
     assert study.split is not None
     first, second = (
@@ -113,7 +111,7 @@ def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Gen
 
 
 def _scatter(study: Study, half: int) -> Array:
-    """Covariance (p, p) of a half's mean over recordings, where the fit claims that they differ."""
+    """Covariance (p, p) of a half's mean over recordings, where the fit includes them."""
     assert study.split is not None
     p = len(study.experiment.layout.names)
     if study.between is None or study.split.recordings is None:
@@ -169,18 +167,15 @@ def _halves_row(
     layout: Layout, i: int, first: HalfFit, second: HalfFit, covariance: Array, z: Array
 ) -> HalvesRow:
     parameter = layout.parameters[i]
-    low, high = (float(parameter.natural(half.mean[i])) for half in (first, second))
+    natural = parameter.transform.natural
+    low, high = (float(natural(half.mean[i])) for half in (first, second))
     middle, reach = 0.5 * (first.mean[i] + second.mean[i]), 0.5 * np.sqrt(covariance[i, i])
-    sd = float(parameter.natural(middle + reach) - parameter.natural(middle - reach))
+    sd = float(natural(middle + reach) - natural(middle - reach))
     return HalvesRow(parameter.name, parameter.unit, low, high, sd, _finite(z[i]))
 
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _plain(values: Array) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
 
 
 def _labels(strokes: NDArray[np.int64]) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""Verdicts of the trust check, each with its threshold and its reason."""
+"""Verdicts of the trust check."""
 
 from collections.abc import Sequence
 
@@ -14,15 +14,15 @@ from scissorcal.calibration.verify.study import EFFORT
 from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
 FALSE_ALARM = 0.01
-"""Probability that any of the statistical verdicts fails although all is right."""
+"""Probability that any of the statistical verdicts fails for a correct fit."""
 
 RANKS_SHARE = 0.5 * FALSE_ALARM
-"""What of it the calibration may use; the two verdicts on halves share the rest."""
+"""The calibration's part of it; the two verdicts on halves share the rest."""
 
 HALVES_SHARE = 0.25 * FALSE_ALARM
 FEWEST_FITS = 20
 UNRELIABLE_LIMIT = 0.05
-"""Share of simulated fits that may break or fail their own diagnostics."""
+"""Limit of the share of simulated fits that fail or do not pass their diagnostics."""
 
 
 def verify_verdicts(
@@ -33,9 +33,9 @@ def verify_verdicts(
     sensitivity: Sensitivity | None,
     not_done: Sequence[str],
 ) -> tuple[Verdict, ...]:
-    """Judge what was asked for; what could not be made is not evaluated, for the reasons given."""
+    """Judge the requested checks; one that could not be done is not evaluated, with the reason."""
     scope = f"verify.{what}"
-    because = " ".join(not_done) or "It could not be made."
+    because = " ".join(not_done) or "The check could not be done."
     verdicts: list[Verdict] = []
     if "sbc" in checks:
         verdicts += _calibration(scope, calibration, because)
@@ -55,19 +55,20 @@ def _calibration(scope: str, found: Calibration | None, because: str) -> list[Ve
 def _ranks(scope: str, found: Calibration) -> Verdict:
     check, limit = "calibration", found.band.alpha
     if found.fits < FEWEST_FITS:
-        why = f"{found.fits} simulated fits tell little; {FEWEST_FITS} are needed, better 200."
+        why = f"{found.fits} simulated fits are too few: {FEWEST_FITS} are needed, 200 recommended."
         return not_evaluated(scope, check, why, limit)
     worst = min(found.quantities, key=lambda quantity: quantity.ecdf_p)
     good = (
-        f"In {found.fits} fits to simulated data the truth's ranks are uniform for all "
-        f"{len(found.quantities)} quantities ({worst.name} least so, p = {worst.ecdf_p:.2g})."
+        f"In {found.fits} fits to simulated data the ranks of the true values are uniform for "
+        f"all {len(found.quantities)} quantities (smallest p = {worst.ecdf_p:.2g}, "
+        f"{worst.name}; limit {limit:.2g})."
     )
     wrong = [quantity for quantity in found.quantities if quantity.ecdf_p < limit]
     remedy = (
-        "They are on the safe side; a longer recording narrows them."
+        "The intervals are conservative; a longer recording narrows them."
         if all(quantity.width < 1.0 - abs(quantity.shift) for quantity in wrong)
-        else "Do not rely on these intervals: record more strokes, or choose a simpler model or a "
-        "higher effort."
+        else "Do not rely on these intervals: record more strokes, or choose a simpler candidate "
+        "or a higher effort."
     )
     how = "; ".join(_how_wrong(quantity) for quantity in wrong)
     bad = f"In {found.fits} fits to simulated data {how}. {remedy}"
@@ -77,11 +78,12 @@ def _ranks(scope: str, found: Calibration) -> Verdict:
 def _how_wrong(quantity: RankedQuantity) -> str:
     name, width, shift = quantity.name, quantity.width, quantity.shift
     fifty, ninety = quantity.coverage
-    held = f"(50 % intervals held {fifty.share:.0%}, 90 % ones {ninety.share:.0%})"
+    held = f"(50 % intervals contain {fifty.share:.0%}, 90 % intervals {ninety.share:.0%})"
     if abs(shift) > abs(width - 1.0):
         side = "below" if shift > 0 else "above"
         return (
-            f"intervals of {name} lie {abs(shift):.2g} standard deviations {side} the truth {held}"
+            f"intervals of {name} are {abs(shift):.2g} standard deviations {side} the true "
+            f"value {held}"
         )
     if width > 1.0:
         return f"intervals of {name} are too narrow by a factor of about {width:.2g} {held}"
@@ -92,40 +94,41 @@ def _refits(scope: str, found: Calibration) -> Verdict:
     every = found.fits + len(found.broken)
     share = (found.unreliable * found.fits + len(found.broken)) / every
     why = (
-        f"{share:.1%} of {every} simulated fits broke or failed their own diagnostics, "
-        f"{found.escalated:.1%} went to a higher effort, {found.other_law:.1%} took another law."
+        f"{share:.1%} of {every} simulated fits failed or did not pass their diagnostics (limit "
+        f"{UNRELIABLE_LIMIT:.0%}); {found.escalated:.1%} used a higher effort, "
+        f"{found.other_law:.1%} chose another candidate."
     )
     if found.broken:
-        why += f" One ended with: {found.broken[0]}"
+        why += f" Example: {found.broken[0]}"
     return judge(scope, "refits", share, UNRELIABLE_LIMIT, why)
 
 
 def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
     checks = ("halves", "halves-effort")
     if found is None or found.p_value is None or found.effort_p_value is None:
-        why = because if found is None else "Each half holds too little to be judged by itself."
+        why = because if found is None else "Each half has too few data to be judged alone."
         return [not_evaluated(scope, name, why, HALVES_SHARE) for name in checks]
     largest = max((row for row in found.rows if row.z is not None), key=lambda r: abs(r.z or 0.0))
     size = f"{largest.name} differs most, by {abs(largest.z or 0.0):.1f} standard deviations"
     p, effort_p = found.p_value, found.effort_p_value
     by_recording = found.split.startswith(BY_RECORDING)
-    good = f"Two halves of the data agree within their claimed errors (p = {p:.2g}; {size})."
+    good = f"Two halves of the data agree within their uncertainty (p = {p:.2g}; {size})."
     if p > 1.0 - HALVES_SHARE:
         good += (
-            " They agree better than expected: a lack of fit repeats in every stroke, and the "
-            "intervals allow for it as if it were noise."
+            " They agree better than by chance: the lack of fit repeats in every stroke, and the "
+            "intervals treat it as noise."
         )
     if not by_recording:
-        good += " How much recordings differ is not known, as there is only one."
+        good += " One recording: the variation between recordings is unknown."
     units = "recordings" if by_recording else "strokes"
     bad = (
-        f"Two halves of the data differ by more than their claimed errors (p = {p:.2g}; {size}): "
-        f"the law or the rig changes between {units}. Look at the residuals by stroke, and repeat "
-        "some."
+        f"Two halves of the data differ by more than their uncertainty (p = {p:.2g}, limit "
+        f"{HALVES_SHARE:.2g}; {size}): law or rig change between {units}. Look at the "
+        "residuals by stroke, and repeat some strokes."
     )
     what = (
-        f"The halves' predictions differ by {found.effort_difference:.2%} of the effort's rms "
-        f"where {found.effort_expected:.2%} is expected (p = {effort_p:.2g})."
+        f"The halves' predictions differ by {found.effort_difference:.2%} of the effort's rms; "
+        f"expected {found.effort_expected:.2%} (p = {effort_p:.2g}, limit {HALVES_SHARE:.2g})."
     )
     return [
         judge(scope, checks[0], p, HALVES_SHARE, good, bad),
@@ -143,17 +146,18 @@ def _prior(scope: str, found: Sensitivity | None, because: str) -> Verdict:
     said = []
     if conflict:
         said.append(
-            f"prior and data pull {', '.join(conflict)} apart: check units and signs, or widen the "
-            "recipe's prior"
+            f"prior and data disagree on {', '.join(conflict)}: check units and signs, or widen "
+            "the recipe's prior"
         )
     if weak:
         said.append(
-            f"the data say little about {', '.join(weak)}, and the prior decides: record strokes "
+            f"the data hardly inform {', '.join(weak)}, and the prior dominates: record strokes "
             "that excite it"
         )
     status: Status = "fail" if conflict or effort.prior >= found.threshold else "pass"
     why = (
-        f"Sensitivity to the prior is {worst.prior:.2g} at most ({worst.name}); the data decide."
+        f"The largest prior sensitivity is {worst.prior:.2g} ({worst.name}; limit "
+        f"{found.threshold:.2g}): the data dominate."
         if not said
         else "; ".join(said).capitalize() + "."
     )

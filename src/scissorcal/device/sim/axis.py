@@ -1,4 +1,4 @@
-"""One axis of the mechanism: inertia, dry friction and two dead stops, with its losses booked."""
+"""One axis of the mechanism: inertia, dry friction, two inelastic stops, and energy losses."""
 
 from scissorcal.device.sim.friction import DryFriction
 
@@ -73,7 +73,7 @@ class Axis:
         return 0.5 * self.inertia * self.rate * self.rate
 
     def _strike(self, beyond: float, moved: float, before: float) -> None:
-        """Stop dead at the stop, and book what the way that was gone does not account for."""
+        """Stop at the stop, and add the lost kinetic energy to ``stops_J``."""
         after = self.rate
         kept = 0.0 if after * beyond > 0.0 else after
         work = self.inertia * (after - before) / (2.0 * self._half) * moved

@@ -1,4 +1,4 @@
-"""Cutting: a crack that waits until it is paid for, runs, stops, and never closes again.
+"""Cutting: a crack that rests until the drive meets the toughness, runs, stops, and never closes.
 
 The crack starts where the released energy per metre exceeds the local fracture energy, and runs
 on until it has fallen to kappa times that: a running crack needs less than one that has to start.
@@ -23,7 +23,7 @@ DRIVE_TOLERANCE_N = 1e-8  # above what the last bit of a run's place may leave
 class Cut:
     """The state of one cut: blades on a sheet, and the pose they came from.
 
-    ``fracture_J`` and ``arrest_J`` add up what the new surface took and what the stops lost.
+    ``fracture_J`` and ``arrest_J`` are the energy of the new surface and what was lost at stops.
     """
 
     __slots__ = ("_drive", "_pose", "_width", "arrest_J", "blade", "fracture_J", "sheet")
@@ -38,7 +38,7 @@ class Cut:
         self._width = SHORTEST_BRACKET
 
     def move_to(self, opening: float, advance: float) -> Touch:
-        """Bring the blades to a pose, let the crack run if it must, and give the forces.
+        """Bring the blades to a pose, advance the crack where driven, and return the forces.
 
         A run that starts on the way is placed on the way: at the pose between the last and this
         one at which the drive met the toughness. So the length of a step of time does not raise

@@ -1,4 +1,4 @@
-"""What can go wrong on purpose: frames lost, garbled or late, a cable pulled, a stuck encoder."""
+"""Faults to simulate: lost, garbled or late frames, an unplugged cable, a stuck encoder."""
 
 import math
 from collections.abc import Iterable
@@ -26,7 +26,7 @@ class Faults:
     """Which faults a virtual rig has; none by default.
 
     ``drop_share`` and ``garble_share`` (0 to 1) are probabilities per frame, either way on the
-    line. ``delay_ms`` holds back every frame to the host, as an adapter with a lazy latency timer
+    line. ``delay_ms`` holds back every frame to the host, as an adapter with a long latency timer
     does. ``unplug_s`` and ``stuck_encoder_s`` count from the first STREAM.
     """
 
@@ -51,7 +51,7 @@ class Faults:
 
 
 def parse_faults(options: Iterable[str]) -> Faults:
-    """Read faults from words such as ``drop=0.01``; InputError where one makes no sense.
+    """Read faults from words such as ``drop=0.01``; InputError where one is not valid.
 
     >>> parse_faults(["drop=0.01", "unplug=2.5"])
     Faults(drop_share=0.01, garble_share=0.0, delay_ms=0.0, unplug_s=2.5, stuck_encoder_s=None)
@@ -60,7 +60,7 @@ def parse_faults(options: Iterable[str]) -> Faults:
     for option in options:
         kind, equals, number = option.partition("=")
         if kind not in _KINDS or not equals:
-            raise InputError(f"The fault {option!r} is not known: give {_MEANINGS}.")
+            raise InputError(f"The fault {option!r} is not known. Give {_MEANINGS}.")
         if _KINDS[kind] in values:
             raise InputError(f"The fault {kind} is given twice: give it once.")
         try:
@@ -78,7 +78,7 @@ def parse_faults(options: Iterable[str]) -> Faults:
 
 
 class FaultyLine:
-    """A serial line that drops and garbles frames by chance."""
+    """A serial line that drops and garbles frames at random."""
 
     def __init__(self, faults: Faults, rng: np.random.Generator) -> None:
         self._faults = faults
@@ -90,7 +90,7 @@ class FaultyLine:
         return share > 0.0 and bool(self._rng.random() < share)
 
     def garbled(self, data: bytes) -> bytes:
-        """The bytes as they arrive: now and then with one of them changed."""
+        """The bytes as they arrive: at random with one of them changed."""
         share = self._faults.garble_share
         if not data or share == 0.0 or self._rng.random() >= share:
             return data

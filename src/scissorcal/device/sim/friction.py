@@ -1,4 +1,4 @@
-"""Dry friction as it truly is: it holds at rest, and slides with a level that depends on speed.
+"""Dry friction: it holds at rest, and slides with a level that depends on speed.
 
 No smoothing stands in for stiction. One step of time solves for the friction impulse: the body
 first moves freely, and friction then takes off at most what brings it to rest (the time-stepping
@@ -89,7 +89,7 @@ class DryFriction:
 
         ``mobility`` is dt / inertia, ``brake`` extra viscous damping. Coulomb and viscous parts
         are implicit; the Stribeck part is taken at the rate before. The result never has the
-        opposite sign of ``free``: friction stops, it does not push.
+        opposite sign of ``free``: friction stops motion, it does not drive it.
         """
         if free > 0.0:
             level, viscous, speed = self.coulomb_pos, self.viscous_pos, free

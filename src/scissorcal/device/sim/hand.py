@@ -1,9 +1,9 @@
-"""A virtual hand: it closes the handles in smooth strokes, opens them, and moves on.
+"""A virtual hand: it closes the handles in smooth strokes, opens them, and advances.
 
 Each movement follows a minimum-jerk path (Flash and Hogan 1985,
 doi:10.1523/JNEUROSCI.05-07-01688.1985). The hand holds the handles as through a damped spring of
-limited strength, and trembles. It sees where the cut ends, as a person does; where there is no
-material it believes the cut to end where the blades have last crossed.
+limited strength, with tremor. It knows where the cut ends, as a person sees it; without
+material it takes the end of the cut to be where the blades last crossed.
 """
 
 import math
@@ -32,8 +32,8 @@ class VirtualHand:
     """Forces of the hand on handles and sledge, one tick at a time.
 
     A round is: open the blades, move on until they just reach the end of the cut, close them.
-    After ``strokes`` rounds (or where the sheet or the sledge's way ends) the hand opens the
-    blades once more and lets go.
+    After ``strokes`` rounds (or at the end of the sheet or of the sledge's travel) the hand opens
+    the blades once more and releases them.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class VirtualHand:
         self._advance_path = (0.0, 0.0, 1.0)
 
     def start(self, speed: float, opening: float, advance: float) -> None:
-        """Take hold and begin strokes with a mean rate of ``speed`` rad/s; 0 lets go."""
+        """Begin strokes with a mean rate of ``speed`` rad/s; 0 releases the handles."""
         self._speed = speed
         self.strokes_done = 0
         self._seen = 0.0
@@ -98,7 +98,7 @@ class VirtualHand:
         )
 
     def _next_phase(self, opening: float, advance: float) -> bool:
-        """Go on to the next phase; False if the hand lets go instead."""
+        """Go on to the next phase; False if the hand releases instead."""
         if self.phase is Phase.OPENING:
             if self.strokes_done >= self.strokes or not self._room_for_stroke():
                 self.phase = Phase.REST
@@ -112,7 +112,7 @@ class VirtualHand:
         return True
 
     def _begin(self, phase: Phase, opening: float, advance: float) -> None:
-        """Lay out the paths of a phase from where the hand holds now."""
+        """Plan the paths of a phase from the current position."""
         law = self._law
         self.phase = phase
         self._elapsed = 0.0
@@ -143,7 +143,7 @@ class VirtualHand:
         return inside and self._stroke_advance() < self._way[1]
 
     def _closed(self, advance: float) -> float:
-        """Opening at which the stroke ends: closed, or pressed as deep as the hand means to."""
+        """Opening at which the stroke ends: closed, or pressed to the intended depth."""
         closed = math.radians(self._law.closed_deg)
         if not self._presses:
             return closed

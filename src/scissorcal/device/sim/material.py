@@ -7,8 +7,8 @@ import numpy as np
 from scissorcal.device.sim.specimen import Material
 
 FORCE_CEILING_N = 1000.0
-"""Beyond this force at the edge the response stays constant: no sheet bears more, and the steel
-gives way. It keeps every number finite without a step in the force."""
+"""Beyond this force at the edge the response stays constant: no sheet sustains more, and the steel
+yields. It keeps every number finite without a step in the force."""
 
 STEPS_PER_LENGTH = 16
 
@@ -67,7 +67,7 @@ class Response:
 
 
 class Sheet:
-    """One fresh piece of material: how far it is cut, and what cutting on costs at each place.
+    """One fresh piece of material: how far it is cut, and its toughness at each place.
 
     The fracture energy per metre of cut is ``mean * (1 + variation * xi(X))``, piecewise linear
     on a grid that is fine against the correlation length. ``xi`` is Gaussian with unit variance

@@ -1,4 +1,4 @@
-"""Start a virtual rig in a process of its own, and end it again whatever happens."""
+"""Start a virtual rig in a separate process, and end it in every case."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ class SimProcess:
     """A virtual rig on a pseudo-terminal, served by another process; a context manager.
 
     ``specimen`` is a name or a path. The process is started at once; :attr:`port` is its path.
-    It ends with :meth:`close`, and by itself when this process ends, even when killed.
+    It ends with :meth:`close`, and when this process ends, even if killed.
 
     >>> with SimProcess("office-paper", seed=1) as sim:
     ...     sim.port.startswith("/dev/")
@@ -55,7 +55,7 @@ class SimProcess:
         return self._process.poll() is None
 
     def close(self) -> None:
-        """End the server and wait for it; doing so twice is fine."""
+        """End the server and wait for it; may be called twice."""
         process = self._process
         if process.stdin is not None and not process.stdin.closed:
             process.stdin.close()
@@ -81,8 +81,8 @@ class SimProcess:
         while not select([stdout], [], [], 0.05)[0]:
             if time.monotonic() > deadline:
                 raise DeviceError(
-                    f"The virtual rig did not start within {START_TIMEOUT_S:g} s: this machine is "
-                    "too busy, or Python cannot run scissorcal.device.sim.server."
+                    f"The virtual rig did not start within {START_TIMEOUT_S:g} s: close "
+                    "programs that load the processor, and start again."
                 )
         line = stdout.readline().decode().strip()
         if line:

@@ -1,21 +1,21 @@
-"""The device's side of the wire: bytes in, frames out, one tick at a time; no clock, no port.
+"""The device's side of the wire: bytes in, frames out, tick by tick; without clock or port.
 
-How it behaves, beyond the messages themselves:
+Its behaviour, beyond the messages themselves:
 
 * HELLO is answered with IDENTITY, CONFIG with CONFIG_ECHO that states the value in force. After
   STREAM = 1 a STATE follows every tick. ``sequence`` counts ticks since power-on, streamed or not.
 * A COMMAND holds from the next tick on until another comes. One that is not finite is ignored.
-* With ENABLE the motors follow the commands; without it they give nothing. While they are
+* With ENABLE the motors follow the commands; without it they exert nothing. While they are
   enabled, BRAKE_AFTER_MS without a COMMAND brakes them (short-circuited windings) and latches a
-  fault: COMMANDS_LOST stands as long as none comes, FAULT_LATCHED until a COMMAND carries
-  CLEAR_FAULT. While the fault is latched the motors brake, whatever is commanded. A host that
-  means to stop talking first sends a COMMAND without ENABLE.
+  fault: COMMANDS_LOST is set until the next COMMAND, FAULT_LATCHED until a COMMAND has
+  CLEAR_FAULT. While the fault is latched the motors brake, whatever is commanded. A host
+  that disconnects first sends a COMMAND without ENABLE.
 * Commands beyond the motors' limits are clipped and flagged TORQUE_SATURATED.
 * MATERIAL = 1 puts in a fresh sheet with its near edge at advance + contact = 0. It is refused
-  (VALUE_REFUSED) while the blades are in the way: open them or draw back first.
-* HAND_SPEED > 0 lets the virtual hand make HAND_STROKES rounds and then let go; 0 lets go at once.
-* An encoder that sticks is noticed after ENCODER_CHECK_MS: ENCODER_FAULT, and the fault latches.
-  Until then its reading is simply frozen.
+  (VALUE_REFUSED) while the blades block it: open them or retract first.
+* HAND_SPEED > 0 makes the virtual hand do HAND_STROKES strokes and then release; 0 releases now.
+* A stuck encoder is detected after ENCODER_CHECK_MS: ENCODER_FAULT, and the fault latches.
+  Until then its reading is constant.
 """
 
 import math
@@ -63,10 +63,10 @@ _ENCODER_FAULT = int(StateFlag.ENCODER_FAULT)
 
 
 class RigProtocol:
-    """A virtual rig that speaks the wire protocol.
+    """A virtual rig with the wire protocol.
 
-    Feed it what the host wrote (:meth:`receive`), let time pass (:meth:`tick`, one device tick
-    each), and collect what it says (:meth:`take`). ``garbled`` counts what it could not read,
+    Pass what the host wrote to :meth:`receive`, advance the time with :meth:`tick` (one device tick
+    each), and collect its frames with :meth:`take`. ``garbled`` counts frames it could not read,
     ``unplugged`` turns True when its cable is pulled.
     """
 
@@ -94,7 +94,7 @@ class RigProtocol:
 
     @property
     def garbled(self) -> int:
-        """Frames from the host that were thrown away."""
+        """Frames from the host that were discarded."""
         return self._decoder.garbled
 
     def receive(self, data: bytes) -> None:
@@ -105,11 +105,11 @@ class RigProtocol:
             try:
                 message = decode(payload)
             except ValueError:
-                continue  # sound frames of another protocol are none of this device's business
+                continue  # valid frames of another protocol are ignored
             self._handle(message)
 
     def tick(self) -> None:
-        """Let one tick pass: move, measure, watch, and say so where streaming is on."""
+        """Advance one tick: move, measure, check for faults, and send STATE if streaming."""
         self._watch_commands()
         self._watch_faults()
         command = self._command
@@ -131,7 +131,7 @@ class RigProtocol:
             opening = self._stuck_at
         elif self._stuck():
             self._stuck_at = opening
-        self._say(
+        self._send(
             State(
                 flags,
                 self._ticks & U32,
@@ -160,12 +160,12 @@ class RigProtocol:
                     self._fault = False
                 self._command = message
         elif isinstance(message, Hello):
-            self._say(self._identity(message.nonce))
+            self._send(self._identity(message.nonce))
         elif isinstance(message, Config):
-            self._say(self._configured(message))
+            self._send(self._configured(message))
 
     def _configured(self, config: Config) -> ConfigEcho:
-        """Set a value if it makes sense, and say what is in force now."""
+        """Set a value if it is acceptable, and state the value in force."""
         key, value = config.key, config.value
         if key not in self._values:
             return ConfigEcho(ConfigStatus.UNKNOWN_KEY, key, config.nonce, 0.0)
@@ -227,7 +227,7 @@ class RigProtocol:
         at = self.faults.stuck_encoder_s
         return at is not None and self._streamed_s() >= at + ENCODER_CHECK_MS * 1e-3
 
-    def _say(self, message: Message) -> None:
+    def _send(self, message: Message) -> None:
         if self._line.drops():
             return
         self._waiting.append((self._ticks + self._delay_ticks, self._line.garbled(encode(message))))

@@ -1,4 +1,4 @@
-"""The virtual rig: mechanism, motors, sensors, sheet and hand, one device tick at a time.
+"""The virtual rig: mechanism, motors, sensors, sheet and hand, simulated tick by tick.
 
 The opening axis obeys
 
@@ -56,7 +56,7 @@ class VirtualRig:
     """A rig made of a specimen and a seeded generator; the same calls give the same numbers.
 
     ``joint`` and ``sledge`` are its two axes; they, ``opening``, ``rate``, ``advance``,
-    ``advance_rate``, ``crack`` and ``time_s`` are the truth, for tests and judges. What a device
+    ``advance_rate``, ``crack`` and ``time_s`` are the truth, for tests. What a device
     reports is what :meth:`tick` returns.
     """
 
@@ -99,7 +99,7 @@ class VirtualRig:
         enabled: bool = True,
         braking: bool = False,
     ) -> Measured:
-        """Let one millisecond pass under a motor torque (N m) and sledge force (N); measure.
+        """Advance one millisecond under a motor torque (N m) and sledge force (N); measure.
 
         Commands beyond the motors' limits are clipped and flagged, non-finite ones count as 0.
         Disabled motors give no torque; ``braking`` shorts their windings, which damps.
@@ -137,7 +137,7 @@ class VirtualRig:
         return True
 
     def remove_sheet(self) -> None:
-        """Take the sheet out; what it stored is gone with it."""
+        """Take the sheet out; its stored energy is lost."""
         if self.cut is not None:
             stored = self.cut.stored_energy(self.opening, self.advance)
             self._book.fracture += self.cut.fracture_J
@@ -181,7 +181,7 @@ class VirtualRig:
 
     @property
     def energy(self) -> EnergyBook:
-        """The books so far, a copy."""
+        """The works so far, a copy."""
         book = EnergyBook(**vars(self._book))
         book.friction = self.joint.friction_J + self.sledge.friction_J
         book.stops = self.joint.stops_J + self.sledge.stops_J

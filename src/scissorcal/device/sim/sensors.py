@@ -1,4 +1,4 @@
-"""What the rig measures instead of the truth: encoder steps, limits, and noise with memory."""
+"""What the rig measures: encoder steps, limits, and autocorrelated noise."""
 
 import math
 from collections.abc import Iterator
@@ -49,7 +49,7 @@ class NoiseChannel:
 
 
 class SensorSet:
-    """All sensors of one rig, with their own stream of random numbers."""
+    """All sensors of one rig, with one stream of random numbers."""
 
     __slots__ = ("_advance_step", "_force", "_force_limit", "_opening_step", "_torque")
 
@@ -93,6 +93,6 @@ class SensorSet:
 
 
 def standard_normals(rng: np.random.Generator) -> Iterator[float]:
-    """Endless standard normals as plain floats, drawn in blocks."""
+    """Infinite standard normals as plain floats, drawn in blocks."""
     while True:
         yield from rng.standard_normal(BLOCK).tolist()

@@ -1,15 +1,14 @@
-"""A virtual rig behind a real pseudo-terminal, at its real pace, in a process of its own.
+"""A virtual rig on a pseudo-terminal, in real time, in a separate process.
 
 Run as ``python -m scissorcal.device.sim.server SPECIMEN``, it prints the port's path on the first
-line of stdout and serves until its stdin ends (so that it never outlives the process that holds
-the other end of that pipe, however that one dies), until SIGTERM or SIGINT, or until its faults
-unplug it.
+line of stdout and serves until its stdin ends (so that it ends with the process that holds the
+other end of that pipe), until SIGTERM or SIGINT, or until its faults unplug it.
 
 Ticks follow an absolute schedule. A process that wakes late catches up with at most CATCH_UP_TICKS
-ticks in one go, fewer than the default BRAKE_AFTER_MS, so that its own lateness never looks like a
-silent host. Whatever is later than that is time in which the rig stood still; it is counted as a
-stall. Nothing blocks: while no one has the port open its frames are lost, as on a real line, and a
-reader that is too slow loses the oldest ones.
+ticks at once, fewer than the default BRAKE_AFTER_MS, so that its own delay is not taken for a
+silent host. During any longer delay the rig stands still, which is counted as a stall. Nothing
+blocks: while the port is not open its frames are lost, as on a real line, and a slow reader loses
+the oldest ones.
 """
 
 import argparse
@@ -56,7 +55,7 @@ def serve(
     announce: Callable[[str], None] = print,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> ServeReport:
-    """Serve a virtual rig on a new pseudo-terminal until told to stop.
+    """Serve a virtual rig on a new pseudo-terminal until stopped.
 
     ``announce`` is called once with the port's path. ``should_stop`` is asked after every tick. A
     stdin that is a pipe ends the service when it is closed; SIGTERM and SIGINT end it too, if this

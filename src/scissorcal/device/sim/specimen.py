@@ -1,7 +1,7 @@
-"""Specimens: what is true about a virtual rig, its blades, the sheet between them and the hand.
+"""Specimens: the true properties of a virtual rig, its blades, the sheet and the hand.
 
-A specimen is a TOML file under ``recipes/specimens``. The simulation reads it; whoever fits a
-model never does. Units stand in the keys; the properties that end in ``_m`` or ``_rad`` give SI.
+A specimen is a TOML file under ``recipes/specimens``. The simulation reads it; a fit never
+does. The keys have the units; the properties that end in ``_m`` or ``_rad`` give SI.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def average_torque(
     """Average torque that a hand feels, in N m; positive opens the blades. Inputs broadcast.
 
     The cut's part is that of a slow closing stroke on mean toughness with the crack tip at
-    ``contact`` (m); where the blades press harder than the sheet bears, the tip settles further
+    ``contact`` (m); where the blades press harder than the sheet sustains, the tip settles further
     out first. With a ripple it is the mean over all places that the tip takes between a start
     and a stop of the crack. With ``friction`` the friction at ``opening`` (rad) and ``rate``
     (rad/s) is added, which resists the motion.

@@ -1,4 +1,4 @@
-/* The block of shared memory through which a supervisor steers the loop and reads what it did.
+/* The block of shared memory through which a supervisor controls the loop and reads its samples.
  *
  * One process runs the loop on the block, another holds the same memory. Orders and counters pass
  * through GCC's __atomic builtins, in this file and sc_loop only; the rest of the core needs none.
@@ -34,7 +34,7 @@ typedef struct {
     uint64_t total;
 } sc_histogram;
 
-/* A CONFIG that the supervisor wants sent while the loop holds the line. */
+/* A CONFIG that the loop sends for the supervisor. */
 typedef struct {
     uint32_t wanted;   /* counts requests */
     uint32_t answered; /* number of the request that the echo below answers */
@@ -51,15 +51,15 @@ typedef struct {
     uint32_t reference_capacity;
     uint32_t reference_size;
     uint32_t has_model;
-    uint32_t silence_limit_ms; /* without a sound STATE, after which the loop gives up */
+    uint32_t silence_limit_ms; /* without a valid STATE, after which the loop ends */
     uint32_t running;
     uint32_t exit_reason; /* SC_STOP_... once the loop has ended */
     int32_t exit_errno;
     uint32_t garbled;
     uint64_t bytes_received;
-    uint64_t other_frames; /* sound, but no STATE */
+    uint64_t other_frames; /* valid, but no STATE */
     uint64_t answers;      /* commands written */
-    uint64_t unsent;       /* commands that the line did not take in time */
+    uint64_t unsent;       /* commands that the line did not accept in time */
     uint64_t stalls;       /* more than 5 ticks between two STATE by the host's clock */
     int64_t started_ns;
     sc_orders orders;
@@ -82,7 +82,7 @@ void sc_block_init(sc_block *block, uint32_t reference_capacity);
 /* 1 if memory of this many bytes holds a block of this layout. */
 int sc_block_is_sound(const sc_block *block, uint64_t size);
 
-/* Views into the block: the model, 0 if it has none or an unsound one; the reference. */
+/* Views into the block: the model, 0 if it has none or an invalid one; the reference. */
 int sc_block_model(const sc_block *block, sc_model *model);
 void sc_block_reference(const sc_block *block, sc_reference *reference);
 

@@ -1,4 +1,4 @@
-/* A blade that loads a crack, walked exactly from sample to sample: for simulated recordings.
+/* A blade that loads a crack, exactly from sample to sample: for simulated recordings.
  *
  * Between two samples opening and advance change linearly. The crack stands and the edge is elastic
  * until what the edge would release, m g(delta) tan(psi), exceeds the energy J at the crack's place;

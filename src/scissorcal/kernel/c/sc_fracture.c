@@ -6,7 +6,7 @@
 static const float RESPONSE_CAP = 1e6f; /* N: far beyond any rig, keeps all that follows finite */
 static const float PARALLEL = 1e-6f;    /* tan(psi) up to which edges count as parallel */
 static const float CLOSE_ENOUGH = 2e-6f;  /* of the target */
-static const float RESOLUTION = 1e-7f;      /* of a station: about what float tells apart */
+static const float RESOLUTION = 1e-7f;      /* of a station: about the resolution of float */
 
 enum { MOST_STEPS = 75 }; /* 25 bisections: the whole blade down to float's resolution */
 
@@ -74,7 +74,7 @@ static float newton_step(const sc_model *model, sc_turn turn, const sc_edge_poin
 
 /* The excess changes sign between low, where *point stands, and high. Newton steps that stay inside
  * the shrinking bracket, every third step a bisection, so that it shrinks whatever the shape. Done
- * when the next step would be too short for float to tell the places apart; such a step back from
+ * when the next step would be below the resolution of float; such a step back from
  * the far side is lengthened to as much, to bracket the root. */
 static void close_bracket(const sc_model *model, sc_turn turn, float target, float high,
                           float excess, sc_edge_point *point)

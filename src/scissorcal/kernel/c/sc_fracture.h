@@ -1,4 +1,4 @@
-/* How far the crack runs: m g(delta) tan(psi) against what the material takes per metre. */
+/* How far the crack runs: m g(delta) tan(psi) against the fracture energy per metre. */
 #ifndef SC_FRACTURE_H
 #define SC_FRACTURE_H
 

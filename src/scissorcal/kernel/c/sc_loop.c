@@ -17,10 +17,10 @@ enum {
     FAREWELLS = 3,
     TICKS_OF_A_STALL = 5,
     FRAMES_UNTIL_ASKED_AGAIN = 50,
-    EMPTY_READS_OF_AN_END = 10 /* some ports give one now and then while all is well */
+    EMPTY_READS_OF_AN_END = 10 /* some ports give one now and then without an error */
 };
 
-/* What the loop knows besides the block; lives on its stack. */
+/* State of the loop besides the block, on its stack. */
 typedef struct {
     int fd;
     sc_block *block;
@@ -57,8 +57,8 @@ static void fail(loop *self, uint32_t reason, int error)
     sc_servo_stop(&self->block->servo, reason);
 }
 
-/* Write what is pending, waiting a little where the line is full. A frame is never cut short: what
- * remains goes out before anything else. Returns 1 once all is written. */
+/* Write what is pending, waiting briefly where the line is full. Frames stay whole: what remains is
+ * sent before anything else. Returns 1 once all is written. */
 static int flush_pending(loop *self)
 {
     while (self->pending > 0) {
@@ -114,7 +114,7 @@ static void say_farewell(loop *self)
     }
 }
 
-/* Pass a CONFIG on, again now and then until its echo comes back. */
+/* Send a requested CONFIG, and repeat it until its echo arrives. */
 static void serve_mailbox(loop *self)
 {
     const sc_mailbox *mailbox = &self->block->mailbox;
@@ -124,18 +124,18 @@ static void serve_mailbox(loop *self)
         return;
     }
     uint8_t payload[SC_SIZE_CONFIG];
-    const sc_config config = {0, (uint16_t)mailbox->key, wanted, mailbox->value};
+    const sc_config config = {(uint16_t)mailbox->key, wanted, mailbox->value};
     self->asked = wanted;
     self->asked_frames = 0;
-    (void)send_payload(self, payload, sc_pack_config(&config, SC_TYPE_CONFIG, payload));
+    (void)send_payload(self, payload, sc_pack_config(&config, payload));
 }
 
 static void take_other(loop *self, const uint8_t *payload, size_t size)
 {
     sc_mailbox *mailbox = &self->block->mailbox;
-    sc_config echo;
+    sc_config_echo echo;
     self->block->other_frames++;
-    if (sc_unpack_config(payload, size, SC_TYPE_CONFIG_ECHO, &echo) &&
+    if (sc_unpack_config_echo(payload, size, &echo) &&
         echo.nonce == __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE) &&
         echo.nonce != mailbox->answered && echo.key == mailbox->key) {
         mailbox->status = echo.status;
@@ -179,7 +179,7 @@ static void take_state(loop *self, const sc_state *state)
 }
 
 /* Answers closer together than a tick, as while frames of a stall are worked off, count as one. A
- * line that takes nothing counts too, or a fault behind it would stand for ever. */
+ * line that accepts nothing counts too, or a fault behind it would never end the loop. */
 static void count_answer(loop *self, int64_t now_ns)
 {
     if (now_ns - self->counted_ns >= (int64_t)self->block->config.tick_us * 1000) {
@@ -226,7 +226,7 @@ static void take_bytes(loop *self, const uint8_t *bytes, size_t size)
     }
 }
 
-/* Read once; what the line says about its own end becomes a stop. */
+/* Read once; the end of the line becomes a stop. */
 static void read_line(loop *self, short events)
 {
     uint8_t bytes[READ_BYTES];
@@ -250,7 +250,7 @@ static void read_line(loop *self, short events)
     }
 }
 
-/* Time in which this computer stood still is its own silence, not the device's. */
+/* Time in which this computer stalled does not count as silence of the device. */
 static void count_silence(loop *self, int64_t passed_ns)
 {
     self->silent_ns += passed_ns < LONGEST_LISTENED_NS ? passed_ns : LONGEST_LISTENED_NS;
@@ -296,7 +296,7 @@ uint32_t sc_loop_run(int fd, sc_block *block)
     block->started_ns = self.epoch_ns + self.last_state_ns;
     __atomic_store_n(&block->running, 1u, __ATOMIC_RELEASE);
     const int line_flags = fcntl(fd, F_GETFL);
-    (void)fcntl(fd, F_SETFL, line_flags | O_NONBLOCK); /* a full line must not hold the loop */
+    (void)fcntl(fd, F_SETFL, line_flags | O_NONBLOCK); /* a full line must not block the loop */
     while (block->servo.stop_reason == SC_STOP_NONE) {
         wait_and_serve(&self);
     }

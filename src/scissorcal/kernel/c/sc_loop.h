@@ -5,8 +5,8 @@
 #include "sc_block.h"
 
 /* Run until a stop, a hangup, silence or an error; returns the reason, which block->exit_reason
- * keeps too. Paced by the device's frames: the loop sleeps in poll(), decodes what came, steps the
- * servo once per STATE, answers the newest, and records a sample for each. On the way out it sends
+ * keeps too. Paced by the device's frames: the loop sleeps in poll(), decodes what arrived, steps the
+ * servo once per STATE, answers the newest, and records a sample for each. At the end it sends
  * commands of zero without ENABLE. The descriptor stays open. Where it is a pipe or a
  * socket, have SIGPIPE ignored, as Python does. */
 uint32_t sc_loop_run(int fd, sc_block *block);

@@ -1,4 +1,4 @@
-/* The model's step: where the crack stands, what the blades feel there, and friction.
+/* The model's step: the crack's place, the torque and force there, and friction.
  *
  * Quantities: opening theta [rad], rate d(theta)/dt [rad/s], advance x_n [m], crack X [m],
  * contact x_c = X - x_n [m], indentation delta = y_top - phi(x_c, theta) [m], response g(delta) [N].
@@ -10,17 +10,17 @@
  * a crack releases per metre. Above J_c h (fracture_energy) the crack runs until kappa J_c h is left.
  * X never decreases; with fracture_energy = 0 nothing is cut and X never moves.
  *
- * At the edges of sense:
+ * Limiting cases:
  *   parallel edges, tan(psi) <= 1e-6   nothing is released; they press, the crack stays (NOT_CUTTING)
  *   contact at or behind the pivot     the formulas go on (the lever may change its sign); flagged
  *   contact at the tip or beyond       no force; what was stored is an arrest loss; the material is
- *                                      met again only from outside, so no energy comes from nothing
+ *                                      met again only from outside, so no energy is created
  *   deeper than the response's table   straight on with its last slope, up to 1e6 N
  *   beyond the edge's table            the edge goes on straight
  *   |rate| beyond the friction tables  the last value is held
  *   opening beyond half a turn, or an edge steeper than some 87 deg: refused (INVALID)
  *
- * No step returns anything that is not finite: what cannot be evaluated gives zero torque and
+ * All outputs of a step are finite: what cannot be evaluated gives zero torque and
  * force with SC_STEP_INVALID set.
  */
 #ifndef SC_MODEL_H
@@ -74,7 +74,7 @@ typedef struct {
     float friction_torque; /* the friction's share of torque */
     float stored_J;        /* m times the integral of g up to delta */
     float fracture_J;      /* kappa J_c h times the crack's advance in this step */
-    float arrest_J;        /* what this step's runs released beyond that */
+    float arrest_J;        /* what this step's crack runs released beyond that */
     uint32_t flags;
 } sc_step_output;
 
@@ -93,7 +93,7 @@ void sc_model_step_many(const sc_model *model, sc_crack *state, int64_t n, const
 void sc_model_torque_many(const sc_model *model, int64_t n, const float *opening, const float *rate,
                           const float *contact, float *torque);
 
-/* 1 if tables and numbers are all sound. */
+/* 1 if all tables and numbers are valid. */
 int sc_model_is_sound(const sc_model *model);
 
 #endif

@@ -17,7 +17,7 @@ typedef struct {
 /* Take a measurement and return the seconds since the last one, by the device's clock.
  *
  * Rates are backward differences behind a first-order low-pass at cutoff_Hz (0: none). A gap of
- * time is divided by its true length; after more than 0.1 s, or when the clock fell back (a device
+ * time is divided by its true length; after more than 0.1 s, or when the clock decreased (a device
  * that restarted), the rates start again from 0. A repeated time changes nothing and returns 0. */
 float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t tick_us, uint32_t device_us,
                        float opening, float advance);
@@ -29,7 +29,7 @@ typedef struct {
     float limit;
 } sc_pid_gains;
 
-/* Effort for an error and its rate. The integral stands still while the effort is at its limit and
+/* Effort for an error and its rate. The integral is held while the effort is at its limit and
  * the error would drive it further, and never exceeds the limit itself. */
 float sc_pid(const sc_pid_gains *gains, float *integral, float error, float error_rate, float dt);
 

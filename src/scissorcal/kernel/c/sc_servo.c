@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors read more */
+static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider */
 static const float LONGEST_TICK_S = 0.01f;       /* a gap does not widen the slew without bound */
 
 enum { SILENCE_UNTIL_STOP = 5, CLEARINGS_UNTIL_STOP = 100 };
@@ -37,7 +37,7 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->advance_error_limit > 0.0f && config->tick_us > 0;
 }
 
-/* Begin a mode afresh. What the model's material still stored goes with the mode that held it. */
+/* Begin a mode again. The energy stored in the model's material ends with its mode. */
 static void engage(sc_servo *servo, uint32_t mode)
 {
     servo->ledger.arrest_J += servo->ledger.stored_J;
@@ -51,7 +51,8 @@ static void engage(sc_servo *servo, uint32_t mode)
     servo->track_index = 0;
 }
 
-/* Follow the supervisor: a new order engages its mode; silence falls back to damping, then stops. */
+/* Follow the supervisor: a new order engages its mode; without a heartbeat the servo falls back to
+ * damping, then stops. */
 static void obey(const sc_servo_config *config, const sc_orders *orders, sc_servo *servo)
 {
     if (orders->stop) {
@@ -86,10 +87,10 @@ static void obey(const sc_servo_config *config, const sc_orders *orders, sc_serv
     }
 }
 
-/* A latched fault is cleared at the start and then a bounded number of times; else it stops us.
- * What counts against one that stands are the clearings that were sent, not the frames that report
- * it: after a stall of the host hundreds of those wait, all from before any clearing could leave.
- * Returns 1 while it stands. */
+/* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
+ * A fault that persists is counted by the clearings that were sent, not by the frames that report
+ * it: after a stall of the host hundreds of those are queued, from before any clearing was sent.
+ * Returns 1 while it persists. */
 static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
 {
     if (state->flags & SC_STATE_ENCODER_FAULT) {
@@ -174,7 +175,7 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
     return wanted;
 }
 
-/* Bring an effort to what may leave: finite, within the limit, and no faster than the slew. */
+/* Limit an effort: finite, within the limit, and no faster than the slew. */
 static float limited(float wanted, float last, float limit, float most_change, uint64_t *at_limit,
                      uint64_t *slewed)
 {
@@ -208,7 +209,7 @@ static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort 
     }
 }
 
-/* Work of the last command over the way that was made since, if the motors were on. */
+/* Work of the last command over the motion since, if the motors were on. */
 static void book_work(sc_servo *servo, const sc_motion *before, const sc_state *state)
 {
     if (!before->started || !(state->flags & SC_STATE_MOTOR_ENABLED)) {
@@ -285,7 +286,7 @@ static effort effort_of_mode(const sc_servo_config *config, const sc_model *mode
     return wanted;
 }
 
-/* Choose what the command says: released motors unless all is well. */
+/* Set the command: motors released unless there is no fault. */
 static void answer(const sc_servo_config *config, sc_servo *servo, int valid, int faulty,
                    effort wanted, float dt, sc_command *command)
 {

@@ -1,12 +1,12 @@
 /* The servo: one STATE in, one COMMAND out. Modes, limits, ramps, watchdog, energy ledger.
  *
- * IDLE    motors off (commands of zero without ENABLE keep the device's watchdog quiet)
+ * IDLE    motors off (commands of zero without ENABLE)
  * TRACK   opening and advance follow a reference by PID
  * RENDER  torque and force come from the model, ramped up from 0 when it engages
  * DAMP    torque = -damping * rate, no force
  *
- * Everything leaves through the same limits: never more than torque_limit and force_limit, never
- * faster than the slews. What is not finite never leaves: it becomes 0.
+ * All commands pass the same limits: at most torque_limit and force_limit, and no faster than the
+ * slews. A command that is not finite becomes 0.
  */
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
@@ -31,14 +31,14 @@ enum {
     SC_STOP_BAD_BLOCK = 9
 };
 
-/* What a sample's flags say above the 16 bits that come from the device. */
+/* A sample's flags above the 16 bits of the device. */
 enum {
     SC_SAMPLE_TORQUE_LIMITED = 0x10000,
     SC_SAMPLE_FORCE_LIMITED = 0x20000,
     SC_SAMPLE_FALLBACK = 0x40000,
     SC_SAMPLE_INVALID = 0x80000,
     SC_SAMPLE_AFTER_GAP = 0x100000,
-    SC_SAMPLE_STEP_SHIFT = 24 /* a rendered step's own flags stand from this bit on */
+    SC_SAMPLE_STEP_SHIFT = 24 /* a rendered step's flags from this bit on */
 };
 
 typedef struct {
@@ -53,9 +53,9 @@ typedef struct {
     float advance_kp, advance_kd, advance_ki;
     float opening_error_limit; /* TRACK stops beyond this error [rad] ... */
     float advance_error_limit; /* ... or this [m] */
-    uint32_t supervisor_ticks; /* silent frames until only damping is left, five times as many
+    uint32_t supervisor_ticks; /* frames without heartbeat until damping only; five times as many
                                   until the stop; 0: no supervision */
-    uint32_t fault_clearings;  /* latched faults of the device that are cleared, not obeyed */
+    uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
 } sc_servo_config;
 
@@ -67,8 +67,8 @@ typedef struct {
     uint32_t size;
 } sc_reference;
 
-/* What the supervisor wants. `order` and `sheet` count up: a new number makes the mode engage
- * afresh, or puts the crack at `crack`. `heartbeat` just has to change now and then. */
+/* The supervisor's orders. `order` and `sheet` count up: a new number engages the mode again, or
+ * puts the crack at `crack`. `heartbeat` has to change within supervisor_ticks. */
 typedef struct {
     uint32_t mode;
     uint32_t order;
@@ -95,8 +95,8 @@ typedef struct {
 } sc_sample;
 
 /* Joules since the start. delivered: work of the commanded torque and force on the mechanism. The
- * model's own books: what the material stores now, what cutting took, what arrests lost, what
- * rendered friction took. A passive rendering has delivered + stored + fracture + arrest + friction
+ * model's energies: stored in the material now, taken by cutting, lost by arrests, taken by
+ * rendered friction. A passive rendering has delivered + stored + fracture + arrest + friction
  * <= 0, up to what sampling adds. */
 typedef struct {
     double delivered_J;
@@ -145,19 +145,20 @@ typedef struct {
     uint64_t faults;
 } sc_servo;
 
-/* Answer a state. Returns 1, and servo->sample tells of this frame; or 0 for a frame that repeats the
+/* Answer a state. Returns 1, and servo->sample is of this frame; or 0 for a frame that repeats the
  * last sequence, which gets the last command again and changes nothing else.
  *
  * model and reference may be null: RENDER and TRACK then give no torque. A state whose opening or
- * advance is no usable number gets zero torque. A device whose clock fell back has restarted: its
+ * advance is not usable gets zero torque. A device whose clock decreases has restarted: its
  * rates start again from 0. */
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command);
 
-/* Say that the last command was put on the line. A caller that takes several states at once and sends
+/* State that the last command was sent. A caller that takes several states at once and sends
  * the newest command alone calls this once for them, and at most once a tick: the device must have
- * had time to act before a fault counts as one that does not clear. Without these calls none does. */
+ * had time to act before a fault counts as one that does not clear. Without these
+ * calls no fault does. */
 void sc_servo_answered(sc_servo *servo);
 
 /* Latch the stop; the first reason stands. */

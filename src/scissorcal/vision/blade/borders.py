@@ -1,4 +1,4 @@
-"""The borders of a blade in the picture's own pixels: its edge, its back, the pivot's hole."""
+"""The borders of a blade in the picture: its edge, its back, the pivot's hole."""
 
 from dataclasses import dataclass
 
@@ -54,7 +54,7 @@ def find_border(
     frame = parts.frame(side)
     there = (frame[:, 0] > first * parts.length) & (frame[:, 0] < last * parts.length)
     if there.sum() < 20:
-        raise InputError(f"{source}: too little of the blade's {what} can be seen.")
+        raise InputError(f"{source}: too little of the blade's {what} is visible.")
     s, e = _thinned(frame[there])
     rough = _in_pixels(view, parts, s, e)
     count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
@@ -142,19 +142,18 @@ def find_hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | Non
 
 
 def fit_circle(points: Array) -> tuple[Array, float]:
-    """Least-squares circle: algebraic start, then Gauss-Newton on the distances."""
+    """Centre (2,) and radius of the circle with the least squared distances from points (n, 2)."""
+    from scipy.optimize import least_squares
+
     middle = points.mean(axis=0)
     away = points - middle
-    design = np.column_stack([2.0 * away, np.ones(len(away))])
-    a, b, c = np.linalg.lstsq(design, np.sum(away**2, axis=1), rcond=None)[0]
-    centre, radius = np.array([a, b]), float(np.sqrt(max(c + a * a + b * b, 0.0)))
-    for _ in range(10):
-        out = away - centre
-        distance = np.linalg.norm(out, axis=1)
-        J = np.column_stack([-out / distance[:, None], -np.ones(len(out))])
-        step = np.linalg.lstsq(J, -(distance - radius), rcond=None)[0]
-        centre, radius = centre + step[:2], radius + float(step[2])
-    return middle + centre, radius
+    size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+
+    def distances(circle: Array) -> Array:
+        return np.asarray(np.linalg.norm(away / size - circle[:2], axis=1) - circle[2])
+
+    x, y, radius = least_squares(distances, [0.0, 0.0, 1.0], method="lm").x
+    return middle + size * np.array([x, y]), size * float(radius)
 
 
 def _thinned(frame: Array) -> tuple[Array, Array]:

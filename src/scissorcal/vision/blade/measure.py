@@ -1,4 +1,4 @@
-"""A blade in one photograph: its edge to a fraction of a pixel, and what makes it uncertain."""
+"""A blade in one photograph: its edge with subpixel accuracy, and its error sources."""
 
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 _ANCHORS, _STRETCHES = 14, 30
 _WAVY = 0.008
-"""How far, in shares of its length, a side may leave a parabola and still be the side."""
+"""Largest distance of a side's points from a parabola, as a share of the blade's length."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class BladeMeasurement:
     """One blade of one photograph.
 
     ``station``, ``offset`` and ``sd`` (n,) are points of the edge in the blade's frame (sheet
-    units: metres, or pixels without a scale), each with the noise of its own; ``modes`` (n, k) are
-    what moves them together, each column by one standard deviation: the mapping, the print's
-    scale, the pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
+    units: metres, or pixels without a scale), each with independent noise; ``modes`` (n, k) are
+    their common errors, one standard deviation per column: the mapping, the print's scale, the
+    pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
     say which. ``softness`` (n,) is the blur of each point against the usual one. ``pivot_px`` and
     ``axis_px`` are for pictures.
     """
@@ -57,10 +57,10 @@ class BladeMeasurement:
 def measure_blade(
     light: Light, view: View, parts: BladeParts, source: str, *, search: float = 0.035
 ) -> BladeMeasurement:
-    """Measure a blade whose parts are roughly known, in the photograph's own pixels.
+    """Measure a blade whose parts are roughly known, in the photograph's pixels.
 
-    Nothing is resampled: borders are crossed in the picture and their places taken to the sheet.
-    What each source of error does to the edge is one linear response (see `blade_modes`).
+    Nothing is resampled: borders are found in the picture and mapped to the sheet. Each error
+    source has a linear response (see `edge_modes`).
     ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
@@ -128,11 +128,10 @@ def _halved(
 
 
 def _smooth(station: Array, offset: Array, along: Array) -> Array:
-    """A side of the blade at places along it, whatever nicks and glare take out of it.
+    """A side of the blade at places along it, robust against nicks and glare.
 
-    Of all parabolas through three of the side's stretches the one that most stretches lie nearest
-    to tells what belongs to it; medians of that are the side, and the parabola where there are
-    none.
+    Of all parabolas through three of the side's stretches, the one closest to most stretches
+    selects the inliers. The result is their medians, and the parabola where there are none.
     """
     here = (station > along[0]) & (station < along[-1])
     s, e = station[here], offset[here]

@@ -1,4 +1,4 @@
-"""What moves all points of a measured edge together: one linear response to every source."""
+"""Common errors of all points of a measured edge: the linear response to each error source."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from scissorcal.vision.blade.view import View
 Array = NDArray[np.float64]
 
 TONE_SHARE = 0.12
-"""By how much of its blur a border may seem shifted, since a camera's curve is not quite sRGB's."""
+"""Shift of a border as a share of its blur, since a camera's tone curve differs from sRGB."""
 
 GRAIN_SHARE = 0.5
-"""Which part of a crossing's noise neighbours share: brushed metal's streaks run along the edge."""
+"""Share of a crossing's noise in common with its neighbours, by streaks of brushed metal."""
 
 SHARP = 1.4
-"""Blur against the usual one below which a point may say where the centreline lies."""
+"""Largest blur, relative to the median, of points that determine the centreline."""
 
 _STRETCHES, _NEIGHBOURS = 40, 5
 
@@ -56,7 +56,7 @@ def halving_stations(length: float) -> Array:
 def edge_modes(
     view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts
 ) -> tuple[Array, tuple[str, ...]]:
-    """What one standard deviation of each shared source of error does to the edge.
+    """Effect on the edge of one standard deviation of each common error source.
 
     Columns (n, k) are changes of the offset at a fixed station, at the edge's points in the order
     of ``seen.edge``; names say which source each belongs to. They come from one linear response:
@@ -174,7 +174,7 @@ class _Outward:
 
 
 def _circle_follows(hole: Array, moves: Array, frame: BladeFrame) -> Array:
-    """How a least-squares circle's middle (2,) follows moves (n, 2) of its points."""
+    """Shift (2,) of a least-squares circle's centre by moves (n, 2) of its points."""
     radial = (hole - frame.pivot) / np.linalg.norm(hole - frame.pivot, axis=1, keepdims=True)
     design = np.column_stack([radial, np.ones(len(radial))])
     away = np.sum(radial * moves, axis=1)
@@ -200,7 +200,7 @@ def _mapping_moves(
 def _mapping_errors(view: View) -> list[tuple[str, Array]]:
     """Values of the mapping moved by one standard deviation of each of its independent errors.
 
-    Those shared by all photographs come first, and take with them what follows from them.
+    Those shared by all photographs come first, with what is correlated with them.
     """
     count = len(view.values)
     order = np.r_[count - view.shared : count, 0 : count - view.shared]
@@ -229,7 +229,7 @@ def _pivot_shifts(
     away = outward.hole_place - frame.pivot
     radial = away / np.linalg.norm(away, axis=1, keepdims=True)
     off = np.linalg.norm(away, axis=1) - frame.radius
-    # neighbours along a small circle share their pixels: about one in four says something new
+    # neighbours along a small circle share pixels: about one in four is independent
     spread = float(np.sqrt(np.mean(off**2)))
     information = radial.T @ radial / 4.0
     pixel = float(np.median(np.linalg.norm(outward.hole, axis=1)))
@@ -239,7 +239,7 @@ def _pivot_shifts(
 
 
 def _turn_sd(s: Array, e: Array) -> float:
-    """How well the middle between edge and back fixes the axis, in radians.
+    """Standard deviation (rad) of the axis by the middle between edge and back.
 
     ``s`` and ``e`` (n,) are the back's stations and offsets.
     """
@@ -252,10 +252,10 @@ def _turn_sd(s: Array, e: Array) -> float:
 
 
 def smooth_slope(station: Array, offset: Array) -> Array:
-    """Slope (n,) of a side of the blade without its points' noise, its nicks and its glare.
+    """Slope (n,) of a side of the blade, robust against noise, nicks and glare.
 
-    Medians over short stretches, of which the median of five neighbours is taken: what is shorter
-    than two stretches leaves no trace, what is longer than ten is followed.
+    Medians over short stretches, median-filtered over five neighbours: features shorter than two
+    stretches are removed, those longer than ten are kept.
     """
     from scipy.ndimage import gaussian_filter1d, median_filter
 

@@ -1,4 +1,4 @@
-"""Which part of an outline is edge, back, tip and pivot of a blade that lies alone."""
+"""Edge, back, tip and pivot in the outline of a single blade."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -56,10 +56,10 @@ def lone_blade(
     pivot: Array | None = None,
     pivot_sd: float = 0.0,
 ) -> BladeParts:
-    """Take a silhouette apart that is expected to be one blade.
+    """Find the parts of a silhouette that should be one blade.
 
     The pivot is the round hole (of several, the one nearest to the mat's pivot mark) unless it is
-    given, and the tip the end farther from it. Which side is the edge cannot be seen in an outline:
+    given, and the tip the end farther from it. An outline does not show which side is the edge:
     it is the side that faces the mat's lower rim (``edge_side`` "down") or the upper one.
     """
     _refuse_others(shape, source)
@@ -119,7 +119,7 @@ def _sides(outer: Array, pivot: Array, axis: Array, up: Array, source: str) -> t
         lower.append(here[e[here] <= e[here].min() + 0.25 * np.ptp(e[here])])
         upper.append(here[e[here] >= e[here].max() - 0.25 * np.ptp(e[here])])
     if len(lower) < 60:
-        raise InputError(f"{source}: the outline is too broken up to be a blade.")
+        raise InputError(f"{source}: the outline is too fragmented to be a blade.")
     below, above = np.concatenate(lower), np.concatenate(upper)
     return outer[below[np.argsort(s[below])]], outer[above[np.argsort(s[above])]]
 
@@ -127,8 +127,8 @@ def _sides(outer: Array, pivot: Array, axis: Array, up: Array, source: str) -> t
 def _pivot_hole(shape: Silhouette, source: str) -> Array:
     """The round opening nearest to the mat's pivot mark.
 
-    In a shadow or beside a glare no one level of light tells an opening from metal, so several
-    are tried between that of the metal and that of the sheet.
+    In a shadow or beside glare no single threshold separates an opening from metal, so several
+    between metal and sheet are tried.
     """
     unit = 1e-3
     best: list[tuple[float, Array]] = []
@@ -144,8 +144,8 @@ def _pivot_hole(shape: Silhouette, source: str) -> Array:
             best.append((away + 0.05 * uneven, hole))
     if not best:
         raise InputError(
-            f"{source}: no round pivot hole of {_HOLE_MM[0]:g} to {_HOLE_MM[1]:g} mm radius can be "
-            "seen through the blade. Let the sheet show through it, or give the pivot's place with "
+            f"{source}: no round pivot hole of {_HOLE_MM[0]:g} to {_HOLE_MM[1]:g} mm radius is "
+            "visible in the blade. Let the sheet show through it, or give the pivot's place with "
             "--pivot."
         )
     return min(best, key=lambda pair: pair[0])[1]
@@ -156,23 +156,24 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
 
     if shape.others:
         raise InputError(
-            f"{source}: {1 + len(shape.others)} things of a blade's size lie on the mat, and one "
-            "blade was expected: lay one blade down, or photograph open scissors with --both."
+            f"{source}: {1 + len(shape.others)} objects of a blade's size are on the mat; one "
+            "blade is expected. Leave one blade, or photograph open scissors with --both."
         )
     outline = shape.outer.astype(np.float32)[:, None, :]
     hull = float(cv2.contourArea(cv2.convexHull(outline)))
     solid = float(cv2.contourArea(outline)) / max(hull, 1e-30)
     if solid < _SOLID:
         raise InputError(
-            f"{source}: the outline fills {100 * solid:.0f} % of its hull, where a single blade "
-            "fills nearly all. Two blades? Lay one down, or give --both for open scissors."
+            f"{source}: the outline fills {100 * solid:.0f} % of its convex hull; a single blade "
+            f"fills at least {100 * _SOLID:.0f} %. Leave one blade, or give --both for open "
+            "scissors."
         )
 
 
 def _refuse_cut_off(shape: Silhouette, pivot: Array, axis: Array, source: str) -> None:
-    """A body that runs out behind the pivot is no harm; a blade that does is."""
+    """Refuse a blade that is cut off ahead of the pivot; behind it nothing is measured."""
     if len(shape.cut_off) and np.any((shape.cut_off - pivot) @ axis > 0.0):
         raise InputError(
-            f"{source}: the blade runs out of the mat's field or of the picture: all of it from "
-            "the pivot to the tip must lie inside the markers."
+            f"{source}: the blade extends beyond the mat's field or the picture: place it inside "
+            "the markers from pivot to tip."
         )

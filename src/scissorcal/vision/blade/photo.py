@@ -1,5 +1,6 @@
 """One photograph of a blade, from the file to its measured edge."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +18,14 @@ from scissorcal.vision.targets.marker_corners import linear_light
 Array = NDArray[np.float64]
 
 _SEARCH = 0.1
-"""How far, in blade lengths, shadows may lead the outline of scissors away from the metal."""
+"""Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
 
 _SCALE_SD = 0.005
 
 
 @dataclass(frozen=True)
 class BladePhoto:
-    """What one photograph shows: how the sheet is seen, the outline, and the edges of its blades.
+    """The result of one photograph: the mapping to the sheet, the outline, the blades' edges.
 
     ``scissors`` is None where a blade lies alone. ``measured`` has one row for a blade alone, two
     for open scissors (the one whose tip is farther from the handles first), none for closed ones.
@@ -35,6 +36,44 @@ class BladePhoto:
     outline: Silhouette
     measured: tuple[BladeMeasurement, ...]
     scissors: Scissors | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the measured blades: "blade" alone, else "left" and "right".
+
+        Left and right are as seen from the handles, the same in every photograph as long as the
+        scissors are not turned over.
+        """
+        if len(self.measured) != 2:
+            return ("blade",) * len(self.measured)
+        first, second = (measured.parts.axis for measured in self.measured)
+        # y runs down on the sheet, so that a positive turn is clockwise: to the right
+        turn = float(first[0] * second[1] - first[1] * second[0])
+        return ("left", "right") if turn > 0 else ("right", "left")
+
+    def sentence(self) -> str:
+        """What was measured, in one line."""
+        name = self.photo.source
+        if self.scissors is not None and not self.measured:
+            return f"{name}: closed scissors; their edges hide each other"
+        parts = []
+        for one in self.measured:
+            length = f"{1e3 * one.length:.2f} mm" if one.metric else f"{one.length:.0f} px"
+            blur = one.edge.blur_px
+            parts.append(f"{length} long, {len(one.station)} points, borders {blur:.1f} px soft")
+        text = f"{name}: " + "; ".join(parts)
+        if self.scissors is not None:
+            text += f"; open by {np.degrees(self.scissors.opening):.1f} deg"
+        return text
+
+
+def by_blade(photos: Sequence[BladePhoto]) -> dict[str, list[BladeMeasurement]]:
+    """Measurements of all photographs by blade's name, in alphabetical order."""
+    found: dict[str, list[BladeMeasurement]] = {}
+    for photo in photos:
+        for name, measured in zip(photo.names, photo.measured, strict=True):
+            found.setdefault(name, []).append(measured)
+    return dict(sorted(found.items()))
 
 
 def photograph_blade(
@@ -69,8 +108,8 @@ def photograph_scissors(
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
-    Without the mat shapes come out up to their size; ``scale`` (metres per pixel of the whole
-    photograph) gives it, and the camera should look straight down, since its tilt stays in. Raises
+    Without the mat shapes have no scale; ``scale`` (metres per pixel of the whole photograph) gives
+    it. The camera should look straight down, since its tilt is not corrected. Raises
     InputError where the photograph shows no scissors, or cannot be used.
     """
     light = linear_light(photo.grey)

@@ -1,4 +1,4 @@
-"""Where a sharp border crosses a line of pixels, to a fraction of a pixel."""
+"""Subpixel places at which a border crosses lines of pixels."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class Crossings:
 
     ``place`` is where, with ``sd``; ``blur`` is the standard deviation of the blur there, ``inner``
     and ``outer`` the light on either side, ``misfit`` the rms residual as a share of the
-    contrast. ``good`` tells whether there is one clear border.
+    contrast. ``good`` says whether there is one clear border.
     """
 
     place: Array
@@ -57,9 +57,9 @@ def steepest(
 
     Light is smoothed by ``soft`` pixels first. The line is the best one of all that lie within
     ``reach`` and shift by no more than a pixel from one point to the next (Viterbi's algorithm):
-    glare and dirt may interrupt a border, but do not carry it away. A thing's shadow lies outside
-    it, and may have the stronger border: with ``innermost``, of lines that are steep enough (a
-    share of the steepest, by the logarithm of light) the one further in is taken.
+    glare and dirt may interrupt a border without shifting it. A shadow lies outside the object and
+    may have the stronger border: with ``innermost``, the innermost of the lines that are steep
+    enough (a share of the steepest, in the logarithm of light) is taken.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -81,7 +81,7 @@ def _best_path(gain: Array) -> NDArray[np.int64]:
     rows, columns = gain.shape
     came = np.zeros((rows, columns), dtype=np.int64)
     index = np.arange(columns)
-    # one place more on either side, from which no path comes
+    # one column more on either side, from which no path starts
     total = np.full(columns + 2, -np.inf)
     total[1:-1] = gain[0]
     choices = np.empty((3, columns))
@@ -103,8 +103,8 @@ def crossings(light: Light, points: Array, normals: Array, reach: float) -> Cros
     """Fit a blurred step across each point's normal.
 
     The model is (a + b v) (1 - F(v / blur)) + (c + d v) F(v / blur), v the distance from the border
-    and F the normal distribution: either side may get lighter away from it, as under a shadow.
-    Every symmetric blur leaves the place alone. Neighbouring samples are half a pixel apart and so
+    and F the normal distribution: either side may have a gradient, as under a shadow.
+    A symmetric blur does not shift the place. Neighbouring samples are half a pixel apart and so
     count half.
     """
     profile = sampled(light, points, normals, reach, STEP_PX)

@@ -1,4 +1,4 @@
-"""Whole scissors in one outline: handles, blades, pivot and opening angle."""
+"""Handles, blades, pivot and opening angle in the outline of scissors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from scissorcal.vision.blade.silhouette import Silhouette
 Array = NDArray[np.float64]
 
 LEAST_OPENING = 0.12
-"""Blades open by less than this (rad) hide each other's edges."""
+"""Below this opening (rad) the blades hide each other's edges."""
 
 _RING_SHARE = 0.04
 _NOTCH_SHARE = 0.08
@@ -31,8 +31,8 @@ class Scissors:
 
     ``blades`` are two where they are open, and none where they are closed, as then each hides the
     other's edge. ``opening`` (rad) is the angle between their centrelines, 0 where closed.
-    ``pivot`` (2,) is known to ``pivot_sd``; ``screw`` tells whether it is a screw's middle or only
-    where the centrelines cross. ``tips`` (k, 2) and ``rings`` are the rest of what was found.
+    ``pivot`` (2,) is known to ``pivot_sd``; ``screw`` says whether it is a screw's centre or
+    the intersection of the centrelines. ``tips`` (k, 2) and ``rings`` were found too.
     """
 
     pivot: Array
@@ -46,17 +46,17 @@ class Scissors:
 
 
 def find_scissors(shape: Silhouette, source: str) -> Scissors:
-    """Take an outline apart that is expected to be a pair of scissors.
+    """Find the parts of an outline that should be a pair of scissors.
 
-    Handles are told by their rings, or by running out of the mat's field; the tips are the ends
+    Handles have rings, or extend beyond the mat's field; the tips are the ends
     away from them. Raises InputError where there are no handles (forks have none) or no blades.
     """
     outline = shape.outer
     rings = _rings(shape)
     if not rings and not len(shape.cut_off):
         raise InputError(
-            f"{source}: what lies there has no handle with a ring and so is no pair of scissors"
-            f"{_prongs(outline)}. Photograph scissors whole, or one blade on the mat."
+            f"{source}: the object has no handle with a ring and so is not a pair of scissors"
+            f"{_prongs(outline)}. Photograph whole scissors, or one blade on the mat."
         )
     handles = (
         np.mean([ring.mean(axis=0) for ring in rings], axis=0)
@@ -67,9 +67,7 @@ def find_scissors(shape: Silhouette, source: str) -> Scissors:
     first = int(np.argmax(away))
     reach = float(away[first])
     if len(shape.cut_off) and rings:
-        raise InputError(
-            f"{source}: the scissors are cut off by the border: bring all of them into the picture."
-        )
+        raise InputError(f"{source}: the border cuts off the scissors: show all of them.")
     crotch = _crotch(shape, first, rings, reach)
     if crotch is None:
         return _closed(shape, outline[first], handles, rings)
@@ -90,7 +88,7 @@ def _rings(shape: Silhouette) -> tuple[Array, ...]:
 
 
 def _prongs(outline: Array) -> str:
-    """What else it may be: count the ends between deep notches."""
+    """Count of the prongs between deep notches, as of a fork."""
     deep = [depth for _, _, _, depth in _notches(outline)]
     size = float(np.ptp(outline, axis=0).max())
     count = sum(depth > 0.04 * size for depth in deep)
@@ -98,7 +96,7 @@ def _prongs(outline: Array) -> str:
 
 
 def _notches(outline: Array) -> list[tuple[int, int, int, float]]:
-    """Start, end, deepest point (indices) and depth of what an outline lacks of its hull."""
+    """Start, end, deepest point (indices) and depth of an outline's convexity defects."""
     import cv2
 
     scale = 1e4 / float(np.ptp(outline, axis=0).max())
@@ -182,14 +180,14 @@ def _open(
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
         raise InputError(
-            f"{source}: the blades are open by {np.degrees(opening):.0f} degrees, and too little "
-            "of their edges can be seen: open them wider."
+            f"{source}: the blades are open by {np.degrees(opening):.0f} deg, and too little of "
+            "their edges is visible: open them wider."
         )
     return Scissors(pivot, sd, screw, tuple(blades), opening, outline[list(tips)], rings, length)
 
 
 def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, ...]) -> Scissors:
-    """Closed scissors: the pivot is a screw between handles and tip, or nothing is known of it."""
+    """Closed scissors: the pivot is a screw between handles and tip, or is unknown."""
     outline = shape.outer
     axis = tip - handles
     reach = float(np.linalg.norm(axis))
@@ -222,11 +220,10 @@ def _pivot(shape: Silhouette, guess: Array, length: float) -> tuple[Array, float
 def _best_screw(
     shape: Silhouette, near: Array, length: float, within: float
 ) -> tuple[Array, float] | None:
-    """The clearest circle near any of some places: its middle and radius.
+    """The clearest circle near any of several places: its centre and radius.
 
-    A circle is clear where light changes straight across it, in whichever sense, along most of its
-    length; a larger one counts more than a glint on it, and one with a slot or a dome within more
-    than an even patch.
+    A circle is clear where the light changes across most of its length, in either sense. Larger
+    circles score higher than a glint, and those with structure inside higher than even patches.
     """
     import cv2
 
@@ -283,7 +280,7 @@ def _sides_of(outline: Array, tip: int, notch: int, handles: Array) -> tuple[Arr
 def _middle_line(
     edge: Array, back: Array, crotch: Array, tip: Array, length: float
 ) -> tuple[Array, Array]:
-    """A point and direction of the line that halves the part of a blade beyond the crotch."""
+    """Point and direction of the centreline of the part of a blade beyond the crotch."""
     axis = (tip - crotch) / length
     across = np.array([-axis[1], axis[0]])
     along = np.linspace(0.1, 0.75, 60) * length

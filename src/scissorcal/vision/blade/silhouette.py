@@ -1,4 +1,4 @@
-"""What lies on the sheet: a flat picture of it, and the outline of the dark thing in it."""
+"""The silhouette of a dark object on a bright sheet."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +24,7 @@ _LEVELS = (0.8, 0.65, 0.5, 0.35, 0.2)
 
 @dataclass(frozen=True)
 class Silhouette:
-    """The outline of what lies on the sheet, in sheet units; y points down.
+    """The outline of the object on the sheet, in sheet units; y points down.
 
     ``outer`` (n, 2) runs around it, ``holes`` are the openings in it. ``pixel`` is the size of the
     flat picture's pixels, whose ``mask`` and relative light ``relative`` (1 is bare sheet) are
@@ -40,11 +40,6 @@ class Silhouette:
     origin: tuple[float, float]
     mask: Mask
     relative: Light
-
-    @property
-    def area(self) -> float:
-        """Area of the outline without its holes, in square sheet units."""
-        return _area(self.outer) - sum(_area(hole) for hole in self.holes)
 
     def openings(self) -> list[Array]:
         """Outlines (n, 2) of bright patches within the outline, at several levels of light.
@@ -74,11 +69,11 @@ class Silhouette:
 
 
 def silhouette(light: Light, view: View, source: str, *, longest: int = LONGEST) -> Silhouette:
-    """Find the one thing that lies on a bright, even sheet.
+    """Find the object on a bright, even sheet.
 
-    The sheet's own light is a smooth surface fitted to what is left when the dark is taken out;
-    what is darker than a threshold between both, with its bright patches filled, is the thing.
-    Raises InputError where nothing stands out.
+    The sheet's light is a smooth surface, fitted robustly without dark pixels; the object is what
+    lies below a threshold between both, with its bright patches filled. Raises InputError where
+    nothing is dark enough.
     """
     left, top, right, bottom = view.bounds
     pixel = max(right - left, bottom - top) / longest
@@ -90,15 +85,16 @@ def silhouette(light: Light, view: View, source: str, *, longest: int = LONGEST)
 
 def _flat(light: Light, view: View, pixel: float) -> Light:
     import cv2
+    from scipy.ndimage import zoom
 
     left, top, right, bottom = view.bounds
     columns, rows = int((right - left) / pixel), int((bottom - top) / pixel)
-    # the lens bends slowly: every eighth place is projected, those between lie between
+    # distortion varies slowly: every eighth pixel is projected, those between are interpolated
     coarse = (columns // 8 + 2, rows // 8 + 2)
     x, y = np.meshgrid(np.linspace(0, columns - 1, coarse[0]), np.linspace(0, rows - 1, coarse[1]))
     points = np.column_stack([x.ravel() * pixel + left, y.ravel() * pixel + top])
     there = view.to_pixels(points).reshape(coarse[1], coarse[0], 2)
-    seen = _between(_between(there, columns, axis=1), rows, axis=0)
+    seen = zoom(there, (rows / coarse[1], columns / coarse[0], 1.0), order=1)
     spacing = float(np.nanmedian(np.abs(np.diff(seen[..., 0], axis=1)))) + float(
         np.nanmedian(np.abs(np.diff(seen[..., 1], axis=1)))
     )
@@ -109,15 +105,6 @@ def _flat(light: Light, view: View, pixel: float) -> Light:
         cv2.remap(light, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
         dtype=np.float32,
     )
-
-
-def _between(values: Array, count: int, axis: int) -> Array:
-    """Values at ``count`` even places along an axis, linearly between those that are there."""
-    place = np.linspace(0.0, values.shape[axis] - 1.0, count)
-    low = np.minimum(place.astype(np.int64), values.shape[axis] - 2)
-    share = (place - low).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
-    first, second = np.take(values, low, axis), np.take(values, low + 1, axis)
-    return np.asarray(first + share * (second - first))
 
 
 def _sheet_light(flat: Light) -> Light:
@@ -161,8 +148,8 @@ def _dark(relative: Light, source: str) -> Mask:
     dark = smooth[mask > 0]
     if dark.size < _LEAST_SHARE * mask.size or float(np.median(dark)) > 1.0 - _LEAST_CONTRAST:
         raise InputError(
-            f"{source}: nothing dark enough lies on the sheet: lay the blade flat on it, in even "
-            "light without a mirror's glare."
+            f"{source}: nothing dark enough is on the sheet: lay the blade flat on it, in even "
+            "light without glare."
         )
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, kernel), dtype=np.uint8)
@@ -175,12 +162,12 @@ def _outlined(
 
     found, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     if not found:
-        raise InputError(f"{source}: nothing lies on the sheet.")
+        raise InputError(f"{source}: nothing is on the sheet.")
     areas = [cv2.contourArea(c) if tree[0][i][3] < 0 else 0.0 for i, c in enumerate(found)]
     order = np.argsort(areas)[::-1]
     main = int(order[0])
     if areas[main] < _LEAST_SHARE * mask.size:
-        raise InputError(f"{source}: nothing of a blade's size lies on the sheet.")
+        raise InputError(f"{source}: nothing of a blade's size is on the sheet.")
 
     def place(contour: NDArray[Any]) -> Array:
         return np.asarray(contour.reshape(-1, 2) * pixel + np.asarray(origin), dtype=np.float64)
@@ -205,8 +192,3 @@ def _outlined(
         np.asarray(own & mask, dtype=np.uint8),
         relative,
     )
-
-
-def _area(outline: Array) -> float:
-    x, y = outline[:, 0], outline[:, 1]
-    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))

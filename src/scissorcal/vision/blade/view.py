@@ -1,4 +1,4 @@
-"""From pixels to the sheet on which a blade lies, and how far that can be trusted."""
+"""The mapping from pixels to the sheet under a blade, with its covariance."""
 
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -23,13 +23,13 @@ _FAR_OFF = 5.0
 
 
 class View(Protocol):
-    """One photograph's way from pixels to a sheet, x to the right and y down.
+    """One photograph's mapping from pixels to a sheet, x to the right and y down.
 
-    ``values`` (p,) with ``covariance`` (p, p) fix the way; `to_sheet` takes other values, so that
-    whoever measures can see what each of them moves. The last ``shared`` of them are the same
+    ``values`` (p,) with ``covariance`` (p, p) are its parameters; `to_sheet` takes other values, to
+    show what each of them moves. The last ``shared`` of them are the same
     in every photograph of one mat and camera. ``bounds`` (left, top, right, bottom) is the
     part of the sheet in which a blade may lie, in sheet units: metres, or pixels where no scale is
-    known (``metric`` False). ``uncertainty`` is a sentence on how well the way is known.
+    known (``metric`` False). ``uncertainty`` is a sentence on its accuracy.
     """
 
     @property
@@ -66,7 +66,7 @@ def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT
     if len(seen.ids) < 4 * LEAST_MARKERS:
         raise InputError(
             f"{photo.source} shows {len(seen.ids) // 4} of the {mat.name}'s {len(mat.ids)} markers "
-            f"sharply and needs {LEAST_MARKERS}: photograph all of the mat, sharp and without "
+            f"sharply; {LEAST_MARKERS} are needed. Photograph the whole mat, in focus and without "
             "glare."
         )
     height, width = photo.image.shape[:2]
@@ -77,7 +77,7 @@ def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT
     if (camera.width, camera.height) != (photo.width, photo.height):
         raise InputError(
             f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
-            f"at {camera.width} x {camera.height}: take photographs as those of the camera's fit."
+            f"at {camera.width} x {camera.height}: use the size of the camera's fit."
         )
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
@@ -86,9 +86,9 @@ def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT
 
 @dataclass(frozen=True)
 class PlainView:
-    """A photograph taken as it is: shapes up to similarity, or to scale where ``scale`` is given.
+    """A photograph without correction: shapes up to similarity, or to scale with ``scale``.
 
-    ``scale`` is metres per pixel, None where nobody knows.
+    ``scale`` is metres per pixel, None where it is unknown.
     """
 
     bounds: tuple[float, float, float, float]
@@ -102,8 +102,8 @@ class PlainView:
     @property
     def uncertainty(self) -> str:
         if self.scale is None:
-            return "No mat: the shape is known up to its size and to the camera's tilt."
-        return "No mat: the scale was given, and the camera's tilt is not corrected."
+            return "No mat: the shape has no scale, and the camera's tilt is not corrected."
+        return "No mat: the scale is as stated, and the camera's tilt is not corrected."
 
     @property
     def values(self) -> Array:
@@ -231,7 +231,7 @@ def _camera_view(
         pose,
         covariance,
         bounds,
-        f"Seen by the fitted camera: the mat's corners lie within {spread:.2f} px of its pose.",
+        f"Fitted camera: the mat's corner residuals are {spread:.2f} px rms.",
     )
 
 
@@ -274,8 +274,8 @@ def _homography_view(
         size,
         covariance,
         bounds,
-        "No camera fit: seen by a homography and one radial term, which leave "
-        f"{spread:.2f} px at the mat's corners.",
+        "No camera fit: a homography and one radial term, with corner residuals of "
+        f"{spread:.2f} px rms.",
     )
 
 

@@ -1,11 +1,10 @@
-"""Where a flat target stands before a camera: both poses that a plane allows, and how sure."""
+"""The pose of a flat target before a camera: both solutions of a plane, and their covariance."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 
@@ -13,16 +12,17 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LEAST_SD_PX = 0.02
-"""No corner is taken to be found better than this, however well a few of them agree."""
+"""Least standard deviation of a corner."""
 
 FAR_OFF = 6.0
-"""Corners farther off than this many robust standard deviations are left out."""
+"""Residuals above this many robust standard deviations are outliers and left out."""
 
 TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
-"""What corners are usually found to, and how many residuals that counts for: four corners of a
-marker leave only two to judge by."""
+"""Prior standard deviation of a corner, and its weight in residuals: the four corners of a marker
+have only two degrees of freedom left."""
 
 FEWEST = 4
+ROUNDS = 100
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Corners:
     """Corners of one flat target as seen by a camera at rest, in one frame or several.
 
     ``pixels`` (n, 2); ``points`` (n, 3) in the target's frame, z = 0, metres; ``frame`` and
-    ``corner`` (n,) say in which picture, and which corner of the target it is: what is wrong with a
-    corner in one picture (its print, its light) is wrong with it in the next.
+    ``corner`` (n,) say in which picture, and which corner of the target it is: a corner's
+    errors by print and light repeat from picture to picture.
     """
 
     pixels: Array
@@ -46,14 +46,14 @@ class Corners:
 
 @dataclass(frozen=True)
 class BoardPose:
-    """T_camera_target and what it rests on.
+    """T_camera_target and its diagnostics.
 
     ``other`` is the second pose that a plane allows, None where there is none. ``odds`` are those
     of the first against it by their squared errors; ``ambiguity`` is the ratio of their rms errors,
-    1 where both explain the picture alike. ``rms_px`` and ``sd_px`` are the rms error and the
-    standard deviation that corners were found to have; ``used`` (n,) marks the corners that count,
-    ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and ``by_print``
-    (6, 2) say how the pose moves with the camera's parameters and the print's scales.
+    1 where both explain the picture equally well. ``rms_px`` and ``sd_px`` are the rms error and
+    the standard deviation that corners were found to have; ``used`` (n,) marks the corners that
+    count, ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and
+    ``by_print`` (6, 2) say how the pose moves with the camera's parameters and the print's scales.
     """
 
     pose: Pose
@@ -73,9 +73,9 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
 
     Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
     are refined on all corners, those far off left out; the better one is the pose. Its covariance
-    has three parts: errors that corners have anew in every frame, errors that a corner keeps
-    from frame to frame (both estimated from the residuals), and what is unknown of the camera and
-    of the print: ``print_sd`` is how far the printer's scale may be off along either axis, a share.
+    has three parts: corner errors that are independent between frames, corner errors that
+    repeat in all frames (both estimated from the residuals), and the errors of camera and print:
+    ``print_sd`` is the relative standard deviation of the printer's scale along each axis.
 
     Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
     """
@@ -174,14 +174,19 @@ def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
 
 
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
-    """Least squares on the reprojection error of the corners used."""
-    both = np.repeat(used, 2)
+    """Minimise the reprojection error of the corners used (Levenberg-Marquardt)."""
+    import cv2
 
-    def evaluate(pose: Array) -> tuple[Array, Array]:
-        residuals, slope = project_pose(pose, corners, camera)
-        return residuals.ravel()[both], -slope[both, :6]
-
-    pose, _ = least_squares(evaluate, start)
+    turn, shift = cv2.solvePnPRefineLM(
+        corners.points[used],
+        corners.pixels[used],
+        camera.matrix,
+        camera.coefficients,
+        start[:3, None].copy(),
+        start[3:, None].copy(),
+        (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, ROUNDS, 1e-12),
+    )
+    pose = np.concatenate([turn.ravel(), shift.ravel()])
     residuals, slope = project_pose(pose, corners, camera)
     return _Refined(pose, residuals, slope, float(np.sum(residuals[used] ** 2)))
 
@@ -197,7 +202,7 @@ def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> tuple[float, float]:
-    """Variances of a coordinate: anew in every frame, and kept by a corner from frame to frame."""
+    """Variances of a coordinate: independent between frames, and constant for a corner."""
     frames = len(np.unique(corners.frame[used]))
     seen = residuals[used]
     labels, place = np.unique(corners.corner[used], return_inverse=True)

@@ -1,4 +1,4 @@
-"""A camera: pinhole with radial and tangential distortion, and how well it is known."""
+"""A pinhole camera with radial and tangential distortion, and its covariance."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-"""What ``Camera.covariance`` has rows and columns of, in this order."""
+"""Rows and columns of ``Camera.covariance``, in this order."""
 
 _ROUND_TRIP_PX = 1e-3
 _UNDISTORT_STEPS = 200
@@ -21,11 +21,11 @@ class Camera:
     ``x' = x/z, y' = y/z, r^2 = x'^2 + y'^2`` of a point in the camera's frame (x right, y down,
     z forward) are bent to ``x'(1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x'y' + p2 (r^2 + 2x'^2)`` (y'
     alike; divided by ``1 + k4 r^2 + k5 r^4 + k6 r^6`` where ``distortion`` has eight numbers) and
-    stand at pixel ``(fx x'' + cx, fy y'' + cy)`` (Brown 1971, as OpenCV writes it). The centre of
+    project to pixel ``(fx x'' + cx, fy y'' + cy)`` (Brown 1971, as OpenCV writes it). The centre of
     the first pixel is (0, 0). ``distortion`` is (k1, k2, p1, p2, k3[, k4, k5, k6]).
 
-    ``covariance`` is (9, 9) over `PARAMETERS` (zero rows for what was held), or None where nobody
-    said: then the camera counts as exactly known.
+    ``covariance`` is (9, 9) over `PARAMETERS` (zero rows for fixed parameters); None means
+    that the camera is taken as exact.
 
     >>> Camera(500.0, 500.0, 320.0, 240.0, (0.0,) * 5, 640, 480).project([[0.1, 0.0, 1.0]])
     array([[370., 240.]])
@@ -81,10 +81,6 @@ class Camera:
         missed = ~(np.abs(back - given).max(axis=1) < _ROUND_TRIP_PX)
         found[missed] = np.nan
         return np.asarray(found, dtype=np.float64)
-
-    def undistort(self, pixels: ArrayLike) -> Array:
-        """Pixels (n, 2) that the same camera without distortion would see; NaN as in `rays`."""
-        return np.asarray(self.rays(pixels) * [self.fx, self.fy] + [self.cx, self.cy])
 
     def scaled(self, width: int, height: int) -> "Camera":
         """Give the camera of the same photographs read at another size (same shape of picture)."""

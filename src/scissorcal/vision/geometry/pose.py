@@ -1,4 +1,4 @@
-"""Poses: rotation as a unit quaternion, translation in metres, and how well both are known."""
+"""Poses: rotation as a unit quaternion, translation in metres, and their covariance."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,8 @@ class Pose:
 
     ``quaternion`` is (w, x, y, z), of length one, w >= 0; ``translation_m`` is b's origin in a.
     ``covariance`` (6, 6) is that of a rotation vector in a's axes (rad), applied after the
-    rotation, and of the translation (m): R = exp(d_phi) R_mean, t = t_mean + d_t. None where nobody
-    said.
+    rotation, and of the translation (m): R = exp(d_phi) R_mean, t = t_mean + d_t. None if
+    unknown.
 
     >>> turned = Pose.from_rotation_vector([0.0, 0.0, np.pi / 2], [0.1, 0.0, 0.0])
     >>> turned.apply([[1.0, 0.0, 0.0]]).round(6)
@@ -88,7 +88,7 @@ class Pose:
         return Pose.from_matrix(turned, -turned @ t, covariance)
 
     def after(self, other: "Pose") -> "Pose":
-        """T_a_c = T_a_b T_b_c, with ``other`` = T_b_c; what is unknown of either adds up."""
+        """T_a_c = T_a_b T_b_c, with ``other`` = T_b_c; the covariances add."""
         matrix, moved = self.matrix, self.apply([other.translation_m])[0]
         covariance = None
         if self.covariance is not None or other.covariance is not None:
@@ -100,10 +100,7 @@ class Pose:
 
 
 def between(a: Pose, b: Pose, shared: Array) -> Pose:
-    """T_a_b of T_c_a and T_c_b whose errors go together: ``shared`` (6, 6) is their covariance.
-
-    What moves both alike then counts as far as it does not cancel.
-    """
+    """T_a_b of T_c_a and T_c_b with the cross-covariance ``shared`` (6, 6)."""
     back = a.inverse()
     found = back.after(b)
     if found.covariance is None:
@@ -122,7 +119,7 @@ def difference(a: Pose, b: Pose) -> Array:
 
 
 def left_jacobian(vector: Array) -> Array:
-    """How the rotation turns, in the outer frame, with a small change of its vector (3,)."""
+    """Left Jacobian (3, 3) of SO(3) at a rotation vector (3,)."""
     angle = float(np.linalg.norm(vector))
     cross = _cross(vector)
     if angle < 1e-6:

@@ -1,11 +1,10 @@
-"""Where the camera stands in the rig's frame: from a card of markers that rides on the rig."""
+"""The camera's pose in the rig's frame, from a card of markers on the moving rig."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
@@ -17,25 +16,35 @@ from scissorcal.vision.geometry.board_pose import (
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
 from scissorcal.vision.targets.boards import PRINT_SCALE_SD
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 
 OPEN = 3.0
-"""Prior standard deviation, rad and m, of what nobody said about how the card is fixed."""
+"""Prior standard deviation (rad and m) of both poses."""
 
 UNTOLD = 0.1
-"""A direction of the camera's pose whose standard deviation exceeds this (rad or m) was not told
-by the motion."""
+"""A direction of the camera's pose with a larger standard deviation (rad or m) is undetermined by
+the motion."""
+
+STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class CardView:
-    """The card in one picture, with where the rig stood: ``advance_m`` and, for a card on a moving
-    blade, ``blade_angle_rad`` by which that blade had turned (zero for a card on the carriage)."""
+    """The card in one picture, and the rig's stance: ``advance_m`` and, for a card on a moving
+    blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
     corners: Corners
     advance_m: float
     blade_angle_rad: float
+
+
+def card_view(detection: Detection, stance: tuple[float, float], moving_blades: int) -> CardView:
+    """The card as detected in one photograph; ``stance`` is advance (mm) and opening (deg)."""
+    frame = np.zeros(len(detection.ids), dtype=np.int64)
+    corners = Corners(detection.pixels, detection.points, frame, detection.ids)
+    return CardView(corners, 1e-3 * stance[0], float(np.radians(stance[1]) / moving_blades))
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class RigPose:
 
     The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
     card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
-    +z. ``untold`` names what the motion left open, empty where all is known. ``by_camera`` (6, 9)
+    +z. ``untold`` names the directions that the motion does not determine. ``by_camera`` (6, 9)
     says how ``camera_rig`` moves with the camera's parameters.
     """
 
@@ -55,7 +64,7 @@ class RigPose:
     by_camera: Array
 
     def holds(self, board: BoardPose, camera: Camera) -> Pose:
-        """T_rig_target of a target that the same camera sees, whose errors are in both poses."""
+        """T_rig_target of a target seen by the same camera, with the common camera errors."""
         known = camera.covariance
         shared = np.zeros((6, 6))
         if known is not None:
@@ -67,44 +76,37 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
-    squares on all corners, both poses unknown at once. Advances tell the x axis, turns tell the
-    pivot's axis and place; with one of them only, part of the frame stays open and is named.
-    The covariance holds what is unknown of the camera and of the card's print.
+    squares on all corners, both poses unknown at once. Advances determine the x axis, turns the
+    pivot's axis and place; with one of them only, ``untold`` names the undetermined directions. The
+    covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
+    from scipy.optimize import least_squares
+
     stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(stances) < 2:
         raise ValueError(
-            "the rig stood in one place in all pictures; move it between pictures: several "
-            "advances, and several openings"
+            "the rig has the same stance in all pictures: take pictures at several advances and "
+            "several openings"
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
-    used = tuple(found.used for found in located)
-
-    weight = LEAST_SD_PX / OPEN
-
-    def evaluate(point: Array) -> tuple[Array, Array]:
-        residuals, by_point, _ = _evaluate(point, views, camera, middle_m, used)
-        # What the motion leaves open stays near the start.
-        prior = weight * (point - start)
-        return np.concatenate([residuals, prior]), np.vstack([-by_point, weight * np.eye(11)])
-
-    point, _ = least_squares(evaluate, start)
-    residuals, by_point, by_shared = _evaluate(point, views, camera, middle_m, used)
-    square, normal = float(residuals @ residuals), by_point.T @ by_point
-    count = len(residuals)
-    noise = max(square / max(count - len(point), 1), LEAST_SD_PX**2)
+    rows = _Rows(views, camera, middle_m, tuple(found.used for found in located))
+    point = least_squares(
+        rows.residuals, start, jac=rows.by_point, method="lm", x_scale="jac", xtol=1e-14, ftol=1e-12
+    ).x
+    residual, slope, shared = rows.residuals(point), rows.by_point(point), rows.by_shared(point)
+    square, normal, slopes = float(residual @ residual), slope.T @ slope, slope.T @ shared
+    noise = max(square / max(len(residual) - len(point), 1), LEAST_SD_PX**2)
     prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
     inverse = np.linalg.inv(normal / noise + prior)
-    spread = normal / noise
-    alike = np.zeros((11, 11))
-    alike[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
+    known = np.zeros((11, 11))
+    known[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
     if camera.covariance is not None:
-        alike[:9, :9] = camera.covariance
-    drawn = by_point.T @ by_shared / noise
-    spread = spread + drawn @ alike @ drawn.T
+        known[:9, :9] = camera.covariance
+    drawn = slopes / noise
+    spread = normal / noise + drawn @ known @ drawn.T
     turn = np.eye(len(point))
     turn[:3, :3] = left_jacobian(point[:3])
     covariance = turn @ inverse @ (spread + prior) @ inverse @ turn.T
@@ -114,7 +116,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     return RigPose(
         Pose(rig.quaternion, rig.translation_m, covariance[:6, :6]),
         card,
-        float(np.sqrt(2.0 * square / count)),
+        float(np.sqrt(2.0 * square / len(residual))),
         untold,
         -(turn @ inverse @ drawn)[:6, :9],
     )
@@ -176,45 +178,54 @@ def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array)
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise ValueError("the card did not move although the rig did; is it fixed to it?")
+        raise ValueError("the card did not move with the rig: fix it to the moving part")
     return np.asarray(vector / length)
 
 
-def _evaluate(
-    point: Array,
-    views: tuple[CardView, ...],
-    camera: Camera,
-    middle_m: Array,
-    used: tuple[NDArray[np.bool_], ...],
-) -> tuple[Array, Array, Array]:
-    """Residuals (n,) of the corners used, with slopes of predicted pixels: (n, 11) by the unknowns,
-    (n, 11) by what all pictures share (the camera's parameters and the print's scales)."""
-    residuals, by_point, by_shared = [], [], []
-    for view, mask in zip(views, used, strict=True):
-        pose, slopes = _card_seen(point, view, middle_m)
-        away, slope = project_pose(pose, view.corners, camera)
-        both = np.repeat(mask, 2)
-        shared = np.hstack([slope[:, 6:15], print_slopes(pose, slope, view.corners)])
-        residuals.append(away.ravel()[both])
-        by_point.append(slope[both, :6] @ slopes)
-        by_shared.append(shared[both])
-    return np.concatenate(residuals), np.concatenate(by_point), np.concatenate(by_shared)
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of the least squares over the corners of all pictures that ``used`` selects."""
+
+    views: tuple[CardView, ...]
+    camera: Camera
+    middle_m: Array
+    used: tuple[NDArray[np.bool_], ...]
+
+    def residuals(self, point: Array) -> Array:
+        """Predicted minus measured pixels (n,) at parameters (11,)."""
+        poses = _poses(point, self.middle_m)
+        away = [
+            project_pose(_card(poses, view), view.corners, self.camera)[0][mask]
+            for view, mask in zip(self.views, self.used, strict=True)
+        ]
+        return -np.concatenate(away).ravel()
+
+    def by_point(self, point: Array) -> Array:
+        """Slopes (n, 11) of predicted pixels by the parameters."""
+        here = _poses(point, self.middle_m)
+        steps = STEP * np.eye(len(point))
+        beside = [[_poses(point + s * e, self.middle_m) for s in (1, -1)] for e in steps]
+        rows = []
+        for view, mask in zip(self.views, self.used, strict=True):
+            _, slope = project_pose(_card(here, view), view.corners, self.camera)
+            chain = [(_card(a, view) - _card(b, view)) / (2 * STEP) for a, b in beside]
+            rows.append(slope[np.repeat(mask, 2), :6] @ np.stack(chain, axis=1))
+        return np.concatenate(rows)
+
+    def by_shared(self, point: Array) -> Array:
+        """Slopes (n, 11) by what all pictures share: the camera and the print's scales."""
+        here = _poses(point, self.middle_m)
+        rows = []
+        for view, mask in zip(self.views, self.used, strict=True):
+            card = _card(here, view)
+            _, slope = project_pose(card, view.corners, self.camera)
+            shared = np.hstack([slope[:, 6:15], print_slopes(card, slope, view.corners)])
+            rows.append(shared[np.repeat(mask, 2)])
+        return np.concatenate(rows)
 
 
-def _card_seen(point: Array, view: CardView, middle_m: Array) -> tuple[Array, Array]:
-    """T_camera_card (6,) as rotation vector and translation, and its slopes (6, 11)."""
-    import cv2
-
-    turned, by_turn = cv2.Rodrigues(point[6:9])
-    place = np.append(point[9:11], 0.0) - turned @ middle_m
-    place_slopes = np.hstack([-(by_turn.reshape(3, 3, 3) @ middle_m).T, np.eye(3, 2)])
-    motion = np.array([0.0, 0.0, view.blade_angle_rad]), np.array([view.advance_m, 0.0, 0.0])
-    moved = cv2.composeRT(point[6:9], place, *motion)
-    seen = cv2.composeRT(moved[0], moved[1], point[:3, None], point[3:6, None])
-    by_moved, by_rig = (
-        np.block([[seen[k], seen[k + 1]], [seen[k + 4], seen[k + 5]]]) for k in (2, 4)
-    )
-    by_card = np.block([[moved[2], moved[3]], [moved[6], moved[7]]])
-    card_slopes = np.vstack([np.eye(3, 5), place_slopes])
-    pose = np.concatenate([seen[0].ravel(), seen[1].ravel()])
-    return pose, np.hstack([by_rig, by_moved @ by_card @ card_slopes])
+def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
+    """The card's pose before the camera (6,): rotation vector and translation."""
+    rig, card = poses
+    seen = rig.after(_motion(view)).after(card)
+    return np.concatenate([seen.rotation_vector, seen.translation_m])

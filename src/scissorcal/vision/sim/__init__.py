@@ -1,6 +1,6 @@
-"""Rendered photographs: exact geometry seen through a lens, with what spoils real pictures.
+"""Rendered photographs: exact geometry through a lens, with the defects of real pictures.
 
-Nothing here is used by a fit, and nothing of a fit is used here but the printed targets' layout.
+Nothing here is used by a fit, and nothing of a fit is used here except the printed targets' layout.
 """
 
 from scissorcal.vision.sim.blades import BladeShape, Nick, blade_layer, scissors_layers

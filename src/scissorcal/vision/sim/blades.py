@@ -1,4 +1,4 @@
-"""Blades with exactly known edges, to be photographed."""
+"""Blades with exactly known edges, for rendering."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -142,7 +142,7 @@ def scissors_layers(
     """Both blades, open by ``opening`` about one pivot, with ring handles behind it.
 
     Each blade is turned away from the common axis by half the opening; its handle lies beyond the
-    pivot on the other side. A dark screw stands in the upper blade's hole.
+    pivot on the other side. A dark screw fills the upper blade's hole.
     """
     look = {"reflectance": STEEL, "brushed": 0.04, **look}
     layers = []

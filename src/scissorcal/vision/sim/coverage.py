@@ -1,4 +1,4 @@
-"""How much of every pixel a polygon covers, exactly."""
+"""The exact share of every pixel that a polygon covers."""
 
 from collections.abc import Iterable
 

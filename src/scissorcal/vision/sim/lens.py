@@ -30,15 +30,8 @@ class Pose:
         Square-on where ``tilt`` is 0; else leaned by it towards ``azimuth``, and turned by ``turn``
         about the line of sight; all in radians.
         """
-        to_azimuth = _about_z(azimuth)
-        lean = np.array(
-            [
-                [np.cos(tilt), 0.0, np.sin(tilt)],
-                [0.0, 1.0, 0.0],
-                [-np.sin(tilt), 0.0, np.cos(tilt)],
-            ]
-        )
-        rotation = _about_z(turn) @ to_azimuth @ lean @ to_azimuth.T
+        to_azimuth = about(2, azimuth)
+        rotation = about(2, turn) @ to_azimuth @ about(1, tilt) @ to_azimuth.T
         target = np.array([target_m[0], target_m[1], 0.0])
         return cls(rotation, np.array([0.0, 0.0, distance_m]) - rotation @ target)
 
@@ -80,6 +73,11 @@ class Lens:
         )
 
 
-def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def about(axis: int, angle: float) -> Array:
+    """Rotation (3, 3) by an angle (rad) about the axis x, y or z (0, 1 or 2)."""
+    turned = np.eye(3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turned[first, first] = turned[second, second] = np.cos(angle)
+    turned[second, first] = np.sin(angle)
+    turned[first, second] = -np.sin(angle)
+    return turned

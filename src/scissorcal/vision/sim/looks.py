@@ -1,4 +1,4 @@
-"""What spoils a photograph after geometry: light, blur, noise, the tone curve and compression."""
+"""Defects of a photograph: light, blur, noise, tone curve and compression."""
 
 from dataclasses import dataclass, replace
 
@@ -87,7 +87,7 @@ def random_looks(rng: np.random.Generator, px_per_mm: float, strength: float = 1
 
 
 def _lit(radiance: Picture, looks: Looks) -> Picture:
-    """What the scene's radiance becomes under the light and the lens's loss towards the corners."""
+    """The scene's radiance under uneven light and vignetting."""
     height, width = radiance.shape
     x = np.linspace(-1.0, 1.0, max(width, 2), dtype=np.float32)[None, :width]
     y = np.linspace(-1.0, 1.0, max(height, 2), dtype=np.float32)[:height, None]

@@ -1,4 +1,4 @@
-"""Rendering: flat things in planes, seen by a lens."""
+"""Rendering of flat shapes in planes through a lens."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scissorcal.vision.sim.looks import Bytes, Looks, Picture, develop
 Array = NDArray[np.float64]
 
 FINEST_PX = 1.5
-"""Sides of a projected polygon are cut so short that a lens cannot bend them visibly."""
+"""Projected polygons are subdivided to sides this short, which distortion leaves straight."""
 
 _CUT_ALL = 4000
 
@@ -34,8 +34,8 @@ class Layer:
     """Flat shapes of one material in one plane.
 
     ``outlines_m`` are closed polygons (n, 2) in the plane of ``pose``, those that run the other
-    way round being holes. ``reflectance`` 1 is perfect white. ``shading`` tells how much lighter
-    metal gets over 100 mm along x and y; ``brushed`` is how strongly it is streaked along
+    way round being holes. ``reflectance`` 1 is perfect white. ``shading`` is the relative gain of
+    light over 100 mm along x and y; ``brushed`` is how strongly it is streaked along
     ``grain`` (rad). ``shadow_m`` shifts a shadow of the shapes, soft over ``shadow_soft_m``, and
     takes ``shadow`` of the light.
     """
@@ -63,7 +63,7 @@ def render(
     """Photograph layers, later ones over earlier ones: bytes (height, width, 3), BGR.
 
     Every shape's outline is projected point by point and its exact share of each pixel taken, so
-    that edges stand where geometry has them, to far below a hundredth of a pixel.
+    that edges are accurate to far below a hundredth of a pixel.
     """
     radiance = np.full((lens.height, lens.width), background, dtype=np.float32)
     for layer in layers:

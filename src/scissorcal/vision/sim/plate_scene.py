@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.sim.lens import Pose
+from scissorcal.vision.sim.lens import Pose, about
 from scissorcal.vision.sim.photograph import Layer
 from scissorcal.vision.sim.targets import target_layers
 from scissorcal.vision.targets.boards import RIG_MARKERS, MarkedBoard
@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlateScene:
-    """What stands where. The card rides on a blade; ``rig_card`` is where it is at no advance and
-    blade angle zero. The target lies on the plate's upper face at ``plate_target``."""
+    """True poses. The card moves with a blade; ``rig_card`` is its pose at no advance and blade
+    angle zero. The target is on the plate's upper face at ``plate_target``."""
 
     camera_rig: Pose
     rig_card: Pose
@@ -31,8 +31,8 @@ class PlateScene:
     def layers(
         self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
     ) -> list[Layer]:
-        """The target on the plate, and the card where the rig's stance brings it."""
-        stance = Pose(_about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        """The target on the plate, and the card at the rig's stance."""
+        stance = Pose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
         card = chained(self.camera_rig, stance, self.rig_card)
         lying = chained(self.camera_plate, self.plate_target)
         return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
@@ -41,10 +41,10 @@ class PlateScene:
 def plate_scene(
     rng: np.random.Generator, place_m: tuple[float, float] = (0.0, 0.0), turn: float = 0.0
 ) -> PlateScene:
-    """Draw a scene: the camera above and aside, plate and card a little off where they belong.
+    """Draw a scene: the camera above and aside, plate and card slightly displaced.
 
-    ``place_m`` and ``turn`` (rad) are where the pattern's upper left corner lies on the plate, and
-    how its upper edge is turned there.
+    ``place_m`` is the place of the pattern's upper left corner on the plate, ``turn`` (rad) the
+    rotation of its upper edge.
     """
     eye = np.array([0.15, 0.7, 0.75]) + rng.normal(0.0, 0.05, 3)
     to_rig = _looking(eye / np.linalg.norm(eye))
@@ -56,7 +56,7 @@ def plate_scene(
     # the plate's upper face looks along the rig's y, in which the blades close
     lying = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ _leaned(rng, 0.02)
     near_edge = np.array([0.03, 0.0, 0.012]) + rng.normal(0.0, 1.5e-3, 3)
-    pattern = _about(2, turn) @ np.diag([1.0, -1.0, -1.0])
+    pattern = about(2, turn) @ np.diag([1.0, -1.0, -1.0])
     return PlateScene(
         camera_rig,
         Pose(facing, card - facing @ centre),
@@ -83,13 +83,4 @@ def _looking(towards_eye: Array) -> Array:
 
 def _leaned(rng: np.random.Generator, size: float) -> Array:
     angles = rng.normal(0.0, size, 3)
-    return np.asarray(_about(0, angles[0]) @ _about(1, angles[1]) @ _about(2, angles[2]))
-
-
-def _about(axis: int, angle: float) -> Array:
-    turned = np.eye(3)
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    turned[first, first] = turned[second, second] = np.cos(angle)
-    turned[second, first] = np.sin(angle)
-    turned[first, second] = -np.sin(angle)
-    return turned
+    return np.asarray(about(0, angles[0]) @ about(1, angles[1]) @ about(2, angles[2]))

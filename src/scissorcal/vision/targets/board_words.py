@@ -1,4 +1,4 @@
-"""A board in words, as it is given on the command line."""
+"""A board's description, as given on the command line."""
 
 import re
 
@@ -39,7 +39,7 @@ def board_from_words(words: str) -> CharucoBoard | Chessboard:
         )
         if min(columns, rows) >= 3 and 0.0 < marker < square:
             return _charuco(columns, rows, 1e-3 * square, 1e-3 * marker, found[5])
-    raise InputError(f"{words!r} is no board: give {FORMS}, as in chessboard:9x6:25.")
+    raise InputError(f"{words!r} is not a board: give {FORMS}, for example chessboard:9x6:25.")
 
 
 def _charuco(columns: int, rows: int, square_m: float, marker_m: float, name: str) -> CharucoBoard:
@@ -47,11 +47,11 @@ def _charuco(columns: int, rows: int, square_m: float, marker_m: float, name: st
 
     dictionaries = [key for key in dir(cv2.aruco) if key.startswith("DICT_")]
     if name not in dictionaries:
-        raise InputError(f"{name} is no dictionary of markers: give one of {dictionaries}.")
+        raise InputError(f"{name} is not a dictionary of markers: give one of {dictionaries}.")
     board = CharucoBoard(
         f"ChArUco {columns}x{rows}", columns, rows, square_m, marker_m, dictionary=name
     )
     held = len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)).bytesList)
     if len(board.ids) > held:
-        raise InputError(f"{name} has {held} markers, and the board needs {len(board.ids)}.")
+        raise InputError(f"{name} has {held} markers; the board needs {len(board.ids)}.")
     return board

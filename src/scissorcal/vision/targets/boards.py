@@ -1,7 +1,7 @@
-"""The printed targets: where their marks stand, and how a photograph tells which one it shows.
+"""The printed targets: the places of their corners, and the identification of a target.
 
-Every target is printed in one dictionary of markers, each with numbers of its own, so that a single
-marker names its target. A board's frame has its origin at the pattern's upper left corner as
+All targets use one dictionary of markers, each target with different numbers, so that a single
+marker identifies its target. A board's frame has its origin at the pattern's upper left corner as
 printed, x to the right, y down, z into the sheet; all in metres.
 """
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 DICTIONARY = "DICT_5X5_250"
 
 PRINT_SCALE_SD = 1e-3
-"""How far printers are off along either axis, as a share: a good laser printer's."""
+"""Relative standard deviation of a laser printer's scale along each axis."""
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ class MarkerBoard:
 
 @dataclass(frozen=True)
 class Chessboard:
-    """A plain chessboard: nothing in it says which one it is, or which way is up.
+    """A plain chessboard, which shows neither its identity nor its orientation.
 
-    ``columns`` and ``rows`` count *inner corners*, as is the custom.
+    ``columns`` and ``rows`` count *inner corners*, as OpenCV does.
     """
 
     name: str
@@ -175,10 +175,10 @@ BLADE_MAT = MarkerBoard(
 """Thirty markers around an empty field on which a blade lies."""
 
 MAT_FIELD_M = (0.024, 0.024, 0.231, 0.153)
-"""The mat's empty field in its frame: left, top, right, bottom. White but for the pivot mark."""
+"""The mat's empty field in its frame: left, top, right, bottom. White except for the pivot mark."""
 
 MAT_PIVOT_M = (0.062, 0.0885)
-"""Where the mat's pivot mark stands in its frame: a small cross to lay the blade's pivot on."""
+"""Place of the mat's pivot mark in its frame: a small cross for the blade's pivot."""
 
 PLATE_STRIP = MarkerBoard(
     "plate strip",
@@ -191,7 +191,7 @@ PLATE_STRIP = MarkerBoard(
 """Six markers in a row, to be stuck along the plate's edge."""
 
 PLATE_BOARD = CharucoBoard("plate board", 7, 5, 20e-3, 14e-3, first_id=100)
-"""A small ChArUco board for plates that have room for one: the most exact."""
+"""A small ChArUco board for plates with room for it: the most accurate plate target."""
 
 RIG_MARKERS = MarkerBoard(
     "rig markers",

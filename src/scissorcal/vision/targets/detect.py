@@ -1,5 +1,6 @@
-"""Find a target in a photograph: its corners to a fraction of a pixel, or why it is not there."""
+"""Detect a target in a photograph: its corners with subpixel accuracy, or why it is missing."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +24,10 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LEAST_CORNERS = 6
-"""Fewer corners of a chessboard than these do not tell how it lies."""
+"""Least number of corners that determine a chessboard's pose."""
 
 SMALL_PX = 40.0
-"""Squares smaller than this are found less and less often, the more so where they are blurred."""
+"""Squares below this size are found less often, especially when blurred."""
 
 _WINDOW_SHARE = 0.2
 
@@ -35,8 +36,8 @@ _WINDOW_SHARE = 0.2
 class Markers:
     """Markers of one dictionary in a picture.
 
-    ``corners`` (n, 4, 2) in pixels, clockwise from the upper left as printed; ``sharp`` (n,) tells
-    whether they were measured by their sides (to about 0.03 px) or only roughly (1 px).
+    ``corners`` (n, 4, 2) in pixels, clockwise from the upper left as printed; ``sharp`` (n,) says
+    whether they were measured by their sides (to about 0.03 px) or coarsely (1 px).
     """
 
     ids: Integers
@@ -49,7 +50,7 @@ class Detection:
     """A target as one photograph shows it.
 
     Row k of ``pixels`` (n, 2), in the whole photograph, is ``board.points[ids[k]]``. ``square_px``
-    is the middle length of a square's (or a marker's) side there.
+    is the median length of a square's (or a marker's) side there.
     """
 
     board: Board
@@ -72,9 +73,9 @@ def find_board(
     window in which a plain chessboard's corners are refined; None takes a fifth of each corner's
     smallest square, since a window that reaches into the next square pulls its corner away.
 
-    Raises InputError saying what the photograph shows instead: nothing, another target, too few
-    corners, squares too small or too blurred; without looking for that where ``explain`` is False,
-    as for a video's frames.
+    Raises InputError with what the photograph shows instead: nothing, another target, too few
+    corners, squares too small or too blurred. With ``explain`` False, as for a video's frames, the
+    message has no explanation.
     """
     if isinstance(board, Chessboard):
         ids, pixels = _chessboard(photo.grey, board, window_px)
@@ -93,11 +94,24 @@ def find_board(
     return Detection(board, ids, whole, _side_px(board, ids, whole))
 
 
-def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None = None) -> Markers:
-    """Find every marker of a dictionary; ``board`` helps to find more of its own.
+def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = True) -> Detection:
+    """Find the first of several boards that a photograph shows.
 
-    Markers are read with twice the usual pixels per cell, which finds those blurred by half a
-    cell; corners are then measured by the markers' sides.
+    Raises InputError as `find_board` does for the last one, where none is seen.
+    """
+    for board in boards[:-1]:
+        try:
+            return find_board(photo, board, explain=False)
+        except InputError:
+            continue
+    return find_board(photo, boards[-1], explain=explain)
+
+
+def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None = None) -> Markers:
+    """Find every marker of a dictionary; ``board`` helps to find more of its markers.
+
+    Markers are read with twice the default pixels per cell, which finds those blurred by half a
+    cell; corners are then measured from the markers' sides.
     """
     import cv2
 
@@ -195,7 +209,7 @@ def _refined(grey: Picture, corner: Array, window: int) -> Array:
 
 
 def _side_px(board: Board, ids: Integers, pixels: Array) -> float:
-    """Middle length in pixels of what a square's (or marker's) side spans."""
+    """Median length in pixels of a square's (or marker's) side."""
     if isinstance(board, MarkerBoard):
         quads = pixels.reshape(-1, 4, 2)
         return float(np.median(np.linalg.norm(np.roll(quads, -1, axis=1) - quads, axis=2)))

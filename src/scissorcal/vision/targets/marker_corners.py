@@ -1,4 +1,4 @@
-"""Marker corners as crossings of a marker's sides, on which blur and tone curve have no say."""
+"""Marker corners as intersections of a marker's sides, independent of blur and tone curve."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,16 @@ _WORST_LINE_PX = 0.6
 def refine_marker_corners(
     grey: NDArray[np.uint8], corners: Array, module: float
 ) -> tuple[Array, Flags]:
-    """Move corners (n, 4, 2) of dark square markers to where their sides cross.
+    """Move corners (n, 4, 2) of dark square markers to the intersections of their sides.
 
-    The corner of a blurred dark square lies half a pixel and more outside what a corner finder
-    sees, and a camera's tone curve moves all four sides inward. So each side is followed at 28
-    places: across it light goes from the dark border (one ``module`` of the side wide, as a share)
-    to the white around it, and the side stands where the *linear* light is half way. A line through
-    these places, robust against a few bad ones, meets its neighbours in the corners.
+    A corner detector finds the corner of a blurred dark square half a pixel or more inside, and a
+    camera's tone curve moves all four sides inward. So each side is sampled at 28 places: across it
+    the light rises from the dark border (one ``module`` wide, as a share of the side) to the white
+    around it, and the side is where the *linear* light is half way. A robust line through these
+    places intersects its neighbours in the corners.
 
-    Returns the corners, and (n,) whether a marker was sharp enough for that. One that was not -
-    too small, blurred over more than its border, or with something over a side - keeps what it had.
+    Returns the corners, and (n,) whether a marker was sharp enough. Others - too small, blurred
+    over more than their border, or with a side partly covered - keep their corners.
     """
     if not len(corners):
         return corners, np.zeros(0, dtype=np.bool_)

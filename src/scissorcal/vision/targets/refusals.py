@@ -1,4 +1,4 @@
-"""Why a target was not found in a photograph, in a sentence with the mend."""
+"""Why a target was not found in a photograph: a sentence with the remedy."""
 
 import numpy as np
 
@@ -14,26 +14,26 @@ from scissorcal.vision.targets.boards import (
 )
 
 BLURRED_PX = 2.5
-"""A picture none of whose edges is sharper than this (standard deviation) counts as blurred."""
+"""A picture is blurred if its sharpest edge has a larger standard deviation."""
 
 _LEAST_SIDE_PX = 200
-_HANDY_PX = 1000
+_REDUCED_PX = 1000
 _OTHERS = ("DICT_4X4_250", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL")
 _APRIL = ("DICT_APRILTAG_36h11",)
 
 
 def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str:
-    """Say what a photograph shows in place of ``board``.
+    """Sentence that says what a photograph shows instead of ``board``.
 
-    Another target of ours, markers of another dictionary, too few corners, a picture too small or
-    too blurred, or nothing.
+    Another target of scissorcal, markers of another dictionary, too few corners, a picture too
+    small or too blurred, or nothing.
     """
-    grey = _handy(photo.grey)
+    grey = _reduced(photo.grey)
     name = photo.source
     if min(photo.width, photo.height) < _LEAST_SIDE_PX:
         return (
-            f"{name} has only {photo.width} x {photo.height} pixels, too few to measure by: take "
-            "photographs of 640 x 480 at least."
+            f"{name} has only {photo.width} x {photo.height} pixels: take photographs of at least "
+            "640 x 480."
         )
     other = _other_target(grey, board)
     if other and not found:
@@ -46,17 +46,17 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
         )
     if found:
         return (
-            f"{name} shows {found} corners of the {board.name} and {least} are needed: bring all "
-            "of it into the picture, at 40 pixels a square or more, without glare or fingers."
+            f"{name} shows {found} corners of the {board.name}; {least} are needed. Show the whole "
+            "board at 40 px per square or more, without glare or fingers."
         )
     if isinstance(board, Chessboard):
         return (
-            f"{name} shows no chessboard of {board.columns} x {board.rows} inner corners: it must "
-            "be in the picture whole, with a white border, and have that many."
+            f"{name} shows no chessboard of {board.columns} x {board.rows} inner corners: show "
+            "the whole board with its white border, and check the number of corners."
         )
     return (
         f"{name} shows no marker of the {board.name} ({board.dictionary} {board.ids[0]}-"
-        f"{board.ids[-1]}): bring it into the picture, sharp and at 40 pixels a square or more."
+        f"{board.ids[-1]}): show it sharply at 40 px per square or more."
     )
 
 
@@ -79,11 +79,11 @@ def sharpest_edge_px(grey: Picture) -> float:
     return float(np.sqrt(max(total**2 - 1.0, 0.0)))
 
 
-def _handy(grey: Picture) -> Picture:
-    """A picture small enough to look through for many things."""
+def _reduced(grey: Picture) -> Picture:
+    """A reduced picture, in which many searches are fast."""
     import cv2
 
-    zoom = _HANDY_PX / max(grey.shape)
+    zoom = _REDUCED_PX / max(grey.shape)
     if zoom >= 1.0:
         return grey
     size = (round(grey.shape[1] * zoom), round(grey.shape[0] * zoom))
@@ -91,7 +91,7 @@ def _handy(grey: Picture) -> Picture:
 
 
 def _other_target(grey: Picture, board: Board) -> str | None:
-    """Name what else is in the picture: another target, or markers of another dictionary."""
+    """Name another target, or markers of another dictionary, in the picture."""
     import cv2
 
     def ids_of(name: str) -> list[int]:
@@ -119,7 +119,7 @@ def _other_target(grey: Picture, board: Board) -> str | None:
 
 
 def _plain_chessboard(grey: Picture, board: Board) -> bool:
-    """Whether a chessboard is there that is not the board itself with its markers unread."""
+    """Whether the picture shows a chessboard other than the board with its markers unread."""
     import cv2
 
     own = (board.columns - 1, board.rows - 1) if isinstance(board, CharucoBoard) else None

@@ -1,6 +1,6 @@
-"""The sheets that people print: boards at true scale, with rulers that check the printer."""
+"""The printed sheets: boards at true scale, with rulers to check the printer."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -69,8 +69,8 @@ class Sheet:
 def target_sheet(name: SheetName, paper: Paper = "A4") -> Sheet:
     """Lay out a sheet: "camera" (ChArUco board), "blade" (mat) or "plate" (plate and rig markers).
 
-    Every sheet has a ruler along each side, since a printer may scale its two ways differently, and
-    says in words which target it is and how to check it.
+    Every sheet has a ruler along each side, since a printer may scale its two axes differently, and
+    states which target it is and how to check it.
 
     >>> sheet = target_sheet("blade", "Letter")
     >>> sheet.width, [board.name for board, _, _ in sheet.boards]
@@ -78,7 +78,7 @@ def target_sheet(name: SheetName, paper: Paper = "A4") -> Sheet:
     """
     width, height = PAPER_MM[paper]
     boards = _places(name, width, height)
-    shapes = [shape for board, x, y in boards for shape in _board(board, x, y)]
+    shapes = [shape for board, x, y in boards for shape in board_ink(board, x, y)]
     shapes += _ruler(0.5 * (width - RULERS_MM[0]), height - 7.0, RULERS_MM[0], across=True)
     shapes += _ruler(5.5, 0.5 * (height - RULERS_MM[1]), RULERS_MM[1], across=False)
     if name == "blade":
@@ -111,8 +111,10 @@ def _twentieths(length: float) -> float:
     return round(length * 20.0) / 20.0
 
 
-def _board(board: MarkedBoard, x: float, y: float) -> Iterator[Rectangle]:
-    """Give the black parts of a board whose frame stands at (x, y)."""
+def board_ink(
+    board: MarkedBoard, x: float = 0.0, y: float = 0.0, ids: Sequence[int] | None = None
+) -> Iterator[Rectangle]:
+    """The black parts of a board whose frame is at (x, y) mm; ``ids`` leaves out other markers."""
     if isinstance(board, CharucoBoard):
         square = 1e3 * board.square_m
         for row in range(board.rows):
@@ -120,6 +122,8 @@ def _board(board: MarkedBoard, x: float, y: float) -> Iterator[Rectangle]:
                 yield Rectangle(x + column * square, y + row * square, square, square)
     cells = dictionary(board.dictionary).markerSize + 2
     for marker in board.ids:
+        if ids is not None and marker not in ids:
+            continue
         corner = 1e3 * board.marker_corners(marker)[0]
         yield from _marker(board, marker, x + corner[0], y + corner[1], cells)
 
@@ -141,7 +145,7 @@ def _ruler(x: float, y: float, length: float, *, across: bool) -> list[Rectangle
     ticks = []
     for at in range(round(length) + 1):
         long = 3.0 if at % 10 == 0 else 2.0 if at % 5 == 0 else 1.2
-        # Outer faces of the end ticks, middles of all others, stand at whole millimetres.
+        # outer faces of the end ticks, centres of all others, are at whole millimetres
         shift = 0.0 if at == 0 else -thin if at == round(length) else -0.5 * thin
         if across:
             ticks.append(Rectangle(x + at + shift, y - long, thin, long))
@@ -200,7 +204,7 @@ def _sentences(
         height - 12.5,
         2.6,
         f"Print at 100 % (actual size). The ruler below must be {RULERS_MM[0]:.1f} mm from end to "
-        f"end, the one at the left {RULERS_MM[1]:.1f} mm: if not, mend the printer's scaling.",
+        f"end, the one at the left {RULERS_MM[1]:.1f} mm: if not, correct the printer's scaling.",
     )
     if name == "plate":
         for board, x, y in boards:

@@ -4,7 +4,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError
+from scissorcal.errors import file_error
 from scissorcal.vision.targets.sheet import Sheet
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
             part.write_bytes(content)
             part.replace(path)
     except OSError as error:
-        raise InputError(f"{folder} cannot take the targets: {error.strerror}.") from None
+        raise file_error(error, folder) or error from None
     pdf, png = contents
     return pdf, png
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.recipe.requirements import GeometryKind, requirements
-from scissorcal.workday.geometry import GeometryFit, fit_geometry
+from scissorcal.recipe.requirements import requirements
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import BladeSetup
-from scissorcal.workday.runs.blade import blade_path, capture_blade
+from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.camera import capture_camera
-from scissorcal.workday.runs.plate import capture_plate, require_plate
+from scissorcal.workday.runs.fit import FitOutcome, fit_workspace, load_result
+from scissorcal.workday.runs.plate import capture_plate
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -44,12 +45,14 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
     They show the specimen's own blade, and targets at places that only the renderer knows.
     """
-    from scissorcal.vision.targets.boards import CAMERA_BOARD
-    from scissorcal.workday.demo.sim_photographs import (
+    from scissorcal.vision.sim.sim_camera import (
         render_blade_photographs,
         render_board_photographs,
+        render_card_photographs,
+        render_plate_photographs,
     )
-    from scissorcal.workday.demo.sim_plate import render_card_photographs, render_plate_photographs
+    from scissorcal.vision.targets.boards import CAMERA_BOARD
+    from scissorcal.workday.demo.sim_photographs import specimen_blade
 
     wanted = [item.name for item in requirements(recipe).photographs]
     for index, what in enumerate(wanted):
@@ -64,7 +67,7 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
                 made = render_board_photographs(CAMERA_BOARD, folder, seed, "board")
                 capture_camera(workspace, made, CAMERA_BOARD, tell)
             elif what == "blade":
-                made = render_blade_photographs(recipe, folder, seed)
+                made = render_blade_photographs(specimen_blade(recipe), folder, seed)
                 capture_blade(workspace, made, BladeSetup(), tell)
             else:
                 made = render_plate_photographs(recipe, folder, seed)
@@ -76,16 +79,10 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
 def fit_photographs(
     workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress
-) -> tuple[GeometryFit, ...]:
+) -> tuple[FitOutcome, ...]:
     """Fit what the scene requires of its photographs, in order."""
-    needs = requirements(recipe)
-    fits: list[GeometryFit] = []
-    kinds: tuple[GeometryKind, ...] = ("camera", "blade", "plate")
-    for what in kinds:
-        if needs.needs_geometry(what):
-            progress(len(fits) / len(needs.geometry), f"fitting the {what}")
-            fits.append(fit_geometry(workspace, what, seed=seed))
-    return tuple(fits)
+    wanted = [item.name for item in requirements(recipe).geometry]
+    return fit_workspace(workspace, wanted, seed=seed, progress=progress) if wanted else ()
 
 
 def judge_photographs(
@@ -107,9 +104,7 @@ def judge_photographs(
 def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeometry]:
     import numpy as np
 
-    from scissorcal.calibration.edge.store import load_blade
-
-    fit = load_blade(blade_path(workspace)).blades[0]
+    fit = load_result(Engine.of(workspace), "blade").blades[0]
     edges = fit.belief.with_values(fit.draws)
     blade, length = specimen.blade, fit.belief.edge.length_m
     rows = []
@@ -139,9 +134,10 @@ def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judg
     import numpy as np
 
     from scissorcal.vision.geometry.pose import Pose, difference
-    from scissorcal.workday.demo.sim_plate import sim_plate_scene
+    from scissorcal.vision.sim.sim_camera import sim_plate_scene
 
-    fit, rendered = require_plate(workspace), sim_plate_scene(recipe, seed).rig_plate
+    fit = load_result(Engine.of(workspace), "plate")
+    rendered = sim_plate_scene(recipe, seed).rig_plate
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)
     if fit.rig_plate is None or fit.rig_plate.covariance is None:
         return []

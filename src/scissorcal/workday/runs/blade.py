@@ -1,55 +1,31 @@
-"""A workspace's blade: photographs taken in, and its edge fitted."""
+"""The blade: photographs captured and measured, and its edge fitted."""
 
-import hashlib
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError
 from scissorcal.vision.targets.boards import BLADE_MAT
 from scissorcal.workday.photographs import (
     BladeSetup,
     PhotoCapture,
-    PhotoWriter,
+    Seen,
+    Taken,
     photo_captures,
-    refuse_known,
+    take_photographs,
 )
-from scissorcal.workday.runs.camera import camera_path, require_camera
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.edge.result import BladeFit, BladeResult, SeenOpening
-    from scissorcal.inference import Effort
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.vision.blade.measure import BladeMeasurement
+    from scissorcal.calibration.edge.result import BladeFit
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.photo import Photo
+    from scissorcal.workday.engine import Engine
+    from scissorcal.workday.runs.fit import Made, Progress, Request
 
-Progress = Callable[[float, str], None]
-
-
-@dataclass(frozen=True)
-class BladeCapture:
-    """A finished capture: ``taken`` and ``refused`` are sentences on each photograph."""
-
-    capture: PhotoCapture
-    taken: tuple[str, ...]
-    refused: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class BladeOutcome:
-    """A blade's fit, its file, its pictures, and whether it had to be done at all."""
-
-    result: "BladeResult"
-    path: Path
-    pictures: tuple[Path, ...]
-    cached: bool
+STREAM = 3
 
 
 def capture_blade(
@@ -57,100 +33,43 @@ def capture_blade(
     paths: Sequence[Path],
     setup: BladeSetup,
     tell: Callable[[str], None],
-) -> BladeCapture:
-    """Take photographs of a blade into captures/blade-<stamp>/, copied byte for byte.
+) -> Taken:
+    """Capture photographs of a blade; each is measured at once, while the blade still lies there.
 
-    Each is measured at once, so that one that cannot be used is left out with its reason while the
-    blade still lies there. Raises InputError, and keeps nothing, where that leaves none.
+    One that cannot be used is left out with its reason. Raises InputError, and keeps nothing, where
+    none is left.
     """
-    from scissorcal.vision.photo import read_photo
+    from scissorcal.workday.engine import Engine
 
-    before = photo_captures(workspace, "blade")
-    _refuse_other_setup(before, setup)
-    taken: list[str] = []
-    refused: list[str] = []
-    with PhotoWriter(workspace, "blade") as writer:
-        for path in paths:
-            try:
-                photo = read_photo(path, colour=False)
-                refuse_known(photo, before, writer)
-                seen = _measured(photo, _camera_for(workspace, photo, setup), setup)
-            except InputError as error:
-                refused.append(str(error))
-                tell(f"left out: {error}")
-                continue
-            writer.add(path, photo)
-            taken.append(_words(seen))
-            tell(taken[-1])
-        if not taken:
-            raise InputError(" ".join(refused[:3]) + " Nothing was kept.")
-        capture = writer.finish(BLADE_MAT if setup.mat else None, setup)
-    return BladeCapture(capture, tuple(taken), tuple(refused))
+    engine = Engine.of(workspace)
+    _refuse_other_setup(photo_captures(workspace, "blade"), setup)
+
+    def look(path: Path, photo: "Photo") -> Seen:
+        return Seen(_measured(photo, _camera_for(engine, photo, setup), setup).sentence())
+
+    board = BLADE_MAT if setup.mat else None
+    return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
 
 
-def fit_workspace_blade(
-    workspace: Workspace,
-    *,
-    effort: "Effort | None" = None,
-    seed: int = 0,
-    force: bool = False,
-    progress: Progress | None = None,
-) -> BladeOutcome:
-    """Fit the blade's edge to all its photographs, where they or the camera changed.
+def fit(engine: "Engine", request: "Request") -> "Made":
+    """Fit the edge to all photographs of the blade; draw it over each of them.
 
-    Uses the workspace's camera where there is one. Writes fits/blade.json and an overlay of each
-    photograph below fits/blade/. Raises MissingError where there is no photograph yet.
+    Uses the workspace's camera where there is one.
     """
-    from scissorcal.calibration.edge.result import BladeResult
-    from scissorcal.calibration.edge.store import load_blade, save_blade
+    from scissorcal.calibration.edge.result import BladeResult, SeenOpening
+    from scissorcal.workday.runs.fit import Made
 
-    recipe = workspace.recipe()
-    captures = photo_captures(workspace, "blade")
-    if not captures:
-        raise MissingError(
-            "There is no photograph of the blade yet: run 'scissorcal capture blade --image "
-            "blade-*.jpg' first."
-        )
-    chosen = effort or recipe.fit.effort
-    expected = blade_inputs_hash(workspace, recipe, captures, chosen)
-    path = blade_path(workspace)
-    if path.is_file() and not force:
-        stored = load_blade(path)
-        if stored.inputs_hash == expected:
-            return BladeOutcome(stored, path, _pictures_of(workspace, stored), cached=True)
-    tell = progress or (lambda done, sentence: None)
-    seen = _all_measured(workspace, captures, tell)
-    openings = _openings(seen)
-    fits = _fits(seen, captures, recipe, chosen, seed, tell)
-    result = BladeResult(
-        fits, openings, expected, tuple(one.photo.source for one in seen), pictures=()
+    captures = photo_captures(engine.workspace, "blade")
+    seen = _all_measured(engine, captures, request.progress)
+    fits = _fits(seen, captures, engine, request)
+    openings = tuple(
+        SeenOpening(one.photo.source, one.scissors.opening)
+        for one in seen
+        if one.scissors is not None
     )
-    pictures = _draw(workspace, seen, fits)
-    names = tuple(workspace.relative(picture) for picture in pictures)
-    save_blade(replace(result, pictures=names), path)
-    return BladeOutcome(result, path, pictures, cached=False)
-
-
-def blade_path(workspace: Workspace) -> Path:
-    """The file of a workspace's blade."""
-    return workspace.root / "fits" / "blade.json"
-
-
-def blade_inputs_hash(
-    workspace: Workspace, recipe: "Recipe", captures: Sequence[PhotoCapture], effort: str
-) -> str:
-    """SHA-256 over all that a fit of the blade depends on."""
-    from scissorcal.calibration.edge.fit import ALGORITHM
-
-    camera = camera_path(workspace)
-    facts = {
-        "algorithm": ALGORITHM,
-        "camera": hashlib.sha256(camera.read_bytes()).hexdigest() if camera.is_file() else "",
-        "captures": [capture.index.model_dump(mode="json") for capture in captures],
-        "scene": [recipe.scene.opening_deg, recipe.scene.contact_mm, recipe.rig.moving],
-        "effort": effort,
-    }
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+    sources = tuple(one.photo.source for one in seen)
+    result = BladeResult(fits, openings, request.inputs_hash, sources)
+    return Made(result, lambda folder: _draw(seen, fits, folder))
 
 
 def _measured(photo: "Photo", camera: "Camera | None", setup: BladeSetup) -> "BladePhoto":
@@ -162,11 +81,13 @@ def _measured(photo: "Photo", camera: "Camera | None", setup: BladeSetup) -> "Bl
     return photograph_blade(photo, camera, edge_side=setup.edge_side, pivot_px=setup.pivot_px)
 
 
-def _camera_for(workspace: Workspace, photo: "Photo", setup: BladeSetup) -> "Camera | None":
+def _camera_for(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "Camera | None":
     """The workspace's camera, where it has one and it took this size of photograph."""
-    if not setup.mat or not camera_path(workspace).is_file():
+    from scissorcal.workday.runs.fit import load_result
+
+    if not setup.mat or not engine.file("fit camera").is_file():
         return None
-    camera = require_camera(workspace).camera
+    camera: Camera = load_result(engine, "camera").camera
     same = (camera.width, camera.height) == (photo.width, photo.height)
     return camera if same else None
 
@@ -177,13 +98,13 @@ def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> No
         if held is not None and held.both != setup.both:
             what = "open scissors" if held.both else "one blade"
             raise InputError(
-                f"{capture.folder} holds photographs of {what}, and one fit takes one kind: remove "
-                "it to start anew."
+                f"{capture.folder} holds photographs of {what}, and one fit uses one kind: remove "
+                "that folder to start again."
             )
 
 
 def _all_measured(
-    workspace: Workspace, captures: Sequence[PhotoCapture], tell: Progress
+    engine: "Engine", captures: Sequence[PhotoCapture], tell: "Progress"
 ) -> tuple["BladePhoto", ...]:
     from scissorcal.vision.photo import read_photo
 
@@ -194,56 +115,24 @@ def _all_measured(
         for photograph in capture.index.photographs:
             tell(0.6 * len(seen) / count, f"measuring {photograph.source}")
             photo = replace(read_photo(capture.path(photograph)), source=photograph.source)
-            seen.append(_measured(photo, _camera_for(workspace, photo, setup), setup))
+            seen.append(_measured(photo, _camera_for(engine, photo, setup), setup))
     return tuple(seen)
-
-
-def _openings(seen: Sequence["BladePhoto"]) -> tuple["SeenOpening", ...]:
-    from scissorcal.calibration.edge.result import SeenOpening
-
-    return tuple(
-        SeenOpening(one.photo.source, one.scissors.opening)
-        for one in seen
-        if one.scissors is not None
-    )
-
-
-def _names(one: "BladePhoto") -> tuple[str, ...]:
-    """What the blades of a photograph are called: "blade" alone, else "left" and "right".
-
-    Left and right are as seen from the handles, so that they stay the same from photograph to
-    photograph as long as the scissors are not turned over.
-    """
-    if len(one.measured) != 2:
-        return ("blade",) * len(one.measured)
-    first, second = (measured.parts.axis for measured in one.measured)
-    # y runs down on the sheet, so that a positive turn is clockwise: to the right
-    turn = float(first[0] * second[1] - first[1] * second[0])
-    return ("left", "right") if turn > 0 else ("right", "left")
-
-
-def _sides(seen: Sequence["BladePhoto"]) -> dict[str, list["BladeMeasurement"]]:
-    """Measurements by blade."""
-    found: dict[str, list[BladeMeasurement]] = {}
-    for one in seen:
-        for name, measured in zip(_names(one), one.measured, strict=True):
-            found.setdefault(name, []).append(measured)
-    return dict(sorted(found.items()))
 
 
 def _fits(
     seen: Sequence["BladePhoto"],
     captures: Sequence[PhotoCapture],
-    recipe: "Recipe",
-    effort: "Effort",
-    seed: int,
-    tell: Progress,
+    engine: "Engine",
+    request: "Request",
 ) -> tuple["BladeFit", ...]:
+    import numpy as np
+
     from scissorcal.calibration.edge.fit import fit_blade
+    from scissorcal.vision.blade.photo import by_blade
 
     lengths = [c.index.blade.length_mm for c in captures if c.index.blade]
     known = next((1e-3 * length for length in lengths if length), None)
-    sides = _sides(seen)
+    sides = by_blade(seen)
     if not sides:
         raise InputError(
             "The scissors are closed in every photograph, and each blade hides the other's edge: "
@@ -251,77 +140,29 @@ def _fits(
         )
     fits = []
     for index, (name, measured) in enumerate(sides.items()):
-        rng = np.random.default_rng([seed, 3, index])
 
         def told(done: float, sentence: str, index: int = index, name: str = name) -> None:
-            tell(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
+            request.progress(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
 
         fits.append(
             fit_blade(
-                measured, recipe, effort=effort, rng=rng, name=name, length_m=known, progress=told
+                measured,
+                engine.recipe,
+                effort=request.effort,
+                rng=np.random.default_rng([request.seed, STREAM, index]),
+                name=name,
+                length_m=known,
+                progress=told,
             )
         )
     return tuple(fits)
 
 
-def _words(seen: "BladePhoto") -> str:
-    name = seen.photo.source
-    if seen.scissors is not None and not seen.measured:
-        return f"{name}: closed scissors; their edges hide each other"
-    parts = []
-    for one in seen.measured:
-        length = f"{1e3 * one.length:.2f} mm" if one.metric else f"{one.length:.0f} px"
-        parts.append(
-            f"{length} long, {len(one.station)} points, borders {one.edge.blur_px:.1f} px soft"
-        )
-    text = f"{name}: " + "; ".join(parts)
-    if seen.scissors is not None:
-        text += f"; open by {np.degrees(seen.scissors.opening):.1f} deg"
-    return text
+def _draw(seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"], folder: Path) -> None:
+    from scissorcal.calibration.edge.pictures import edge_picture
+    from scissorcal.vision.overlay import write_picture
 
-
-def _draw(
-    workspace: Workspace, seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"]
-) -> tuple[Path, ...]:
-    from scissorcal.vision.blade.picture import NickMark, as_png, blade_picture
-
-    folder = blade_path(workspace).with_suffix("")
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("*.png"):
-        old.unlink()
-    by_name = {fit.name: fit for fit in fits}
-    paths = []
+    by_name = {found.name: found for found in fits}
     for number, one in enumerate(seen, start=1):
-        edges, marks = [], []
-        for name, measured in zip(_names(one), one.measured, strict=True):
-            fit = by_name[name]
-            unit = measured.length / fit.belief.edge.length_m if not measured.metric else 1.0
-            edges.append(_scaled_edge(fit, unit))
-            marks.append(
-                [
-                    NickMark(nick.station_m * unit, _nick_words(nick.depth_m, fit.metric))
-                    for nick in fit.nicks
-                ]
-            )
-        picture = blade_picture(
-            one.photo, one.view, one.outline, one.measured, edges, marks, one.photo.source
-        )
-        path = folder / f"{number:03d}-{Path(one.photo.source).stem}.png"
-        part = path.with_name(path.name + ".part")
-        part.write_bytes(as_png(picture))
-        part.replace(path)
-        paths.append(path)
-    return tuple(paths)
-
-
-def _scaled_edge(fit: "BladeFit", unit: float) -> Callable[["np.ndarray"], "np.ndarray"]:
-    edge = fit.belief.edge
-    return lambda station: edge.offset_at(station / unit) * unit
-
-
-def _nick_words(depth: float, metric: bool) -> str:
-    return f"nick {1e3 * depth:.2f} mm" if metric else f"nick {100 * depth:.1f} %"
-
-
-def _pictures_of(workspace: Workspace, result: "BladeResult") -> tuple[Path, ...]:
-    return tuple(workspace.root / name for name in result.pictures)
+        name = f"{number:03d}-{Path(one.photo.source).stem}.png"
+        write_picture(edge_picture(one, by_name), folder / name)

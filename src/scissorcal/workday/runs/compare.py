@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import scissorcal
 from scissorcal.errors import InputError, MissingError
-from scissorcal.workday.runs.fit import current_fits
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
 
 if TYPE_CHECKING:
@@ -35,13 +36,13 @@ def compare_runs(
 
     sides = [load_side(path) for path in (first, second)]
     found = compare(*sides, created=now or datetime.now(UTC), version=scissorcal.__version__)
-    files = write_comparison(found, sides[0], sides[1], folder)
+    files = write_comparison(found, folder)
     return Compared(found, files.html, files.json)
 
 
 def load_side(path: Path) -> "Side":
     """Read one side of a comparison from wherever it lies."""
-    from scissorcal.report import read_twin, side_of
+    from scissorcal.report import Side, read_twin
 
     if path.is_dir():
         if not (path / RECIPE_FILE).is_file():
@@ -58,7 +59,7 @@ def load_side(path: Path) -> "Side":
     if path.suffix == ".nc":
         return _side_of_fit(path)
     try:
-        return side_of(read_twin(path.read_bytes()), str(path))
+        return Side(str(path), read_twin(path.read_bytes()))
     except (OSError, ValueError) as error:
         first = str(error).splitlines()[0]
         raise InputError(
@@ -68,21 +69,23 @@ def load_side(path: Path) -> "Side":
 
 
 def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
-    from scissorcal.report import facts_of, side_of
+    from scissorcal.report import Side, document_of
 
-    recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True)
-    return side_of(facts_of(recipe, list(fits.values())), source)
+    engine = Engine.of(workspace)
+    fits = [load_result(engine, what) for what in available(engine, ("friction", "cut"))]
+    if not fits:
+        raise MissingError(f"{source} has no current fit: run 'scissorcal fit' there first.")
+    return Side(source, document_of(engine.recipe, fits))
 
 
 def _side_of_fit(path: Path) -> "Side":
     """A fit alone: what it is of, its workspace says if it lies in one."""
     from scissorcal.calibration import load_fit
-    from scissorcal.report import side_of_fit
+    from scissorcal.report import Side, document_of_fit
 
     fit = load_fit(path)
     try:
         recipe = find_workspace(path.parent).recipe()
     except MissingError:
         recipe = None
-    return side_of_fit(fit, str(path), recipe)
+    return Side(str(path), document_of_fit(fit, recipe))

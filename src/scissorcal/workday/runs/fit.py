@@ -1,44 +1,76 @@
 """Fit what a workspace's scene requires, in order, and only where something changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.requirements import requirements
-from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.recordings import usable_recordings
-from scissorcal.workday.workspace import FitKind, Workspace
+from scissorcal.verdicts import Verdict
+from scissorcal.workday.engine import Engine, StepState
+from scissorcal.workday.history import save_version
+from scissorcal.workday.steps import BY_NAME, Step, steps_of
+from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.calibration import FitResult
     from scissorcal.calibration.result import Effort
 
 Progress = Callable[[float, str], None]
 Stop = Callable[[], bool]
 
-FIT_ORDER: tuple[FitKind, ...] = ("friction", "cut")
-"""Fits in the order in which they build on one another."""
+
+@dataclass(frozen=True)
+class Request:
+    """How a fit is to be made: effort, seed, identity of its inputs, and who follows it.
+
+    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on, ``last_model``
+    the model that the stored fit chose, empty where there is none. ``stop`` says whether the time
+    allowed is used up.
+    """
+
+    effort: "Effort"
+    seed: int
+    inputs_hash: str
+    checkpoint: Path
+    last_model: str
+    progress: Progress
+    stop: Stop
+
+
+@dataclass(frozen=True)
+class Made:
+    """A result, and how to draw its pictures into a folder; None where the report draws it."""
+
+    result: Any
+    draw: Callable[[Path], None] | None = None
+
+
+class FitModule(Protocol):
+    """What a module of runs/ gives for its fit: the computation."""
+
+    def fit(self, engine: Engine, request: Request) -> Made: ...
 
 
 @dataclass(frozen=True)
 class FitOutcome:
-    """One fit of a workspace: its result, its file, and whether it had to be done at all.
+    """One fit of a workspace: its result, file, pictures and state, and whether it was cached."""
 
-    ``verified`` says that there is a trust check of this very fit.
-    """
-
-    what: FitKind
-    result: "FitResult"
+    what: str
+    result: Any
     path: Path
+    pictures: tuple[Path, ...]
     cached: bool
-    verified: bool = False
+    state: StepState
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        return tuple(self.result.verdicts)
 
 
 def fit_workspace(
     workspace: Workspace,
-    wanted: Sequence[FitKind] = (),
+    wanted: Sequence[str] = (),
     *,
     effort: "Effort | None" = None,
     seed: int = 0,
@@ -46,225 +78,116 @@ def fit_workspace(
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> tuple[FitOutcome, ...]:
-    """Run the fits that the scene requires, each only where its inputs changed.
+    """Run the fits in ``wanted`` ("camera", "blade", "plate", "friction", "cut"), or all required.
 
-    ``wanted`` names fits; none means all that the scene requires. A cut's fit builds on that of
-    friction, which is run first where it is missing or its inputs changed. ``effort`` is the
-    recipe's where not given. A fit whose inputs hash (recordings, settings, effort, fits it builds
-    on) equals that of the stored one is read back instead; ``force`` does it again all the same.
-    Draft fits one law: the recipe's, else the one that the stored fit chose. ``stop`` says whether
-    the time allowed is used up; a fit that this ended is stored as one that is not current.
+    A fit whose identity equals that of the stored one is read back; ``force`` does those in
+    ``wanted`` again all the same. Fits that a wanted one builds on are run first where they are
+    missing or stale. ``effort`` is the recipe's where not given. The result that was there is kept
+    (`workday.history`).
 
     Raises InputError where the scene does not require what is wanted, MissingError where nothing
     was captured, and what the fits themselves raise.
     """
-    recipe = workspace.recipe()
-    needed = [item.name for item in requirements(recipe).fits]
-    order: list[FitKind] = [kind for kind in FIT_ORDER if kind in (wanted or needed)]
-    _refuse_unneeded(workspace, order, needed)
-    if "cut" in order and "friction" not in order and not _friction_is_current(workspace, recipe):
-        order.insert(0, "friction")
-    outcomes: list[FitOutcome] = []
-    for index, kind in enumerate(order):
-        share = progress_share(progress, index, len(order))
-        outcomes.append(_fit(workspace, recipe, kind, effort, seed, force, share, stop))
-    return tuple(outcomes)
+    engine = Engine.of(workspace)
+    steps = steps_to_fit(engine, wanted)
+    return tuple(
+        fit_step(
+            engine,
+            step,
+            effort=effort,
+            seed=seed,
+            force=force and (not wanted or step.what in wanted),
+            progress=share_of(progress, index, len(steps)),
+            stop=stop,
+        )
+        for index, step in enumerate(steps)
+    )
 
 
-def current_fits(
-    workspace: Workspace,
-    recipe: Recipe,
+def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
+    """The fits to run, in order: those wanted, or all required, and stale ones they build on.
+
+    Raises InputError where the scene does not require what is wanted.
+    """
+    needed = [step for step in steps_of("fit") if engine.needed(step.name)]
+    for what in wanted:
+        step = BY_NAME[f"fit {what}"]
+        if step not in needed and BY_NAME[step.inputs[0]].kind == "recordings":
+            listed = " and ".join(step.what for step in needed)
+            raise InputError(
+                f"{engine.workspace.recipe_path}: this scene requires no fit of {what}. It "
+                f"requires: {listed}."
+            )
+    names = {f"fit {what}" for what in wanted} or {step.name for step in needed}
+    for step in reversed(steps_of("fit")):
+        if step.name in names:
+            names |= {item for item in step.inputs if _must_run_first(engine, item)}
+    return [step for step in steps_of("fit") if step.name in names]
+
+
+def fit_step(
+    engine: Engine,
+    step: Step,
     *,
-    partial: bool = False,
-    wanted: Sequence[FitKind] = (),
-) -> "dict[FitKind, FitResult]":
-    """Load the fits that the scene requires, as far as they are of what is there now.
-
-    Raises MissingError naming the command where one is missing or its inputs changed since; with
-    ``partial`` it is enough that one is there. ``wanted`` names those that must be there; others
-    are left out, but for friction, which a cut builds on.
-    """
-    from scissorcal.calibration import load_fit
-
-    fits: dict[FitKind, FitResult] = {}
-    needed = [item.name for item in requirements(recipe).fits]
-    if wanted:
-        _refuse_unneeded(workspace, wanted, needed)
-        needed = [kind for kind in needed if kind in wanted or kind == "friction"]
-    for what in (kind for kind in FIT_ORDER if kind in needed):
-        path = workspace.fit_path(what)
-        if not path.is_file():
-            if partial and fits and what not in wanted:
-                continue
-            raise MissingError(f"There is no fit of {what} yet: run 'scissorcal fit' first.")
-        fits[what] = load_fit(path)
-        if fits[what].what != what:
-            raise InputError(
-                f"{path} holds a fit of {fits[what].what}: remove it and run 'scissorcal fit'."
-            )
-        if not is_current(workspace, recipe, fits[what], fits.get("friction")):
-            raise MissingError(
-                f"{path} was made from other recordings or settings than there are now: run "
-                "'scissorcal fit' first."
-            )
-    return fits
-
-
-def is_current(
-    workspace: Workspace, recipe: Recipe, fit: "FitResult", friction: "FitResult | None"
-) -> bool:
-    """Whether a fit's inputs are still what they were, at the fit's own effort.
-
-    ``friction`` is the friction fit as it is now, which a fit of a cut builds on.
-    """
-    upstream = _upstream(workspace, recipe, friction) if fit.what == "cut" else ""
-    return fit.inputs_hash == expected_hash(workspace, recipe, fit.what, fit.effort, upstream)
-
-
-def expected_hash(
-    workspace: Workspace, recipe: Recipe, what: FitKind, effort: str, upstream: str = ""
-) -> str:
-    """Return the inputs hash that a fit of the workspace would have now."""
-    from scissorcal.calibration import fit_inputs_hash
-    from scissorcal.calibration.cut import settings_of
-
-    settings = recipe.fit.friction.model_dump_json() if what == "friction" else settings_of(recipe)
-    recordings = usable_recordings(workspace, recipe, what).recordings
-    return fit_inputs_hash(what, recordings, settings, effort, upstream)
-
-
-def _upstream(workspace: Workspace, recipe: Recipe, friction: "FitResult | None") -> str:
-    """What a fit of a cut builds on now; what is missing or of no use gives a hash no fit has."""
-    from scissorcal.calibration.hashing import cut_upstream
-    from scissorcal.workday.geometry import edge_belief
-
-    try:
-        edge = edge_belief(workspace, recipe)
-    except (MissingError, InputError):
-        return "no fit of the blade"
-    return cut_upstream(friction.inputs_hash if friction else "", edge)
-
-
-def _fit(
-    workspace: Workspace,
-    recipe: Recipe,
-    what: FitKind,
-    effort: "Effort | None",
-    seed: int,
-    force: bool,
-    progress: Progress,
-    stop: Stop | None,
+    effort: "Effort | None" = None,
+    seed: int = 0,
+    force: bool = False,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
 ) -> FitOutcome:
-    import numpy as np
-
-    from scissorcal.calibration import fit_cut, fit_friction, load_fit, save_fit
-    from scissorcal.calibration.hashing import cut_upstream
-    from scissorcal.calibration.store import load_header
-    from scissorcal.workday.geometry import edge_belief, edge_verdicts
-
-    chosen: Effort = effort or recipe.fit.effort
-    progress(0.0, f"{what}: reading recordings")
-    usable = usable_recordings(workspace, recipe, what)
-    if not usable.recordings:
-        raise MissingError(_nothing_captured(workspace, what, usable.left_out))
-    friction = load_fit(workspace.fit_path("friction")) if what == "cut" else None
-    if friction is not None and friction.position_unit != "rad":
-        raise InputError(
-            f"{workspace.fit_path('friction')} is of a linear joint, which carries no blades: the "
-            "fit of a cut needs friction of the rig that cuts."
-        )
-    path = workspace.fit_path(what)
-    edge = edge_belief(workspace, recipe) if friction else None
-    upstream = cut_upstream(friction.inputs_hash, edge) if friction else ""
-    expected = expected_hash(workspace, recipe, what, chosen, upstream)
-    if path.is_file() and not force and load_header(path).inputs_hash == expected:
-        stored = load_fit(path)
-        return FitOutcome(what, stored, path, cached=True, verified=is_verified(workspace, stored))
-    rng = np.random.default_rng([seed, FIT_ORDER.index(what)])
-    checkpoint = workspace.checkpoint_path(what, expected)
-    before = last_chosen(workspace, what)
-    if friction is None:
-        result = fit_friction(
-            usable.recordings,
-            recipe.fit.friction,
-            effort=chosen,
-            rng=rng,
-            progress=progress,
-            checkpoint=checkpoint,
-            last_chosen=before,
-            stop=stop,
-        )
-    else:
-        result = fit_cut(
-            usable.recordings,
-            recipe,
-            friction,
-            effort=chosen,
-            rng=rng,
-            progress=progress,
-            edge=edge,
-            edge_verdicts=edge_verdicts(workspace, recipe),
-            checkpoint=checkpoint,
-            last_chosen=before,
-            stop=stop,
-        )
-    if result.rejected and stop is not None and stop():
-        result = _unfinished(result)
-    save_fit(result, path)
-    if not result.rejected:
-        checkpoint.unlink(missing_ok=True)
-    return FitOutcome(what, result, path, cached=False, verified=is_verified(workspace, result))
-
-
-def last_chosen(workspace: Workspace, what: FitKind) -> str | None:
-    """Name of the law that the stored fit chose, whatever its inputs; None where there is none."""
-    from scissorcal.calibration.store import load_header
-
-    path = workspace.fit_path(what)
-    try:
-        return load_header(path).rung if path.is_file() else None
-    except InputError:
-        return None
-
-
-def _unfinished(result: "FitResult") -> "FitResult":
-    """A fit that ran out of time, marked so that the next run does it again."""
-    note = (
-        "The time allowed was used up before the fit was finished; the next 'scissorcal fit' does "
-        "it again, with --max-minutes for as long as it needs."
+    """Run one fit, or read it back where its identity is the stored one's, unless ``force``."""
+    chosen: Effort = effort or engine.recipe.fit.effort
+    identity = engine.identity(step.name, chosen)
+    path = engine.file(step.name)
+    stored = _stored(engine, step, force)
+    current = stored.get("inputs") == identity or stored.get("imported")
+    if stored and current and not force and engine.state(step.name).state != "stale":
+        state = engine.state(step.name)
+        return FitOutcome(step.what, _load(step, path), path, pictures_beside(path), True, state)
+    _refuse_without_data(engine, BY_NAME[step.inputs[0]])
+    request = Request(
+        effort=chosen,
+        seed=seed,
+        inputs_hash=identity,
+        checkpoint=path.with_name(f"{step.what}-{identity[:12]}.chains"),
+        last_model=str(stored.get("model", "")),
+        progress=progress or (lambda done, sentence: None),
+        stop=stop or (lambda: False),
     )
-    return replace(
-        result, inputs_hash=f"unfinished:{result.inputs_hash}", notes=(*result.notes, note)
-    )
+    made = cast(FitModule, import_module(step.run)).fit(engine, request)
+    save_version(engine, step.name, made.result)
+    if made.draw:
+        made.draw(path.with_suffix(""))
+    state = engine.state(step.name)
+    if state.state != "incomplete":
+        request.checkpoint.unlink(missing_ok=True)
+    return FitOutcome(step.what, made.result, path, pictures_beside(path), False, state)
 
 
-def _refuse_unneeded(
-    workspace: Workspace, wanted: Sequence[FitKind], needed: Sequence[str]
-) -> None:
-    for kind in wanted:
-        if kind not in needed:
-            raise InputError(
-                f"{workspace.recipe_path}: this scene requires no fit of {kind}; it requires "
-                f"{' and '.join(needed)}."
-            )
+def load_result(engine: Engine, what: str) -> Any:
+    """Load a fit that is current: its state is neither missing nor stale.
+
+    Raises MissingError naming the command where it is, InputError where it cannot be read.
+    """
+    step = BY_NAME[f"fit {what}"]
+    state = engine.state(step.name)
+    if state.state == "missing" or not engine.file(step.name).exists():
+        raise MissingError(f"There is no fit of {what} yet: run '{step.command}' first.")
+    if state.state == "stale":
+        raise MissingError(
+            f"{engine.workspace.relative(engine.file(step.name))} is stale ({state.found}): run "
+            f"'{step.command}' first."
+        )
+    return _load(step, engine.file(step.name))
 
 
-def _friction_is_current(workspace: Workspace, recipe: Recipe) -> bool:
-    from scissorcal.calibration import load_fit
-
-    path = workspace.fit_path("friction")
-    return path.is_file() and is_current(workspace, recipe, load_fit(path), None)
-
-
-def _nothing_captured(workspace: Workspace, what: str, left_out: Sequence[str]) -> str:
-    because = "".join(f" {sentence}" for sentence in left_out)
-    return (
-        f"Nothing to fit: {workspace.captures_dir} has no {what} recording for this recipe."
-        f"{because} Take one with 'scissorcal capture {what} --device PORT' (or --device sim)."
-    )
+def available(engine: Engine, names: Sequence[str] = ()) -> tuple[str, ...]:
+    """The fits that the scene requires and that are neither missing nor stale nor unreadable."""
+    steps = [step for step in steps_of("fit") if not names or step.what in names]
+    return tuple(step.what for step in steps if _usable(engine, step))
 
 
-def progress_share(progress: Progress | None, index: int, count: int) -> Progress:
+def share_of(progress: Progress | None, index: int, count: int) -> Progress:
     """Give the part of a progress that one of several steps may fill."""
 
     def tell(done: float, sentence: str) -> None:
@@ -274,12 +197,55 @@ def progress_share(progress: Progress | None, index: int, count: int) -> Progres
     return tell
 
 
-def is_verified(workspace: Workspace, fit: "FitResult") -> bool:
-    """Whether there is a trust check of this very fit."""
-    from scissorcal.calibration.verify import load_verify
+def pictures_beside(path: Path) -> tuple[Path, ...]:
+    """Pictures that were drawn for a result: those in the folder of its name."""
+    return tuple(sorted(path.with_suffix("").glob("*.png")))
 
-    path = workspace.verify_path(fit.what)
+
+def _usable(engine: Engine, step: Step) -> bool:
+    state = engine.state(step.name)
+    current = state.state not in ("missing", "stale", "excluded") and bool(state.content)
+    return current and engine.needed(step.name)
+
+
+def _must_run_first(engine: Engine, item: str) -> bool:
+    step = BY_NAME[item.rstrip("?")]
+    return (
+        step.kind == "fit"
+        and not item.endswith("?")
+        and engine.needed(step.name)
+        and engine.state(step.name).state in ("missing", "stale")
+    )
+
+
+def _stored(engine: Engine, step: Step, force: bool) -> dict[str, Any]:
+    """Facts of the stored result; one that cannot be read counts as none where it is made again."""
+    if not engine.file(step.name).is_file():
+        return {}
     try:
-        return path.is_file() and load_verify(path).fit_hash == fit.inputs_hash
+        return engine.facts(step.name)
     except InputError:
-        return False
+        if force:
+            return {}
+        raise
+
+
+def _refuse_without_data(engine: Engine, capture: Step) -> None:
+    state = engine.state(capture.name)
+    if state.content:
+        return
+    if state.state == "failed":
+        raise InputError(" ".join((f"{capture.name}: {state.found}.", *state.notes)))
+    notes = "".join(f" {sentence}" for sentence in state.notes)
+    sim = " (or --device sim)" if capture.kind == "recordings" else ""
+    raise MissingError(
+        f"Nothing to fit ({capture.name}: {state.found}).{notes} Run '{capture.command}'{sim} "
+        "first."
+    )
+
+
+def _load(step: Step, path: Path) -> Any:
+    from scissorcal.calibration.store import load
+
+    module, _, name = step.holds.partition(":")
+    return load(path, getattr(import_module(module), name))

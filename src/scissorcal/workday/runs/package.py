@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from scissorcal.errors import InputError
-from scissorcal.recipe.requirements import requirements
+from scissorcal.errors import InputError, VerdictError
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.geometry import expected_package_hash, scene_plate
-from scissorcal.workday.runs.fit import current_fits
-from scissorcal.workday.runs.sign import ReviewState, review_state
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.sign import standing_review
+from scissorcal.workday.steps import BY_NAME
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
@@ -27,60 +26,80 @@ class Built:
     cached: bool
 
 
-def build_workspace_package(workspace: Workspace, *, seed: int = 0, force: bool = False) -> Built:
+def build_workspace_package(
+    engine: Engine, *, seed: int = 0, force: bool = False, allow_failed: bool = False
+) -> Built:
     """Compile the fits of a workspace into package/<recipe>.zip.
 
     The package carries the signature under the report, where there is one that stands. Nothing is
     done where the package there was built from the same fits, recipe and signature, unless
-    ``force``. Raises MissingError where a fit is missing or has fallen behind, and what
-    `scissorcal.package.build_package` raises.
+    ``force``. Raises VerdictError where a fit failed, unless ``allow_failed``, MissingError where a
+    fit is missing or stale, and what `scissorcal.package.build_package` raises.
     """
     import numpy as np
 
-    from scissorcal.package import (
-        build_package,
-        check_package,
-        open_package,
-        put_review,
-    )
+    from scissorcal.package import build_package, check_package, open_package, put_review
 
-    recipe = workspace.recipe()
-    if not requirements(recipe).tables:
+    if not engine.needed("package build"):
         raise InputError(
-            f"{workspace.recipe_path}: a linear joint carries no blades (rig.joint), so there is "
-            "no package to build; 'scissorcal report' shows its fit."
+            f"{engine.workspace.recipe_path}: a linear joint carries no blades (rig.joint), so "
+            "there is no package to build; 'scissorcal report' shows its fit."
         )
-    fits = current_fits(workspace, recipe)
-    friction, cut = fits.get("friction"), fits.get("cut")
-    plate = scene_plate(workspace, recipe)
-    path = workspace.package_path(recipe)
-    state = review_state(workspace, recipe, fits)
+    fits = _fits(engine)
+    if not allow_failed:
+        _refuse_failed(engine)
+    review, path = standing_review(engine), engine.file("package build")
     if path.is_file() and not force:
         try:
-            package = open_package(path)
+            package = open_package(path, warn=False)
         except InputError:
             package = None
-        expected = expected_package_hash(workspace, recipe, fits)
-        if package and package.manifest.provenance.inputs_hash == expected:
-            cached = package.manifest.review == state.valid
+        if package and package.manifest.provenance.inputs_hash == engine.identity("package build"):
+            cached = package.manifest.review == review
             if not cached:
-                package = put_review(package, state.valid, path)
-            warnings = _void(state) + package.warnings
+                package = put_review(package, review, path)
+            warnings = _void(engine) + package.warnings
+            engine.refresh()
             return Built(path, package.manifest, check_package(path), warnings, cached)
     summary = build_package(
-        recipe,
-        friction,
-        cut,
+        engine.recipe,
+        fits["friction"],
+        fits["cut"],
         path,
         np.random.default_rng(seed),
-        review=state.valid,
-        plate=plate,
+        review=review,
+        plate=fits["plate"],
+        inputs_hash=engine.identity("package build"),
+        allow_failed=allow_failed,
     )
-    warnings = _void(state) + summary.warnings
+    engine.refresh()
+    warnings = _void(engine) + summary.warnings
     return Built(path, summary.manifest, summary.verdicts, warnings, cached=False)
 
 
-def _void(state: ReviewState) -> tuple[str, ...]:
-    if not state.why:
+def _fits(engine: Engine) -> dict[str, Any]:
+    """The fits that the package is compiled from; None where the scene does not need one."""
+    found: dict[str, Any] = {}
+    for item in BY_NAME["package build"].inputs:
+        what = BY_NAME[item].what
+        found[what] = load_result(engine, what) if engine.needed(item) else None
+    return found
+
+
+def _refuse_failed(engine: Engine) -> None:
+    for item in BY_NAME["package build"].inputs:
+        state = engine.state(item)
+        if state.state == "failed":
+            raise VerdictError(
+                f"No package was built: the {item.replace('fit', 'fit of')} failed "
+                f"({', '.join(state.failed) or state.found}). Run '{state.command}'. "
+                "'scissorcal package build --allow-failed' builds one all the same, which says so "
+                "wherever it is used."
+            )
+
+
+def _void(engine: Engine) -> tuple[str, ...]:
+    state = engine.state("report sign")
+    if state.state != "stale":
         return ()
-    return (f"The signature under the report was not taken along: {state.why}.",)
+    return (f"The signature under the report is void and was left out: {state.found}.",)

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
-from scissorcal.workday.recordings import usable_recordings
-from scissorcal.workday.runs.fit import current_fits
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.recordings import used_recordings
+from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -63,11 +64,12 @@ def predict_workspace(
 
     tell = progress or (lambda done, sentence: None)
     _refuse_endings(table, plot)
-    recipe = workspace.recipe()
-    fit = current_fits(workspace, recipe, wanted=("friction",))["friction"]
+    engine = Engine.of(workspace)
+    recipe = engine.recipe
+    fit = load_result(engine, "friction")
     settings = recipe.fit.friction
     tell(0.0, "prediction: reading recordings")
-    own = usable_recordings(workspace, recipe, "friction").recordings
+    own = used_recordings(workspace, recipe, "friction", engine.index)
     given = read_motion(motion, own[0].joint, own[0].handle_radius_m)
     tell(0.2, "prediction: calibrating the band on what the fit had not seen")
     design = friction_experiment(own, settings, fit)
@@ -144,9 +146,9 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 def _headings(path: Path) -> list[str]:
     if path.suffix.lower() == ".parquet":
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from scissorcal.recording.parquetfile import require_pyarrow
 
+        pa, pq = require_pyarrow()
         try:
             return list(pq.read_schema(path).names)
         except (OSError, pa.ArrowException) as error:

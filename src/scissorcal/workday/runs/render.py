@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.load import read_text
-from scissorcal.workday.geometry import expected_package_hash
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import open_rig
-from scissorcal.workday.runs.fit import current_fits
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def render_workspace(
     from scissorcal.render import open_writer, render
 
     recipe = workspace.recipe()
-    package = open_package(package_path or workspace.package_path(recipe))
+    package = open_package(package_path or workspace.package_path(recipe), warn=False)
     with open_rig(device, recipe.specimen, seed) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
         path = workspace.new_recording("render") if record else None
@@ -70,34 +69,27 @@ def render_workspace(
 
 
 def package_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:
-    """What is wrong with the package that would be rendered, its review and fits, as sentences.
+    """What is to be known before the package is rendered: its review, its fits, and their states.
 
     Empty where there is none that can be opened, which rendering it then says.
     """
     from scissorcal.package import open_package
 
+    engine = Engine.of(workspace)
     try:
-        package = open_package(package_path or workspace.package_path(workspace.recipe()))
+        package = open_package(package_path or engine.file("package build"), warn=False)
     except ScissorcalError:
         return ()
-    return package.warnings
-
-
-def package_has_fallen_behind(workspace: Workspace) -> bool:
-    """Whether the workspace's package is of other fits or another recipe than there are now.
-
-    False where there is none that can be opened, which rendering it then says.
-    """
-    from scissorcal.package import open_package
-
-    recipe = workspace.recipe()
-    try:
-        manifest = open_package(workspace.package_path(recipe)).manifest
-    except ScissorcalError:
-        return False
-    try:
-        fits = current_fits(workspace, recipe)
-    except ScissorcalError:
-        return True
-    expected = expected_package_hash(workspace, recipe, fits)
-    return manifest.provenance.inputs_hash != expected
+    if package_path is not None:
+        return package.warnings
+    state = engine.state("package build")
+    said = []
+    if state.state == "stale":
+        said.append(f"The package is stale: {state.found}. Run '{state.command}'.")
+    said += [
+        f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether its "
+        f"intervals hold ('{engine.state(name).command}')."
+        for name in ("fit friction", "fit cut")
+        if engine.state(name).state == "unverified"
+    ]
+    return (*said, *package.warnings)

@@ -1,80 +1,33 @@
 """A workspace's track: the plate's pose from picture to picture, a line of JSON for each."""
 
-import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import TYPE_CHECKING, TextIO
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel
 
-from scissorcal.calibration.plate.store import PoseRecord, pose_record
+from scissorcal.calibration.plate.fit import plate_target
+from scissorcal.calibration.plate.track import (
+    TrackHead,
+    TrackRow,
+    TrackSummary,
+    track_row,
+    track_summary,
+    why_no_pose,
+)
 from scissorcal.errors import InputError
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-from scissorcal.vision.track import STATES, State, Tracked, track
-from scissorcal.workday.runs.camera import require_camera
-from scissorcal.workday.runs.plate import plate_target, workspace_rig
+from scissorcal.vision.track import STATES, track
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.plate import locate_workspace_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.vision.geometry.camera import Camera
-    from scissorcal.vision.geometry.pose import Pose
-    from scissorcal.vision.geometry.rig_frame import RigPose
     from scissorcal.vision.live import Frame
 
 Progress = Callable[[float, str], None]
-
-
-class TrackHead(BaseModel):
-    """First line of a track: what it is of, and in which frame its poses are."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    format: Literal["scissorcal-track/1"] = "scissorcal-track/1"
-    source: str = Field(description="camera's number or video file")
-    started_utc: str
-    frame: Literal["camera", "rig"] = Field(description="poses map the plate's frame into this one")
-    camera_inputs_hash: str
-
-
-class TrackRow(BaseModel):
-    """One picture. ``pose`` is null in a drop-out; ``other`` is the second pose that a plane
-    allows, ``odds`` those of the first against it, null where there is none."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    number: int
-    time_s: float = Field(description="since the first picture")
-    state: State
-    target: str | None = None
-    corners: int = 0
-    rms_px: float | None = None
-    odds: float | None = None
-    pose: PoseRecord | None = None
-    other: PoseRecord | None = None
-
-
-@dataclass(frozen=True)
-class TrackSummary:
-    """How a track went. ``states`` counts pictures, ``longest_gap_s`` is the longest time between
-    two poses (or to either end); sd are medians over the poses, of their worst axis."""
-
-    path: Path
-    frame: Literal["camera", "rig"]
-    pictures: int
-    poses: int
-    states: dict[State, int]
-    longest_gap_s: float
-    seconds: float
-    travel_mm: float
-    sd_mm: float
-    sd_deg: float
-
-    @property
-    def drop_outs(self) -> int:
-        return self.pictures - self.poses
 
 
 def track_plate(
@@ -92,11 +45,11 @@ def track_plate(
     all of it. Ends after ``seconds``, with the pictures, or by an interrupt from the keyboard.
     Raises InputError, and keeps nothing, where no picture showed the target.
     """
-    fitted = require_camera(workspace)
-    recipe = workspace.recipe()
-    located = workspace_rig(workspace, fitted.camera, recipe)
+    engine = Engine.of(workspace)
+    fitted = load_result(engine, "camera")
+    located = locate_workspace_rig(engine, fitted.camera)
     rig = None if located is None or located.untold else located
-    back = plate_target(recipe).inverse()
+    back = plate_target(engine.recipe).inverse()
     head = TrackHead(
         source=Path(source).name,
         started_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -112,7 +65,7 @@ def track_plate(
             _append(file, head)
             try:
                 for seen in track(counted, (PLATE_BOARD, PLATE_STRIP), fitted.camera):
-                    rows.append(_row(seen, fitted.camera, back, rig))
+                    rows.append(track_row(seen, fitted.camera, back, rig))
                     _append(file, rows[-1])
             except KeyboardInterrupt:
                 pass
@@ -120,50 +73,8 @@ def track_plate(
         if not any(row.pose for row in rows):
             path.unlink(missing_ok=True)
     if not any(row.pose for row in rows):
-        raise InputError(f"{source}: {_why_nothing(rows)} Nothing was kept.")
-    return summary(path, head, rows)
-
-
-def read_track(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
-    """Read a track; a last line that was cut short is left out. Raises InputError."""
-    try:
-        lines = path.read_text("utf-8").splitlines(keepends=True)
-        whole = [line for line in lines if line.endswith("\n")]
-        head = TrackHead.model_validate_json(whole[0] if whole else "")
-        return head, tuple(TrackRow.model_validate_json(line) for line in whole[1:])
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, ValidationError) as error:
-        why = str(error).splitlines()[0]
-        raise InputError(f"{path} is not a track of scissorcal, or it is damaged: {why}.") from None
-
-
-def track_schema() -> dict[str, Any]:
-    """JSON schema of a track's lines: the first is a head, each other one a row."""
-    from pydantic import TypeAdapter
-
-    schema: dict[str, Any] = TypeAdapter(TrackHead | TrackRow).json_schema()
-    dialect = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": dialect, "$id": "track.schema.json", **schema}
-
-
-def summary(path: Path, head: TrackHead, rows: Iterable[TrackRow]) -> TrackSummary:
-    """Count a track's drop-outs by what they came from, and say how well its poses are known."""
-    rows = tuple(rows)
-    posed = [row for row in rows if row.pose]
-    marks = [rows[0].time_s, *(row.time_s for row in posed), rows[-1].time_s]
-    spread = [_worst(row.pose) for row in posed if row.pose]
-    places = np.array([row.pose.translation_m for row in posed if row.pose])
-    return TrackSummary(
-        path=path,
-        frame=head.frame,
-        pictures=len(rows),
-        poses=len(posed),
-        states={state: sum(row.state == state for row in rows) for state in STATES},
-        longest_gap_s=float(np.diff(marks).max()),
-        seconds=rows[-1].time_s - rows[0].time_s,
-        travel_mm=float(1e3 * np.linalg.norm(places - places[0], axis=1).max()),
-        sd_mm=float(np.median([mm for mm, _ in spread])),
-        sd_deg=float(np.median([deg for _, deg in spread])),
-    )
+        raise InputError(f"{source}: {why_no_pose(rows)} Nothing was kept.")
+    return track_summary(path, head, rows)
 
 
 def _counted(
@@ -185,47 +96,9 @@ def _counted(
         yield frame
 
 
-def _row(seen: Tracked, camera: "Camera", back: "Pose", rig: "RigPose | None") -> TrackRow:
-    found = seen.found
-    if found is None:
-        return TrackRow(
-            number=seen.number, time_s=seen.time_s, state=seen.state, corners=seen.corners
-        )
-
-    pose = (rig.holds(found, camera) if rig else found.pose).after(back)
-    other = None
-    if found.other:
-        known = replace(rig.camera_rig, covariance=None).inverse() if rig else None
-        other = (known.after(found.other) if known else found.other).after(back)
-    return TrackRow(
-        number=seen.number,
-        time_s=seen.time_s,
-        state=seen.state,
-        target=seen.board.name if seen.board else None,
-        corners=seen.corners,
-        rms_px=found.rms_px,
-        odds=min(found.odds, 1e12) if found.other else None,
-        pose=pose_record(pose),
-        other=pose_record(other) if other else None,
-    )
-
-
 def _append(file: TextIO, line: BaseModel) -> None:
     file.write(line.model_dump_json() + "\n")
     file.flush()
-
-
-def _worst(pose: PoseRecord) -> tuple[float, float]:
-    sd = np.sqrt(np.diag(np.array(pose.covariance)))
-    return float(1e3 * sd[3:].max()), float(np.degrees(sd[:3].max()))
-
-
-def _why_nothing(rows: list[TrackRow]) -> str:
-    if not rows:
-        return "there was not one picture."
-    counts = {state: sum(row.state == state for row in rows) for state in STATES}
-    told = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items() if n)
-    return f"none of {len(rows)} pictures gave a pose of the plate's target ({told})."
 
 
 def _new_path(workspace: Workspace) -> Path:

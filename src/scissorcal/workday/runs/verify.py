@@ -1,21 +1,21 @@
 """The trust check of a workspace's fits: in parallel, resumable, kept beside the fit."""
 
-import hashlib
-import json
 import pickle
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.errors import InputError
-from scissorcal.recipe.schema import Recipe
+from scissorcal.errors import InputError, MissingError
+from scissorcal.identity import digest
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import Pool, open_pool
-from scissorcal.workday.recordings import usable_recordings
+from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.records import Record, RecordFile
-from scissorcal.workday.runs.fit import FIT_ORDER, current_fits, progress_share
+from scissorcal.workday.runs.cut import edge_of_photographs
+from scissorcal.workday.runs.fit import available, load_result, share_of
 from scissorcal.workday.workspace import FitKind, Workspace
 
 if TYPE_CHECKING:
@@ -80,21 +80,22 @@ def verify_workspace(
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    from scissorcal.calibration.verify import assess, make_study, save_verify, tasks_of
+    from scissorcal.calibration.store import save
+    from scissorcal.calibration.verify import assess, make_study, tasks_of
 
     chosen = settings or VerifySettings()
-    recipe = workspace.recipe()
-    fits = current_fits(workspace, recipe, partial=True, wanted=wanted)
-    kinds = [kind for kind in FIT_ORDER if kind in fits and kind in (wanted or fits)]
+    engine = Engine.of(workspace)
+    kinds = _kinds(engine, wanted)
     outcomes = []
     with open_pool(workers, cluster) as pool:
         for index, kind in enumerate(kinds):
-            tell = progress_share(progress, index, len(kinds))
+            tell = share_of(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
-            experiment, simulator, sheets = _experiment(workspace, recipe, kind, fits)
+            fit = load_result(engine, kind)
+            experiment, simulator, sheets = _experiment(engine, kind, fit)
             study = make_study(
                 experiment,
-                fits[kind],
+                fit,
                 simulator,
                 seed=chosen.seed,
                 prior=chosen.prior,
@@ -103,34 +104,47 @@ def verify_workspace(
             )
             tasks = tasks_of(study, chosen.checks, chosen.fits)
             partial = workspace.verify_partial_path(kind)
-            with RecordFile(partial, _inputs_hash(fits[kind], chosen)) as file:
+            with RecordFile(partial, _inputs_hash(engine, kind, chosen)) as file:
                 fitted = _run(pool, study, tasks, file, kind, tell)
                 wanted_tasks = {(task.kind, task.index) for task in tasks}
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
-                result = assess(study, fits[kind], chosen.checks, records)
-                path = workspace.verify_path(kind)
-                save_verify(result, path)
+                result = assess(study, fit, chosen.checks, records)
+                result = replace(result, fit_content=engine.identity(f"verify {kind}"))
+                path = engine.file(f"verify {kind}")
+                save(result, path)
+                engine.refresh()
             notes = (file.note,) if file.note else ()
             outcomes.append(VerifyOutcome(kind, result, path, fitted, notes))
     return tuple(outcomes)
 
 
+def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
+    """What is checked: the wanted fits, or those of the rig that are current."""
+    if wanted:
+        return list(wanted)
+    kinds: tuple[FitKind, ...] = ("friction", "cut")
+    there = available(engine, kinds)
+    if not there:
+        raise MissingError("There is no fit to check yet: run 'scissorcal fit' first.")
+    return [kind for kind in kinds if kind in there]
+
+
 def _experiment(
-    workspace: Workspace, recipe: Recipe, kind: FitKind, fits: "dict[FitKind, FitResult]"
+    engine: Engine, kind: FitKind, fit: "FitResult"
 ) -> "tuple[Experiment, Simulator, dict[int, int]]":
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
     from scissorcal.calibration.cut import cut_experiment
     from scissorcal.calibration.friction.fit import friction_experiment
     from scissorcal.calibration.verify import cut_simulator, friction_simulator
-    from scissorcal.workday.geometry import edge_belief
 
-    recordings = usable_recordings(workspace, recipe, kind).recordings
+    recipe = engine.recipe
+    recordings = used_recordings(engine.workspace, recipe, kind, engine.index)
     if kind == "friction":
-        settings, fit = recipe.fit.friction, fits["friction"]
+        settings = recipe.fit.friction
         empty = friction_experiment(recordings, settings, fit)
         return empty, friction_simulator(recordings, settings, fit, empty.layout), {}
-    edge = edge_belief(workspace, recipe)
-    friction, fit = fits["friction"], fits["cut"]
+    edge, _ = edge_of_photographs(engine)
+    friction: FitResult = load_result(engine, "friction")
     design = cut_experiment(recordings, recipe, friction, fit, edge)
     simulator = cut_simulator(recordings, recipe, friction, fit, design.layout, edge)
     return design, simulator, _sheets(recordings)
@@ -199,17 +213,17 @@ def _unpacked(blob: bytes) -> Any:
     return pickle.loads(blob)
 
 
-def _inputs_hash(fit: "FitResult", settings: VerifySettings) -> str:
-    """SHA-256 of all that single fits depend on; not of how many there are."""
-    facts = {
-        "algorithm": ALGORITHM,
-        "fit": fit.inputs_hash,
-        "draws": hashlib.sha256(fit.draws.tobytes()).hexdigest(),
-        "prior": settings.prior,
-        "spread": settings.spread,
-        "seed": settings.seed,
-    }
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+def _inputs_hash(engine: Engine, kind: FitKind, settings: VerifySettings) -> str:
+    """Identity of all that single fits depend on; not of how many there are."""
+    return digest(
+        {
+            "algorithm": ALGORITHM,
+            "fit": engine.identity(f"verify {kind}"),
+            "prior": settings.prior,
+            "spread": settings.spread,
+            "seed": settings.seed,
+        }
+    )
 
 
 def _duration(seconds: float) -> str:

@@ -23,7 +23,7 @@ from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, record, s
 from tests.calibration.truth import sweep
 
 COARSE = 2 * np.pi / 20_000
-FRICTION = FrictionLaw(coulomb_pos=COULOMB, coulomb_neg=COULOMB)
+FRICTION = FrictionLaw({"coulomb": COULOMB})
 
 
 def spring(opening):
@@ -55,7 +55,7 @@ def test_a_fine_encoder_is_hardly_smoothed():
     assert off(motion.opening, made.opening) < 0.35e-6
 
 
-def test_a_coarse_encoder_is_smoothed_by_what_the_drive_says():
+def test_a_coarse_encoder_is_smoothed_by_the_drive():
     """Better than its steps by 2.5 in place, and than differences of them by 5 in rate."""
     made = record(swing(), spring, step_rad=COARSE)
     motion = motion_of(made)
@@ -67,7 +67,7 @@ def test_a_coarse_encoder_is_smoothed_by_what_the_drive_says():
 
 
 @pytest.mark.parametrize("step_rad", [1e-5, COARSE])
-def test_the_error_of_the_rate_is_as_large_as_it_says(step_rad):
+def test_the_error_of_the_rate_matches_its_standard_deviation(step_rad):
     made = record(swing(), spring, step_rad=step_rad)
     motion = motion_of(made)
     assert 0.4 < off(motion.rate, made.rate) / motion.rate_sd.mean() < 2.0
@@ -172,7 +172,7 @@ def test_the_line_stays_within_what_the_sledge_did(hertz):
             assert advance[first] - 2e-6 < pair.min() <= pair.max() < advance[last] + 2e-6
 
 
-def test_a_sledge_that_goes_back_while_the_blades_stand_is_no_path():
+def test_a_sledge_that_moves_back_at_rest_does_not_count():
     """30 mm in 0.3 s before the blades turn, and then 0.05 m a rad: the line is that of the way."""
     motion = motion_of(record(np.concatenate([np.full(300, 0.6), sweep(0.6, 0.5, 0.2)]), spring))
     back = np.linspace(0.03, 0.0, 300)
@@ -200,7 +200,7 @@ def test_cogging_and_offset_are_taken_off():
 
 
 @pytest.mark.parametrize("late_ticks", [0.3, 1.0])
-def test_a_late_torque_is_mended_by_its_delay(late_ticks):
+def test_a_late_torque_is_corrected_by_its_delay(late_ticks):
     made = record(swing(), spring, late_ticks=late_ticks)
     motion = motion_of(made)
     turns = turning_points(motion.opening, 3e-3)
@@ -245,7 +245,7 @@ def test_noise_is_taken_from_friction_and_white_where_it_is_not_known():
     assert torque_noise_of({"residual_rms": 2e-3}).white_Nm == 2e-3
 
 
-def test_turns_that_are_undone_are_no_turns():
+def test_reversed_turns_are_tremor():
     """The first sample counts as one where the opening falls or rises from there."""
     way = np.concatenate(
         [
@@ -261,7 +261,7 @@ def test_turns_that_are_undone_are_no_turns():
     assert turning_points(np.full(20, 0.4), 1e-3) == []
 
 
-def test_spoilt_samples_stay_marked_and_a_gap_parts_a_motion():
+def test_invalid_samples_stay_marked_and_a_gap_splits_a_motion():
     made = record(swing(4.0), spring)
     usable = np.ones(4000, dtype=bool)
     usable[1000:1010] = False

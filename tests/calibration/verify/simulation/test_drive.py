@@ -19,7 +19,7 @@ from scissorcal.model import FrictionLaw
 from tests.calibration.truth import Truth, friction_recording
 
 SILENT = TorqueNoise(0.0, 0.0, 0.01)
-LAW = FrictionLaw(0.013, 0.016, 0.002, 0.002)
+LAW = FrictionLaw({"coulomb_pos": 0.013, "coulomb_neg": 0.016, "viscous": 0.002})
 INERTIA = 2e-4
 
 
@@ -33,7 +33,7 @@ def motion(recording):
     return motion_of((recording,), INERTIA)[0]
 
 
-def test_labels_times_and_steps_are_kept(recording, motion):
+def test_labels_times_and_resolutions_are_kept(recording, motion):
     truth = DriveTruth(INERTIA, LAW, TorqueNoise(1e-3, 5e-4, 0.02))
     (made,) = simulate_friction((motion,), truth, np.random.default_rng(2))
     (again,) = simulate_friction((motion,), truth, np.random.default_rng(2))
@@ -48,7 +48,7 @@ def test_labels_times_and_steps_are_kept(recording, motion):
 
 
 @pytest.mark.parametrize("cogging", [(0.0, 0.0, 0.0), (4e-4, -3e-4, 90.0)])
-def test_the_work_of_the_material_comes_back(recording, motion, cogging):
+def test_the_materials_work_is_recovered(recording, motion, cogging):
     """A torque of 5 to 25 mN m by place, without noise: over 20 mrad right to 0.05 mN m."""
 
     def material(opening):
@@ -93,7 +93,7 @@ def test_load_and_offsets_act_by_direction(motion):
         assert shifted[inner] - base[inner] == pytest.approx(-offset, abs=1e-9)
 
 
-def test_a_late_torque_is_a_late_torque(motion):
+def test_a_delay_shifts_the_simulated_torque(motion):
     piece = motion.pieces[0]
     plain = DriveTruth(INERTIA, LAW, SILENT)
     none = np.zeros(len(piece.opening) - 1)
@@ -103,7 +103,7 @@ def test_a_late_torque_is_a_late_torque(motion):
     assert late[1:] == pytest.approx(0.7 * base[1:] + 0.3 * base[:-1], abs=1e-12)
 
 
-def test_strokes_differ_by_what_they_are_said_to(motion):
+def test_strokes_differ_by_their_stated_offset(motion):
     piece = motion.pieces[0]
     plain = DriveTruth(INERTIA, LAW, SILENT)
     none = np.zeros(len(piece.opening) - 1)

@@ -1,4 +1,4 @@
-"""Opening and rate at every sample, smoothed as far as the encoder's steps ask for."""
+"""Opening and rate at every sample, smoothed according to the encoder's resolution."""
 
 from dataclasses import dataclass
 
@@ -15,23 +15,23 @@ Mask = NDArray[np.bool_]
 
 STRIDES = (1, 2, 4, 8, 16)
 CLEAR = 3.0
-"""The change of torque is measured at the shortest stride at which its differences exceed those
-of the encoder's steps so many times."""
+"""The change of torque is measured at the shortest stride at which its differences exceed those of
+the encoder's steps by this factor."""
 WALK_S, WALK_ROUNDS = 0.03, 6
-"""The change of torque is also measured over such a time, two swings at 80 Hz of blades that the
-material holds at a turn, in so many rounds of smoothing. On a virtual rig of 20,000 counts a turn
+"""The change of torque is also measured over this time (two oscillations at 80 Hz of blades that
+the material holds at a turn) in these rounds of smoothing. On a virtual rig of 20,000 counts a turn
 positions were wrong there by 187 urad with one walk for all, by 91, 64, 59, 57, 56, 56 urad after
 each round."""
 WALKS = 9
-"""Sizes of the walk, between the least and the most, at which the rate's error is worked out."""
+"""Number of sizes of the walk at which the rate's error is computed."""
 FINEST_STEP = 1e-7
 """Encoder step in rad (m) that is assumed where positions show none."""
 LEAST_PLACE_SD_M = 1e-6
 """Error of a place along the cut where the sledge's encoder shows no coarser steps."""
 STILL_S, STILL_STEPS, STILL_RAD_PER_S = 0.02, 4.0, 0.01
-"""Blades stand while they turn, over such a time, by less than so many steps of the encoder or at
-less than such a rate, a tenth of the slowest stroke's. Slower than four steps in 20 ms they may
-swing back at 30 Hz by less than a step, which nobody sees."""
+"""Blades rest while they turn, over this time, by fewer encoder steps or more slowly than these, a
+tenth of the slowest stroke's rate. Slower than four steps in 20 ms they may
+move back at 30 Hz by less than a step, which is unresolved."""
 RATE_WEIGHTS = np.array([-1.0, 8.0, 0.0, -8.0, 1.0]) / 12.0
 """Of five neighbouring positions, the last one first: exact for a polynomial of fourth degree."""
 HELD = 0.5
@@ -47,7 +47,7 @@ class PathMotion:
     ``drive_step`` its change over that tick, by which a delay of one tick would lower it.
     ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
     unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor
-    spoilt a sample, ``standing`` true where the blades do not turn. ``rate_sd`` is the error of
+    invalid a sample, ``standing`` true where the blades do not turn. ``rate_sd`` is the error of
     the rate, ``resolution`` the encoder's step, ``advance_sd`` (m) the error of a place along the
     cut.
     """
@@ -77,12 +77,11 @@ def path_motion(
 ) -> tuple[PathMotion, ...]:
     """Smooth the motion of recordings, one stretch without a gap after the other.
 
-    ``inertia`` (kg m^2) ties position and drive together: what is unknown is only the torque that
-    neither explains, which is taken as a random walk. The positions that are most probable then
-    follow the measured drive exactly, and the encoder as closely as its steps deserve (a Kalman
-    smoother, Rauch, Tung and Striebel 1965, doi:10.2514/3.3166, solved as one banded system). The
-    walk's size comes from the data: a fine encoder is hardly smoothed, a coarse one much, and less
-    where the torque changes fast, as it does while blades swing on the material that holds them.
+    ``inertia`` (kg m^2) relates position and drive; the unexplained torque is modelled as a random
+    walk. The most probable positions follow the measured drive exactly, and the encoder within its
+    resolution (a Kalman smoother, Rauch, Tung and Striebel 1965, doi:10.2514/3.3166, solved as one
+    banded system). The walk's size comes from the data: a fine encoder is hardly smoothed, a coarse
+    one more, and less where the torque changes fast, as while blades oscillate on the material.
     """
     found: list[PathMotion] = []
     offset = 0

@@ -1,4 +1,4 @@
-"""Work of the material between openings, and how well it is known."""
+"""Work of the material between openings, and its covariance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,10 +34,10 @@ class Material:
     """What the material does to the opening at each sample (n,).
 
     ``work`` (J) is what it did so far, ``torque`` (N m) what it does now: the former is summed and
-    exact, the latter carries the noise of an acceleration. Where blades stand, friction acts
-    against what they creep by on the whole: what a smoothed position trembles by is noise, and the
-    friction on it would add up. ``direction`` (n - 1,) is how dry
-    friction acts between samples, from -1 (closing) to 1, less where it has not built up.
+    exact, the latter carries the noise of an acceleration. Where blades rest, friction acts
+    along their mean creep: tremor of the smoothed position is noise, whose friction would add up.
+    ``direction`` (n - 1,) is how dry friction acts between samples, from -1 (closing) to 1, less
+    where it has not built up.
     """
 
     work: Array
@@ -54,18 +54,18 @@ def material_of(
     """Work and torque of the material along a motion.
 
     W = I omega^2 / 2 + sum of (F + offset - cog - drive) d(theta), so that between two samples the
-    material's mean torque over the path is the difference of W over that of the opening. No
-    acceleration enters, and it does not matter how fast the path was gone. ``cogging`` is
+    material's mean torque over the path is the difference of W over that of the opening,
+    independent of acceleration and speed. ``cogging`` is
     (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
     """
     path = motion.opening
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
     state, direction = None, np.sign(step)
-    if np.any(friction.presliding_share):
-        built = presliding_state(path, float(friction.presliding_length))
+    if np.any(friction["presliding_share"]):
+        built = presliding_state(path, float(friction["presliding_length"]))
         state = 0.5 * (built[1:] + built[:-1])
-        direction = direction + float(friction.presliding_share) * (state - direction)
+        direction = direction + float(friction["presliding_share"]) * (state - direction)
     law = friction_torque(friction, middle, _turning_rate(motion, step), 0.0, state)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
@@ -78,7 +78,7 @@ def material_of(
 
 
 def _turning_rate(motion: PathMotion, step: Array) -> Array:
-    """Rate (n - 1,) between samples; its mean for as long as the blades stand."""
+    """Rate (n - 1,) between samples; its mean while the blades rest."""
     rate = step / motion.tick_s
     still = np.concatenate([[False], motion.standing[1:] & motion.standing[:-1], [False]])
     starts, ends = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2).T
@@ -103,9 +103,9 @@ def mean_advance(motion: PathMotion, ends: Integers) -> Array:
 def advance_line(motion: PathMotion, ends: Integers) -> Array:
     """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
 
-    By the straight line over the opening that is nearest to it along the path, within what the
-    sledge did: single samples carry the steps of the encoder. What the sledge does while the
-    blades stand is no path.
+    By the regression line over the opening along the path, within the sledge's range: single
+    samples carry the steps of the encoder. Motion of the sledge while the blades rest does not
+    count.
     """
     low, high = int(ends[0]), int(ends[-1])
     path, place = motion.opening[low : high + 1], motion.advance[low : high + 1]
@@ -119,7 +119,7 @@ def advance_line(motion: PathMotion, ends: Integers) -> Array:
     middle, advance = 0.5 * (path[1:] + path[:-1]), 0.5 * (place[1:] + place[:-1])
     centre, mean = (sums_between(x * weight, inside) / whole for x in (middle, advance))
     away, beyond = middle - centre[segment], advance - mean[segment]
-    # Between two samples both go on straight: a twelfth of a step's product is theirs.
+    # linear motion between samples adds a twelfth of a step's product
     spread = sums_between((away**2 + step**2 / 12.0) * weight, inside)
     slope = sums_between((beyond * away + gone * step / 12.0) * weight, inside) / spread
     first, last = motion.opening[ends[:-1]] - centre, motion.opening[ends[1:]] - centre

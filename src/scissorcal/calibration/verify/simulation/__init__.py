@@ -1,4 +1,4 @@
-"""Raw recordings of a known truth, over the motion of recordings that there are."""
+"""Simulated raw recordings of known parameters, with the motion of existing recordings."""
 
 from scissorcal.calibration.verify.simulation.crack import (
     Sheet,

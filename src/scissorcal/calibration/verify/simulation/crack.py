@@ -1,4 +1,4 @@
-"""What a material does to blades along a motion: cracks walked exactly, toughness that varies."""
+"""The material's torque along a motion: exact crack growth through varying toughness."""
 
 from dataclasses import dataclass
 
@@ -17,12 +17,12 @@ RESPONSE_KNOTS = 801
 RESPONSE_SPAN = (1e-4, 1e2)
 """Indentations of the response's table, in references; a power law is exact at any."""
 SMOOTH_FROM = 0.999
-"""Kappa from which teeth are so short that a crack is taken to run along."""
+"""Kappa from which a crack is simulated as smooth, since its teeth are very short."""
 CELLS = 40
 """Cells of the toughness over the length on which it varies."""
 MOST_CELLS = 100_000
 LEAST_TOUGHNESS = 0.05
-"""Share of the mean energy that a place keeps, however uneven the sheet."""
+"""Least local energy, as a share of the mean."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Unevenness:
     """How toughness varies: an Ornstein-Uhlenbeck process over each sheet, and between sheets.
 
     ``variation`` and ``sheet_variation`` are relative standard deviations, ``length_m`` is the
-    distance over which the process forgets.
+    correlation length.
     """
 
     variation: float = 0.0

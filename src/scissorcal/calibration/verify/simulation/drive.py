@@ -1,4 +1,4 @@
-"""The torque that drives a motion, as a rig with a known truth would have measured it."""
+"""The drive torque that a rig with known parameters would have measured along a motion."""
 
 from dataclasses import dataclass
 
@@ -23,8 +23,7 @@ class DriveTruth:
     sine, periods per turn) of what it gives besides. ``load_share`` of the material's torque is
     added to friction. ``closing_offset`` and ``opening_offset`` (N m) are added to the
     material's torque by direction, ``stroke_sd`` (N m) is what single strokes differ by.
-    ``delay_s`` is how much later than its sample says the torque is measured, ``noise``
-    what is added to each sample.
+    ``delay_s`` is the delay of the torque measurement, ``noise`` that of each sample.
     """
 
     inertia: float
@@ -50,8 +49,8 @@ def measured_drive(
         inertia * acceleration = drive - friction - offset - cogging + material
 
     holds exactly for means around each sample, as the second difference of the positions weighs
-    them; a sample shows it a delay later. Dry friction of a joint that is nearly at rest may be
-    anything up to its level: it is taken in proportion to the speed there.
+    them; a sample shows it a delay later. Dry friction of a joint nearly at rest is anything up to
+    its level; it is taken in proportion to the speed there.
     """
     path, tick_s = piece.opening, piece.tick_s
     step = np.diff(path)
@@ -59,9 +58,9 @@ def measured_drive(
     sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
     direction, state = np.sign(step), None
     law = truth.friction
-    if np.any(law.presliding_share):
-        state = _built(path, float(law.presliding_length))
-        direction = direction + float(law.presliding_share) * (state - direction)
+    if np.any(law["presliding_share"]):
+        state = _built(path, float(law["presliding_length"]))
+        direction = direction + float(law["presliding_share"]) * (state - direction)
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
     dry = sense * friction_torque(law, middle, step / tick_s, load, state)
     cosine, sine, number = truth.cogging
@@ -80,7 +79,7 @@ def measured_drive(
 
 
 def drawn_noise(noise: TorqueNoise, count: int, tick_s: float, rng: np.random.Generator) -> Array:
-    """Noise (count,) of two time scales: white, and one that lasts."""
+    """Noise (count,): a white and an exponentially correlated part."""
     from scipy.signal import lfilter
 
     white = noise.white_Nm * rng.standard_normal(count)

@@ -1,4 +1,4 @@
-"""The motion of a recording, as a smooth path that other torques may have driven."""
+"""The motion of a recording as a smooth path, to be simulated with other torques."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 PATH_SD = 2.0
-"""Standard deviation in samples of a Gaussian that takes off what is left of the encoder's steps:
-accelerations of a rough path would stand in the torque that drives it."""
+"""Standard deviation in samples of a Gaussian that removes the rest of the encoder's steps, whose
+accelerations would appear in the simulated torque."""
 SLEDGE_SD = 10.0
 REST_S = 0.005
-"""Below one step of the encoder in so long a joint counts as nearly at rest."""
+"""A joint that moves less than one encoder step in this time is nearly at rest."""
 REST_RATES = (1e-6, 1e-2)
-"""Least and largest of the speeds (rad/s or m/s) that this may give."""
+"""Bounds of the resulting speed (rad/s or m/s)."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class SmoothPiece:
 
 @dataclass(frozen=True)
 class Motion:
-    """A recording to be made anew: its pieces, and the steps of its channels (NaN for none)."""
+    """A recording to be simulated: its pieces, and its channels' resolutions (NaN for none)."""
 
     recording: Recording
     pieces: tuple[SmoothPiece, ...]
@@ -55,7 +55,7 @@ class Motion:
     torque_step: float
 
     def with_drive(self, drives: Sequence[Array]) -> Recording:
-        """The recording with the same motion, quantised anew, and with other drives.
+        """The recording with the same motion, quantised again, and with other drives.
 
         ``drives`` are by piece and sample (N m): motor less handle. The handle's force, labels and
         time stamps are kept; samples outside the pieces stay as they were.
@@ -80,7 +80,7 @@ class Motion:
 def motion_of(recordings: tuple[Recording, ...], inertia: float) -> tuple[Motion, ...]:
     """The smooth motion of recordings, from :func:`~scissorcal.calibration.cut.path.path_motion`.
 
-    ``inertia`` (kg m^2) is what their smoothing takes; what moves is kept, what drove it is not.
+    ``inertia`` (kg m^2) is used to smooth the path.
     """
     found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
     for motion in path_motion(recordings, inertia):
@@ -117,7 +117,8 @@ def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
 
 
 def _smoothed(values: Array, sd: float) -> Array:
-    """A path (n,) under a Gaussian of ``sd`` samples; its ends go on as they come."""
+    """A path (n,) smoothed by a Gaussian of ``sd`` samples; its ends are continued by "
+    "reflection."""
     from scipy.ndimage import gaussian_filter1d
 
     reach = min(int(4 * sd), len(values) - 1)

@@ -1,4 +1,4 @@
-"""Raw recordings of a known truth, over the motion of recordings that there are."""
+"""Simulated recordings of friction and cuts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,17 +9,14 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import cutting_from
-from scissorcal.calibration.friction.model import friction_law
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.verify.simulation.crack import Unevenness, material_torque
 from scissorcal.calibration.verify.simulation.drive import DriveTruth, measured_drive
 from scissorcal.calibration.verify.simulation.motion import Motion
-from scissorcal.model import Cutting
+from scissorcal.model import Cutting, FrictionLaw
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
-
-_NO_FRICTION = ("inertia", "offset", "delay", "noise", "cogging_cos", "cogging_sin")
 
 
 @dataclass(frozen=True)
@@ -41,10 +38,9 @@ def friction_truth(
 
     ``noise`` and ``stroke_sd`` (N m) are by sample and by stroke.
     """
-    law = {n: np.asarray(v) for n, v in values.items() if n not in _NO_FRICTION}
     return DriveTruth(
         inertia=float(values["inertia"]),
-        friction=friction_law(law, float(structure["angle_center"])),
+        friction=FrictionLaw.of_fit(values, float(structure["angle_center"])),
         noise=noise,
         offset=float(values.get("offset", 0.0)),
         cogging=(
@@ -62,7 +58,7 @@ def cut_truth(
 ) -> CutTruth:
     """The material and the rig that parameters of a cut's fit, by name, and its structure describe.
 
-    Friction, inertia and cogging are those of the empty sweeps; what these left open is in the
+    Friction, inertia and cogging are those of the empty sweeps; their uncertainty is in the
     offsets among ``values``. Unevenness counts only where something is cut.
     """
     cutting = cutting_from(structure, {n: np.asarray(v) for n, v in values.items()})
@@ -110,7 +106,7 @@ def simulate_friction(
 def simulate_cut(
     motions: tuple[Motion, ...], truth: CutTruth, rng: np.random.Generator
 ) -> tuple[Recording, ...]:
-    """Recordings of cuts (or presses), raw samples; every sheet is drawn anew.
+    """Recordings of cuts (or presses), raw samples; every sheet is a new draw.
 
     A sheet that lies in two pieces of a recording, with a gap between them, is walked as one.
     """

@@ -1,0 +1,185 @@
+"""Write docs/api, and the table of docs/verdicts.md, from the code.
+
+    python docs/make_api.py --write     # after a change of public docstrings
+    python docs/make_api.py --check     # exit code 1 if a page is not up to date
+
+One page per room: every name in the room's ``__all__`` with its signature and its docstring.
+"""
+
+import argparse
+import ast
+import importlib
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from scissorcal.verdicts import MEANINGS, TORQUE
+
+DOCS = Path(__file__).parent
+ROOMS = (
+    "scissorcal",
+    "scissorcal.recording",
+    "scissorcal.model",
+    "scissorcal.inference",
+    "scissorcal.calibration",
+    "scissorcal.package",
+    "scissorcal.kernel",
+    "scissorcal.report",
+    "scissorcal.errors",
+    "scissorcal.verdicts",
+)
+TABLE_HEAD = "| scope | check | limit | bounds | what the value is, and what it guards |"
+
+
+def main() -> int:
+    """Write or check every page; returns the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    choice = parser.add_mutually_exclusive_group(required=True)
+    choice.add_argument("--write", action="store_true")
+    choice.add_argument("--check", action="store_true")
+    wanted = pages()
+    if parser.parse_args().write:
+        for path, text in wanted.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        return 0
+    stale = stale_pages(wanted)
+    for path in stale:
+        print(f"{path} is not up to date: run 'make api'.", file=sys.stderr)
+    return 1 if stale else 0
+
+
+def pages() -> dict[Path, str]:
+    """Return every generated page by its path."""
+    modules = [importlib.import_module(name) for name in ROOMS]
+    found = {DOCS / "api" / f"{m.__name__}.md": _room_page(m) for m in modules}
+    found[DOCS / "api" / "index.md"] = _index(modules)
+    verdicts = DOCS / "verdicts.md"
+    head = verdicts.read_text(encoding="utf-8").partition(TABLE_HEAD)[0]
+    found[verdicts] = head + _verdict_table()
+    return found
+
+
+def stale_pages(wanted: dict[Path, str]) -> list[Path]:
+    """Return the pages that differ from what the code gives, and those that it no longer has."""
+    differ = [p for p, text in wanted.items() if not p.is_file() or p.read_text("utf-8") != text]
+    return differ + sorted(set((DOCS / "api").glob("*.md")) - set(wanted))
+
+
+def _index(modules: list[ModuleType]) -> str:
+    lines = ["# API", "", "Generated from the docstrings by `make api`.", ""]
+    lines += ["| room | content | names |", "|---|---|---|"]
+    for module in modules:
+        names = ", ".join(f"`{name}`" for name, _ in _public(module))
+        lines.append(
+            f"| [{module.__name__}]({module.__name__}.md) | {_summary(module)} | {names} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def _room_page(module: ModuleType) -> str:
+    parts = [f"# {module.__name__}", "", *_text(module)]
+    for name, thing in _public(module):
+        parts += [f"## {name}", ""]
+        if inspect.isclass(thing):
+            parts += _class(name, thing)
+        elif callable(thing):
+            parts += [*_signature(name, thing), *_text(thing)]
+        else:
+            parts += [f"`{name}` of type `{type(thing).__name__}`.", ""]
+    return "\n".join(parts)
+
+
+def _public(module: ModuleType) -> Iterator[tuple[str, Any]]:
+    names = getattr(module, "__all__", None) or [
+        name
+        for name, thing in vars(module).items()
+        if not name.startswith("_") and getattr(thing, "__module__", "") == module.__name__
+    ]
+    for name in sorted(names):
+        if not name.startswith("__"):
+            yield name, getattr(module, name)
+
+
+def _class(name: str, thing: type) -> list[str]:
+    parts = _fields(name, thing) + _text(thing)
+    for member, value in vars(thing).items():
+        if member.startswith("_"):
+            continue
+        if isinstance(value, property):
+            parts += [f"### {name}.{member}", "", *_text(value.fget)]
+        elif inspect.isfunction(value) or isinstance(value, (classmethod, staticmethod)):
+            function = inspect.unwrap(getattr(thing, member))
+            parts += [f"### {name}.{member}", "", *_signature(member, function), *_text(function)]
+    return parts
+
+
+def _fields(name: str, thing: type) -> list[str]:
+    """The fields of a dataclass or a pydantic model, as the source has them."""
+    body = _parsed(thing)
+    if not isinstance(body, ast.ClassDef):
+        return []
+    fields = [ast.unparse(node) for node in body.body if isinstance(node, ast.AnnAssign)]
+    return _fenced(name, [f for f in fields if not f.startswith("_")], "") if fields else []
+
+
+def _signature(name: str, thing: Any) -> list[str]:
+    """Arguments and result, as the source has them: types keep their short names."""
+    function = _parsed(thing)
+    if not isinstance(function, ast.FunctionDef):
+        return []
+    parts = re.split(r", (?=\*{0,2}\w+(?::|=|,|$)|\*$|\*,|/)", ast.unparse(function.args))
+    result = f" -> {ast.unparse(function.returns)}" if function.returns else ""
+    return _fenced(name, [part for part in parts if part not in ("", "self", "cls")], result)
+
+
+def _fenced(name: str, parts: list[str], result: str) -> list[str]:
+    one = f"{name}({', '.join(parts)}){result}"
+    if len(one) > 96:
+        one = f"{name}(\n    " + ",\n    ".join(parts) + f",\n){result}"
+    return ["```python", one, "```", ""]
+
+
+def _parsed(thing: Any) -> ast.AST | None:
+    try:
+        return ast.parse(textwrap.dedent(inspect.getsource(thing))).body[0]
+    except (TypeError, OSError):
+        return None
+
+
+def _summary(thing: Any) -> str:
+    return (inspect.getdoc(thing) or "").partition("\n")[0]
+
+
+def _text(thing: Any) -> list[str]:
+    """The docstring as Markdown: examples in fences, the rest as it stands."""
+    lines: list[str] = []
+    fenced = False
+    for line in (inspect.getdoc(thing) or "").splitlines():
+        example = line.lstrip().startswith((">>>", "..."))
+        if example and not fenced:
+            lines += ["```pycon"]
+            fenced = True
+        elif fenced and not line.strip():
+            lines += ["```"]
+            fenced = False
+        lines.append(line if fenced else re.sub(r":\w+:`~?([^`]+)`", r"`\1`", line))
+    return [*lines, *(["```"] if fenced else []), ""] if lines else []
+
+
+def _verdict_table() -> str:
+    rows = [TABLE_HEAD, "|---|---|---|---|---|"]
+    for key, (limit, guards) in MEANINGS.items():
+        scope, _, check = key.partition(" ")
+        kind = "torque" if guards.startswith(TORQUE) else ""
+        rows.append(f"| {scope} | *{check}* | {limit} | {kind} | {guards.removeprefix(TORQUE)} |")
+    return "\n".join([*rows, ""])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

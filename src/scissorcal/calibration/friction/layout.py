@@ -1,0 +1,81 @@
+"""The parameters of a friction fit: rows of the table of terms, with the recipe's priors."""
+
+from dataclasses import dataclass
+
+from scissorcal.calibration.parameters import Layout, Parameter
+from scissorcal.model.friction_terms import PARAMETERS, REFERENCE, TERMS, terms_of
+from scissorcal.model.terms import Term
+from scissorcal.recipe.priors import FrictionPriors
+from scissorcal.recording.recording import Joint
+
+SIDES = {"": "", "_pos": ", positive rate", "_neg": ", negative rate"}
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What of the drive is fitted with friction.
+
+    ``cogging`` adds the two parameters of a torque that repeats over the opening. ``held_tick_s``
+    is the sampling interval where the drive is held by commands, so that it is measured late; None
+    where it is not.
+    """
+
+    cogging: bool = False
+    held_tick_s: float | None = None
+
+
+def friction_layout(
+    law: str,
+    symmetric: bool,
+    joint: Joint,
+    priors: FrictionPriors,
+    adopt: tuple[str, ...] = (),
+    drive: Drive | None = None,
+) -> Layout:
+    """Lay out the parameters of a law and of the terms that it adopts; ``noise`` stands last.
+
+    An asymmetric law has no offset: its unequal Coulomb levels contain it.
+    """
+    drive = drive or Drive()
+    left_out = {
+        "offset": not symmetric,
+        "cogging_cos": not drive.cogging,
+        "cogging_sin": not drive.cogging,
+        "delay": drive.held_tick_s is None,
+    }
+    own = terms_of(law)
+    rows: list[Parameter] = []
+    for term in PARAMETERS.values():
+        if left_out.get(term.name, bool(term.part) and term not in own):
+            continue
+        if term.nuisance and adopt:
+            rows += _adopted(adopt, joint, priors)
+            adopt = ()
+        rows += _rows(term, symmetric, joint, priors, drive.held_tick_s or 1.0)
+    return Layout(tuple(rows))
+
+
+def _rows(
+    term: Term, symmetric: bool, joint: Joint, priors: FrictionPriors, tick_s: float
+) -> list[Parameter]:
+    mean, sd = priors.of(term, joint.kind)
+    if term.prior is not None and term.prior.in_ticks:
+        mean, sd = mean * tick_s, sd * tick_s
+    unit = term.unit(joint.position_unit, joint.effort_unit)
+    return [
+        Parameter(
+            name, unit, term.transform, mean, sd, term.meaning + SIDES[name.removeprefix(term.name)]
+        )
+        for name in term.names(symmetric)
+    ]
+
+
+def _adopted(names: tuple[str, ...], joint: Joint, priors: FrictionPriors) -> list[Parameter]:
+    """Adopted terms: normal around 0, with the recipe's sd of their effort at the reference."""
+    rows = []
+    for term in (TERMS[name] for name in names):
+        size = abs(float(term.column(REFERENCE[joint.kind])))
+        unit = term.unit(joint.position_unit, joint.effort_unit)
+        sd = priors.adopted(joint.kind) / size
+        rows.append(Parameter(term.name, unit, term.transform, 0.0, sd, f"adopted: {term.meaning}"))
+    return rows

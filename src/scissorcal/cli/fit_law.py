@@ -1,0 +1,98 @@
+"""What ``scissorcal fit friction`` and ``scissorcal fit cut`` say."""
+
+from typing import TYPE_CHECKING
+
+from scissorcal.cli.output import table
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from scissorcal.calibration.result import FitResult, FittedParameter
+    from scissorcal.workday.runs.fit import FitOutcome
+
+
+def facts(outcome: "FitOutcome") -> dict[str, object]:
+    """What ``--json`` prints of a fit, but for its parameters."""
+    fitted: FitResult = outcome.result
+    return {
+        "what": outcome.what,
+        "cached": outcome.cached,
+        "state": outcome.state.state,
+        "rung": fitted.rung,
+        "parameters": [parameter.name for parameter in fitted.parameters],
+        "effort": fitted.effort,
+        "calibration": not fitted.rejected,
+        "rungs": fitted.rungs,
+        "selection": fitted.selection,
+        "critic": fitted.critic,
+        "replay": fitted.replay,
+        "diagnostics": fitted.diagnostics,
+        "held_out": fitted.held_out,
+        "inputs_hash": fitted.inputs_hash,
+        "notes": fitted.notes,
+    }
+
+
+def text(outcome: "FitOutcome") -> str:
+    """What people read of a fit of friction or of a cut."""
+    fitted: FitResult = outcome.result
+    head = f"{outcome.what}: {fitted.rung} ({fitted.effort})"
+    if outcome.cached:
+        head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
+    if fitted.rejected:
+        reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
+        shown = _shown(outcome).replace("\n", "\n  ")
+        return (
+            f"{outcome.what}: not a calibration:\n{reasons}\n"
+            f"{head}; the search ended with these numbers, which are not to be used:\n  {shown}"
+        )
+    said = [head, _shown(outcome), fitted.selection]
+    said += [proposal.sentence for proposal in fitted.critic]
+    said += [fitted.replay.sentence] if fitted.replay else []
+    said += outcome.state.notes
+    if outcome.state.state == "unverified":
+        said.append(
+            f"unverified: 'scissorcal verify {outcome.what}' checks whether these intervals hold."
+        )
+    return "\n".join(line for line in said if line)
+
+
+def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
+    return (*outcome.result.parameters, *outcome.result.derived)
+
+
+def parameter_facts(outcome: "FitOutcome") -> list[dict[str, object]]:
+    """Parameters as ``--json`` prints them, each with what is known to be poor about it."""
+    from scissorcal.calibration.caveats import caveats_by_parameter
+
+    known = caveats_by_parameter(outcome.result)
+    return [
+        {**parameter.as_dict(), "caveats": list(known.get(parameter.name, ()))}
+        for parameter in _reported(outcome)
+    ]
+
+
+def _shown(outcome: "FitOutcome") -> str:
+    """The table of parameters, and below it which of their intervals are known to be poor."""
+    from scissorcal.calibration.caveats import caveats_of
+
+    known = caveats_of(outcome.result)
+    marked = {name for caveat in known for name in caveat.parameters}
+    lines = [parameter_table(_reported(outcome), marked)]
+    lines += [f"* {', '.join(caveat.parameters)}: {caveat.sentence}" for caveat in known]
+    return "\n".join(lines)
+
+
+def parameter_table(
+    parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
+) -> str:
+    """Set out fitted parameters for people; those that are ``marked`` get an asterisk."""
+    rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", "identifiability"]]
+    for parameter in parameters:
+        numbers = (parameter.mean, parameter.sd, parameter.q05, parameter.q95)
+        rows.append(
+            [f"{parameter.name} *" if parameter.name in marked else parameter.name, parameter.unit]
+            + [f"{number:.4g}" for number in numbers]
+            + [f"{parameter.identifiability:.2f}"]
+        )
+    return table(rows, right=range(2, 7))

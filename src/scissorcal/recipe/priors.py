@@ -1,0 +1,197 @@
+"""Priors as a recipe states them, and those of friction, one key for each row of its table.
+
+Every default is an argument about machines of the kind, written beside its number
+(:mod:`scissorcal.model.friction_terms`); none is taken from the data that a fit then judges.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from scissorcal.model.friction_terms import ADOPTED, PARAMETERS
+from scissorcal.model.terms import JointKind, Prior, Term
+from scissorcal.model.transforms import IDENTITY, LOG, LOGIT, Transform
+
+
+class Section(BaseModel):
+    """Base of every table of the recipe: frozen, strict about keys, types and numbers."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+class LogNormalPrior(Section):
+    """A positive quantity, log-normal: ``median``, and the factor that holds 90 % of it.
+
+    ``{ median = 3000, factor_90 = 10 }`` says: between 300 and 30000 with 90 % probability.
+    """
+
+    median: Annotated[float, Field(ge=1e-9, le=1e9, allow_inf_nan=False)]
+    factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
+
+    @property
+    def transform(self) -> Transform:
+        """What the prior is normal in."""
+        return LOG
+
+    @property
+    def log_sd(self) -> float:
+        """Standard deviation of the logarithm."""
+        return self.normal()[1]
+
+    def normal(self) -> tuple[float, float]:
+        """Mean and standard deviation of the logarithm."""
+        return LOG.normal_prior(self.median, self.factor_90)
+
+
+class NormalPrior(Section):
+    """A quantity of either sign, normal with ``mean`` and standard deviation ``sd``."""
+
+    mean: Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
+    sd: Annotated[float, Field(ge=1e-12, le=1e9, allow_inf_nan=False)]
+
+    @property
+    def transform(self) -> Transform:
+        """What the prior is normal in."""
+        return IDENTITY
+
+    def normal(self) -> tuple[float, float]:
+        """Mean and standard deviation."""
+        return IDENTITY.normal_prior(self.mean, self.sd)
+
+
+class LogitNormalPrior(Section):
+    """A share between 0 and 1: its ``median``, and the factor that holds 90 % of its odds.
+
+    ``{ median = 0.7, odds_factor_90 = 5 }``: odds of 7 to 3, times or over 5, are 0.32 and 0.92.
+    """
+
+    median: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
+    odds_factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
+
+    @property
+    def transform(self) -> Transform:
+        """What the prior is normal in."""
+        return LOGIT
+
+    def normal(self) -> tuple[float, float]:
+        """Mean and standard deviation of the logarithm of the odds."""
+        return LOGIT.normal_prior(self.median, self.odds_factor_90)
+
+
+AnyPrior = LogNormalPrior | NormalPrior | LogitNormalPrior
+
+
+class FrictionPriors(Section):
+    """Priors of a friction fit for one kind of joint, by the keys of the table's rows."""
+
+    def of(self, term: Term, kind: JointKind) -> tuple[float, float]:
+        """Mean and standard deviation of a row's unconstrained parameter (ticks for a delay)."""
+        prior: AnyPrior = getattr(self, term.prior_key(kind))
+        return prior.normal()
+
+    def adopted(self, kind: JointKind) -> float:
+        """Standard deviation of what an adopted term adds at the reference motion."""
+        prior: NormalPrior = getattr(self, adopted_key(kind))
+        return prior.sd
+
+
+def adopted_key(kind: JointKind) -> str:
+    """The recipe's name of the prior that adopted terms share."""
+    return "adopted_Nm" if kind == "rotary" else "adopted_N"
+
+
+def _section(name: str, kind: JointKind) -> type[FrictionPriors]:
+    """A section with one key for every row of the table that has a prior."""
+    fields: dict[str, Any] = {}
+    for term in PARAMETERS.values():
+        if term.prior is not None:
+            fields[term.prior_key(kind)] = _field(term.transform, term.prior, kind, term.meaning)
+    fields[adopted_key(kind)] = _field(IDENTITY, ADOPTED, kind, "effort of an adopted term")
+    made = create_model(name, __base__=FrictionPriors, **fields)
+    made.__doc__ = f"Priors of a friction fit to a {kind} joint."
+    return made
+
+
+def _field(transform: Transform, prior: Prior, kind: JointKind, meaning: str) -> tuple[Any, Any]:
+    centre, width, why = prior.of(kind)
+    stated: AnyPrior
+    if transform is LOG:
+        stated = LogNormalPrior(median=centre, factor_90=width)
+    elif transform is LOGIT:
+        stated = LogitNormalPrior(median=centre, odds_factor_90=width)
+    else:
+        stated = NormalPrior(mean=centre, sd=width)
+    return type(stated), Field(default=stated, description=f"{meaning}: {why}")
+
+
+if TYPE_CHECKING:
+    RotaryFrictionPriors = FrictionPriors
+    LinearFrictionPriors = FrictionPriors
+else:
+    RotaryFrictionPriors = _section("RotaryFrictionPriors", "rotary")
+    LinearFrictionPriors = _section("LinearFrictionPriors", "linear")
+
+
+class JointPriors(Section):
+    """Priors of a friction fit by kind of joint; a fit takes those of its recording's joint."""
+
+    rotary: RotaryFrictionPriors = RotaryFrictionPriors()
+    linear: LinearFrictionPriors = LinearFrictionPriors()
+
+    def of(self, kind: JointKind) -> FrictionPriors:
+        """Priors for one kind of joint."""
+        return self.rotary if kind == "rotary" else self.linear
+
+
+class CutPriors(Section):
+    """Priors of what a cut's fit infers beside force, exponent and toughness."""
+
+    kappa: LogitNormalPrior = Field(
+        default=LogitNormalPrior(median=0.7, odds_factor_90=5.2),
+        description="share of the fracture energy at which a running crack stops: 0.31 to 0.92",
+    )
+    rest_phase: NormalPrior = Field(
+        default=NormalPrior(mean=0.65, sd=0.25),
+        description="where in the cycle cracks rest, 0 just after a jump and 1 before the next: "
+        "blades that yield stall where the torque is highest",
+    )
+    rest_spread: LogNormalPrior = Field(
+        default=LogNormalPrior(median=0.2, factor_90=5.2),
+        description="spread of that in cycles: 0.29 is uniform, blades that stall leave less; wide,"
+        " or the scatter of rests would decide kappa",
+    )
+    toughness_variation: LogNormalPrior = Field(
+        default=LogNormalPrior(median=0.04, factor_90=3.2),
+        description="relative variation of the toughness along a sheet",
+    )
+    toughness_variation_length_mm: LogNormalPrior = Field(
+        default=LogNormalPrior(median=1.5, factor_90=2.3),
+        description="length over which the toughness varies: that of fibres and threads",
+    )
+    sheet_variation: LogNormalPrior = Field(
+        default=LogNormalPrior(median=0.004, factor_90=5.2),
+        description="relative variation of the toughness between sheets: 0.08 to 2 %",
+    )
+    noise_scale: LogNormalPrior = Field(
+        default=LogNormalPrior(median=1.0, factor_90=1.4),
+        description="noise of elastic segments over that of the empty sweeps",
+    )
+    response_shape: NormalPrior = Field(
+        default=NormalPrior(mean=0.0, sd=0.5),
+        description="change of a spline's log exponent from one interval to the next",
+    )
+    torque_delay_ticks: NormalPrior = Field(
+        default=NormalPrior(mean=0.08, sd=0.06),
+        description="a motor that lags by 0 to 2 ticks is late by 0 to 0.13",
+    )
+    load_share: NormalPrior = Field(
+        default=NormalPrior(mean=0.0, sd=0.1),
+        description="share of the cut's torque that friction adds: up to 0.1 in jaw tools",
+    )
+    friction_sd_floor_Nm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)] = Field(
+        default=1e-4,
+        description="least sd of friction in a stroke: levels differ by stroke and speed by more "
+        "than the empty sweeps' posterior says",
+    )

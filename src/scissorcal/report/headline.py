@@ -1,0 +1,183 @@
+"""Whether to trust a fit, why, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recipe.requirements import GeometryKind
+from scissorcal.report.numbers import percent
+from scissorcal.report.subjects.posterior import prior_only
+from scissorcal.report.subjects.torque import held_out_summary
+from scissorcal.verdicts import Verdict
+
+Stance = Literal["trust", "unverified", "care", "reject"]
+STANCES: tuple[Stance, ...] = ("reject", "care", "unverified", "trust")
+"""From the worst."""
+SAID: dict[Stance, str] = {
+    "trust": "✓ trust",
+    "unverified": "? not verified",
+    "care": "! use with care",
+    "reject": "✗ do not use",
+}
+DRAFT_SKIPS = "k-hat"
+
+ADVICE: dict[str, str] = {
+    "k-hat": (
+        "The posterior is far from its approximation: record more varied strokes, or choose a "
+        "simpler candidate in the recipe's `[fit]` table."
+    ),
+    "optimum": (
+        "The search did not settle: check the recording's units and signs, then fit again, with "
+        "`--effort standard` if this was a draft."
+    ),
+    "bound": (
+        "A parameter ended at the edge of the search: check the recording's units and signs, then "
+        "its prior in the recipe."
+    ),
+    "whiteness": (
+        "The residuals are autocorrelated: look at the worst strokes, then record longer or more "
+        "varied motion, or try a richer candidate in the recipe's `[fit]` table."
+    ),
+    "held-out": (
+        "New strokes are not predicted well: record more strokes at the speeds of the worst ones, "
+        "or try a richer candidate."
+    ),
+    "r-squared": (
+        "The law explains too little: check the recording's units and signs, and that what was "
+        "recorded is what the recipe says."
+    ),
+    "calibration|refits": (
+        "Intervals do not hold the truth as often as they claim on data simulated from the fit: "
+        "fit with more effort, or choose a simpler candidate in the recipe's `[fit]` table."
+    ),
+    "trust|halves": (
+        "Two halves of the data disagree by more than they claim: check that nothing moved or "
+        "warmed up during the capture, then capture again."
+    ),
+    "identifiability": (
+        "Some parameters repeat their prior: record the speeds or openings that inform them, or "
+        "choose a candidate without them."
+    ),
+}
+"""What to do about a check that failed, by words in its name, parted by bars."""
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What to think of one fit: a sentence, the same in brief, and the next steps in order."""
+
+    fit: str
+    stance: Stance
+    sentence: str
+    brief: str
+    next_steps: tuple[str, ...]
+
+
+def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
+    """Weigh a fit's verdicts, effort and identifiability; ``checked`` are of its trust check.
+
+    Any failed verdict rejects. Missing verdicts, checks that were not evaluated, draft effort, or
+    a parameter that repeats its prior ask for care. Without a trust check a fit that passed its
+    own checks is not verified.
+    """
+    verdicts = (*fit.verdicts, *checked)
+    failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
+    error = _error_words(fit)
+    if failed:
+        brief = f"{_listed(failed)} failed"
+        sentence = f"Do not use the {fit.what} fit: {brief}.{error}"
+        return Headline(fit.what, "reject", sentence, brief, _advice(fit, failed))
+    doubts, steps = _doubts(fit, verdicts)
+    if doubts:
+        brief = "; ".join(doubts)
+        sentence = f"Use the {fit.what} fit with care: {brief}.{error}"
+        return Headline(fit.what, "care", sentence, brief, steps)
+    passed = f"passed all {len(verdicts)} checks" if len(verdicts) > 1 else "passed its one check"
+    if not checked:
+        sentence = (
+            f"The {fit.what} fit is not verified: it {passed}, but whether its intervals hold the "
+            f"truth was not tested.{error}"
+        )
+        step = f"Run `scissorcal verify {fit.what}`, then `scissorcal report`."
+        brief = f"{passed}; trust check not done"
+        return Headline(fit.what, "unverified", sentence, brief, (step,))
+    sentence = f"The {fit.what} fit can be trusted: it {passed}.{error}"
+    step = "Read on, and sign with `scissorcal report sign`."
+    return Headline(fit.what, "trust", sentence, passed, (step,))
+
+
+def geometry_headline(kind: GeometryKind, verdicts: Sequence[Verdict]) -> Headline:
+    """Weigh the verdicts on a fit of photographs."""
+    failed = [verdict for verdict in verdicts if verdict.status == "fail"]
+    unmade = [verdict for verdict in verdicts if verdict.status == "not_evaluated"]
+    if failed:
+        brief = f"{_listed([v.check for v in failed])} failed"
+        again = f"Then run `scissorcal fit {kind}` and `scissorcal report` again."
+        steps = (*(verdict.why for verdict in failed), again)
+        return Headline(kind, "reject", f"Do not use the {kind} fit: {brief}.", brief, steps)
+    if unmade or not verdicts:
+        brief = "nothing was checked"
+        if unmade:
+            brief = f"{_listed([v.check for v in unmade])} not evaluated"
+        steps = tuple(verdict.why for verdict in unmade) or (
+            f"Run `scissorcal fit {kind} --force`, so that its checks are made.",
+        )
+        return Headline(kind, "care", f"Use the {kind} fit with care: {brief}.", brief, steps)
+    passed = f"passed all {len(verdicts)} checks" if len(verdicts) > 1 else "passed its one check"
+    sentence = (
+        f"The {kind} fit is not verified: it {passed}, but whether its intervals hold the truth "
+        "was not tested on these photographs."
+    )
+    step = "Look at its pictures: is what was drawn what you see?"
+    return Headline(kind, "unverified", sentence, passed, (step,))
+
+
+def _doubts(fit: FitResult, verdicts: Sequence[Verdict]) -> tuple[list[str], tuple[str, ...]]:
+    """What asks for care, and what to do about it."""
+    draft = fit.effort == "draft"
+    unmade = [
+        verdict.check
+        for verdict in verdicts
+        if verdict.status == "not_evaluated" and not (draft and verdict.check == DRAFT_SKIPS)
+    ]
+    silent = prior_only(fit)
+    doubts, steps = [], []
+    if not verdicts:
+        doubts.append("nothing was checked")
+        steps.append("Fit again, so that its checks are made.")
+    if unmade:
+        doubts.append(f"{_listed(unmade)} could not be evaluated")
+        steps.append("Read in the verdicts why, and supply what the check needs.")
+    if silent:
+        named = _listed([f"`{name}`" for name in silent])
+        doubts.append(f"{named} repeat{'s' if len(silent) == 1 else ''} the prior")
+        steps += _advice(fit, ["identifiability"])
+    if draft:
+        doubts.append("its intervals are those of a draft")
+        steps.append(f"Run `scissorcal fit {fit.what} --effort standard` for reliable intervals.")
+    return doubts, tuple(steps)
+
+
+def _error_words(fit: FitResult) -> str:
+    middle, worst = held_out_summary(fit)
+    if middle is None:
+        return ""
+    return f" Hold-out error by stroke: {percent(middle)} (median; worst {percent(worst)})."
+
+
+def _advice(fit: FitResult, checks: Sequence[str]) -> tuple[str, ...]:
+    steps: list[str] = []
+    for check in checks:
+        said = check.lower()
+        known = [step for keys, step in ADVICE.items() if any(k in said for k in keys.split("|"))]
+        steps += known[:1] or [f"Read why {check} failed, correct that, and fit again."]
+    again = f"Then run `scissorcal fit {fit.what}` and `scissorcal report` again."
+    return (*dict.fromkeys(steps), again)
+
+
+def _listed(names: Sequence[str]) -> str:
+    unique = list(dict.fromkeys(names))
+    return unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} and {unique[-1]}"

@@ -1,0 +1,238 @@
+"""The decision page: simulated or real, trust, data, trust check, felt error, weaknesses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from scissorcal.calibration.caveats import caveats_of
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.package.scene_torque import SceneTorque
+from scissorcal.recipe.schema import Recipe
+from scissorcal.report.headline import SAID, STANCES, Headline, Stance
+from scissorcal.report.inputs import Cell, Evidence, Geometry, RecordingSummary
+from scissorcal.report.numbers import finite, percent
+from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
+from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
+from scissorcal.report.subjects.torque import held_out_summary
+from scissorcal.report.subjects.trust import coverage_found
+
+PART = "decision"
+SIMULATOR = 0x8000
+"""The capability of a device that is a simulator, as in docs/protocol.md."""
+MOST_CELLS = 3
+
+Origin = Literal["simulated", "real", "mixed", "unknown"]
+TITLES: dict[Origin, str] = {
+    "simulated": "Simulated",
+    "real": "Real rig",
+    "mixed": "Simulated and real",
+    "unknown": "Origin not stated",
+}
+OUTCOMES: dict[Stance, str] = {
+    "trust": "Trust",
+    "unverified": "Not verified",
+    "care": "Use with care",
+    "reject": "Do not use",
+}
+
+
+def origin_of(recordings: Sequence[RecordingSummary]) -> Origin:
+    """Whether recordings come from a simulator, as their devices state it."""
+    stated = [one.device.get("capabilities") for one in recordings if one.device]
+    flags = {bool(value & SIMULATOR) for value in stated if isinstance(value, int)}
+    if len(flags) != 1:
+        return "mixed" if flags else "unknown"
+    return "simulated" if flags.pop() else "real"
+
+
+def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Panel:
+    """Simulated or real."""
+    said = {
+        "simulated": "All recordings come from a virtual rig: no value here is of a real specimen.",
+        "real": "All recordings that state their device come from a real rig.",
+        "mixed": "Some recordings come from a virtual rig and some from a real one.",
+        "unknown": "No recording states the device that it comes from.",
+    }[origin]
+    names = sorted({str(r.device["serial"]) for r in recordings if r.device.get("serial")})
+    device = f" Device: {', '.join(names)}." if names else ""
+    return Panel(f"{PART}-origin", PART, TITLES[origin], said + device)
+
+
+def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
+    """The overall outcome, and one row per fit; ``rig`` names the fits of recordings."""
+    rows = tuple(
+        Row(
+            one.fit,
+            (words("decision", SAID[one.stance]), words("why", one.brief)),
+            link=one.fit,
+            marked=one.stance in {"reject", "care"},
+        )
+        for one in headlines
+    )
+    overall = overall_stance(headlines, rig)
+    own = [one for one in headlines if one.stance == overall]
+    first = next((one for one in own if one.fit in rig), own[0] if own else None)
+    sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
+    return Panel(f"{PART}-trust", PART, OUTCOMES[overall], sentence, rows)
+
+
+def overall_stance(headlines: Sequence[Headline], rig: Sequence[str]) -> Stance:
+    """The worst stance; photographs that passed their checks do not lower that of the rig."""
+    counted = [
+        h.stance for h in headlines if not (rig and h.fit not in rig and h.stance == "unverified")
+    ]
+    return min(counted or ["unverified"], key=STANCES.index)
+
+
+def cells_of(
+    fits: Sequence[tuple[FitResult, Sequence[StrokeSamples]]], evidence: Evidence
+) -> tuple[Cell, ...]:
+    """Count strokes by kind and speed, and photographs by fit.
+
+    Planned are those that a recording lists, recorded those with samples (where these are at
+    hand), used those with samples in the fit's series.
+    """
+    cells: list[Cell] = []
+    for fit, strokes in fits:
+        used = {one.name.stroke for one in strokes if len(one.places)}
+        planned: dict[str, list[int]] = {}
+        recorded: set[int] = set()
+        number = 0
+        own = [one for one in evidence.recordings if one.kind == fit.what]
+        raw = {one.source: one for one in evidence.raw}
+        for recording in own:
+            if recording.source in raw:
+                sampled = np.unique(raw[recording.source].samples["stroke"])
+                recorded.update(int(n) + number for n in sampled if n >= 0)
+            for stroke in recording.strokes:
+                label = stroke_label(stroke, 0, fit.position_unit).partition(", ")[2]
+                planned.setdefault(label, []).append(number)
+                number += 1
+        known = bool(own) and all(one.source in raw for one in own)
+        for name, numbers in planned.items():
+            kept = sum(n in used for n in numbers)
+            returns = name.startswith(kind_word("opening", fit.position_unit))
+            if fit.what == "cut" and kept == 0 and returns:
+                continue  # return strokes: a cut is fitted to closing strokes alone
+            there = sum(n in recorded for n in numbers) if known else None
+            cells.append(Cell(fit.what, name, len(numbers), there, kept))
+    return (*cells, *_photographs(evidence.geometry))
+
+
+def _photographs(geometry: Geometry) -> list[Cell]:
+    found = []
+    for what, fit in geometry.fits.items():
+        views = getattr(fit, "views", None)
+        if views is None:
+            views = {view.source for blade in fit.blades for view in blade.photographs}  # type: ignore[union-attr]
+        if fit.sources:
+            found.append(Cell(what, "all", None, len(fit.sources), len(views), "photographs"))
+    return found
+
+
+def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
+    """Totals per capture with the incomplete cells, for the decision page; and every cell."""
+    rows = []
+    for capture, unit in dict.fromkeys((cell.capture, cell.unit) for cell in cells):
+        own = [cell for cell in cells if cell.capture == capture]
+        rows.append(Row(f"{capture} {unit}", _counts(own), link="data"))
+    odd = [cell for cell in cells if cell.incomplete]
+    sentence = "Everything that was recorded is used." if cells else "Nothing is known of the data."
+    if odd:
+        named = "; ".join(f"{c.capture}, {c.name}: {_lack(c)}" for c in odd[:MOST_CELLS])
+        more = f"; {len(odd) - MOST_CELLS} more" if len(odd) > MOST_CELLS else ""
+        sentence = f"Incomplete: {named}{more}."
+    every = tuple(
+        Row(f"{c.capture}: {c.name}", _counts([c]), note=c.remark, marked=c.incomplete)
+        for c in cells
+    )
+    full = Panel("data-cells", "data", "Data planned, recorded and used", sentence, every)
+    return Panel(f"{PART}-data", PART, "Data", sentence, tuple(rows)), full
+
+
+def _counts(cells: Sequence[Cell]) -> tuple[Value, ...]:
+    values = []
+    for name in ("planned", "recorded", "used"):
+        known = [getattr(cell, name) for cell in cells]
+        values.append(words(name, "–") if None in known or not known else count(name, sum(known)))
+    return tuple(values)
+
+
+def _lack(cell: Cell) -> str:
+    if cell.planned is not None and cell.recorded is not None and cell.recorded < cell.planned:
+        return f"{cell.recorded} of {cell.planned} recorded"
+    return f"{cell.used} of {cell.planned if cell.recorded is None else cell.recorded} used"
+
+
+def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult]) -> Panel:
+    """Whether the trust check was made, with the coverage that it found."""
+    rows = []
+    for fit in fits:
+        check = checks.get(fit.what)
+        if check is None:
+            said = f"not done: `scissorcal verify {fit.what}`"
+        else:
+            outcome = _outcome(check)
+            said = "; ".join(part for part in (outcome, coverage_found(check)) if part)
+        rows.append(Row(fit.what, (words("trust check", said),), marked=check is None))
+    return Panel(f"{PART}-checked", PART, "Trust check", rows=tuple(rows))
+
+
+def _outcome(check: VerifyResult) -> str:
+    """What a trust check ended in."""
+    for status, word in (("fail", "failed"), ("not_evaluated", "not evaluated")):
+        named = [verdict.check for verdict in check.verdicts if verdict.status == status]
+        if named:
+            return f"{word}: {', '.join(named)}"
+    return "passed"
+
+
+def felt_panel(
+    found: SceneTorque | None, why: str, fits: Sequence[FitResult], recipe: Recipe
+) -> Panel:
+    """What is uncertain of the torque that is felt, as a share of it, against the tolerance."""
+    tolerance = f"tolerance {percent(recipe.scene.tolerance_percent / 100)}"
+    rows = []
+    sentence = why
+    if found is not None:
+        share = found.share[np.isfinite(found.share)]
+        middle, worst = (
+            (float(np.median(share)), float(share.max())) if len(share) else (None, None)
+        )
+        rows.append(
+            Row(
+                "uncertainty of the rendered torque",
+                (percent_of("median ±", middle), percent_of("worst ±", worst)),
+            )
+        )
+        sentence = (
+            f"± {percent(middle)} of the scene's torque (median place; worst ± {percent(worst)}), "
+            f"{tolerance}: {percent(finite(found.within_tolerance))} of the places are within it."
+        )
+    for fit in fits:
+        middle, worst = held_out_summary(fit)
+        if middle is not None:
+            name = f"hold-out error, {fit.what}"
+            rows.append(Row(name, (percent_of("median ±", middle), percent_of("worst ±", worst))))
+    return Panel(f"{PART}-felt", PART, "Felt error", sentence, tuple(rows))
+
+
+def weaknesses_panel(fits: Sequence[FitResult], found: SceneTorque | None) -> Panel:
+    """What is known to be poor in these fits."""
+    notes = [
+        f"{fit.what}, {', '.join(caveat.parameters)}: {caveat.sentence}"
+        for fit in fits
+        for caveat in caveats_of(fit)
+    ]
+    if found is not None:
+        notes += [
+            f"Not measured, and not in the band: {name}, up to {percent(share)} of the mean torque."
+            for name, share in found.not_in_band
+        ]
+    sentence = "" if notes else "No known weakness applies to these fits."
+    title = "Known weaknesses of this fit"
+    return Panel(f"{PART}-weaknesses", PART, title, sentence, notes=tuple(notes))

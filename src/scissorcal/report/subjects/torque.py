@@ -1,0 +1,395 @@
+"""Measured torque against the model: by group of strokes, by stroke, and what the model misses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recording.recording import Stroke
+from scissorcal.report.numbers import Number, finite, percent, short, unit_text, with_unit
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Panel,
+    Row,
+    Series,
+    absent,
+    band,
+    count,
+    curve,
+    number,
+    percent_of,
+    points,
+)
+from scissorcal.report.reduce import Array, block_means, limits_of, mean, median, rms, thinned
+from scissorcal.report.strokes import (
+    BETWEEN,
+    KINDS,
+    StrokeName,
+    StrokeSamples,
+    channels_of,
+    kind_word,
+    look_of,
+    stroke_label,
+)
+
+MOST_DOTS = 600
+MOST_STROKES = 12
+MOST_CHARTS = 12
+MOST_CARDS = 12
+MOST_BARS = 20
+SPREAD_DOTS = 900
+OPENING_BLOCKS, TIME_BLOCKS = 60, 300
+SAME_SPEED = 0.05
+
+Against = Literal["opening", "time"]
+
+
+@dataclass(frozen=True)
+class TorqueGroup:
+    """Strokes that are shown together: all closing and opening at one speed, say."""
+
+    title: str
+    against: Against
+    strokes: tuple[StrokeSamples, ...]
+
+
+def torque_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+    """Data against the model, a chart and a row for each group of strokes."""
+    words = channels_of(fit)
+    title = f"{words.effort.capitalize()}: data against the model"
+    if not strokes:
+        return absent(f"{part}-torque", part, title, "The fit holds no samples to show.")
+    groups = group_strokes(fit, strokes)
+    series = fit.series
+    directed = [one.places for g in groups if g.against == "opening" for one in g.strokes]
+    shared = np.concatenate(directed) if directed else np.zeros(0, np.int64)
+    limits = limits_of(series.measured[shared], series.predicted[shared])
+    charts = tuple(
+        _group_chart(fit, group, f"{part}-torque{place}", limits)
+        for place, group in enumerate(groups[:MOST_CHARTS])
+    )
+    residual = finite(rms(series.measured - series.predicted))
+    size = rms(series.measured)
+    share = percent(residual / size) if residual is not None and size > 0 else "not available"
+    return Panel(
+        f"{part}-torque",
+        part,
+        title,
+        f"Measured minus model is {with_unit(residual, fit.effort_unit, 2)} rms, {share} of what "
+        "was measured.",
+        tuple(_group_row(fit, group) for group in groups),
+        charts,
+        notes=(
+            "Marks are measured and thinned evenly, lines are the model, the shade holds its mean "
+            "with 90 % probability; where none is seen, it is narrower than the line.",
+        ),
+    )
+
+
+def group_strokes(fit: FitResult, strokes: Sequence[StrokeSamples]) -> tuple[TorqueGroup, ...]:
+    """Group strokes by speed (those of a cut also by kind); an excitation stands alone."""
+    grouped: dict[tuple[str, float], list[StrokeSamples]] = {}
+    pace = _common_speeds([stroke.name.speed for stroke in strokes])
+    for stroke in strokes:
+        grouped.setdefault(_key(fit, stroke.name, pace), []).append(stroke)
+    return tuple(
+        TorqueGroup(_title(fit, members), against_of(members[0].name), tuple(members))
+        for _, members in sorted(grouped.items())
+    )
+
+
+def against_of(name: StrokeName) -> Against:
+    """A movement with a direction is shown over opening, any other over time."""
+    return "time" if name.label.startswith(BETWEEN) or name.kind == "excitation" else "opening"
+
+
+def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+    """Residuals by stroke from the worst: bars, spread, a chart for each of the worst strokes."""
+    title, id_ = "Residuals by stroke, the worst first", f"{part}-residuals"
+    ranked = sorted(strokes, key=lambda one: -(finite(_rms(fit, one)) or -1.0))
+    if not ranked:
+        return absent(id_, part, title, "The fit holds no strokes.")
+    carded = {stroke.name.anchor for stroke in ranked[:MOST_CARDS]}
+    rows = tuple(_residual_row(fit, stroke, carded) for stroke in ranked)
+    charts: list[Chart] = []
+    if finite(_rms(fit, ranked[0])) is not None:
+        charts.append(_bars(fit, ranked[:MOST_BARS], rows, f"{part}-worst"))
+        charts.append(_spread(fit, strokes, "opening", f"{part}-spread"))
+        if fit.what == "friction":
+            charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
+    charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
+    worst = ranked[0]
+    sentence = (
+        f"The model misses most on {worst.name.label}: "
+        f"{with_unit(finite(_rms(fit, worst)), fit.effort_unit, 2)} rms."
+    )
+    caption = f"Measured minus model by stroke, in {unit_text(fit.effort_unit)}."
+    return Panel(id_, part, title, sentence, rows, tuple(charts), caption=caption)
+
+
+def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+    """Error on strokes that the fit had not seen, from the worst."""
+    title, id_ = "Hold-out error by stroke", f"{part}-heldout"
+    if not fit.held_out:
+        return absent(id_, part, title, "No stroke was held out.")
+    names = {(one.name.stroke, one.name.recording): one.name for one in strokes}
+    errors = sorted(fit.held_out, key=lambda e: -(finite(e.relative_rms) or -1.0))
+    rows, marks = [], []
+    for error in errors:
+        name = names.get((error.stroke, error.recording))
+        kind = KINDS.get(error.kind, "excitation")
+        label = (
+            name.label if name else stroke_label(Stroke(0, kind), error.stroke, fit.position_unit)
+        )
+        speed = name.speed if name and name.speed is not None else finite(error.speed)
+        values = (
+            percent_of("relative", error.relative_rms),
+            number("rms", error.rms, fit.effort_unit),
+        )
+        rows.append(Row(label, values, link=name.anchor if name else ""))
+        if speed and finite(error.relative_rms) is not None:
+            marks.append((speed, 100 * error.relative_rms, kind))
+    middle, worst = held_out_summary(fit)
+    charts = (_held_out_chart(fit, marks, f"{part}-heldout-speed"),) if marks else ()
+    sentence = (
+        f"On strokes that it had not seen the model errs by {percent(middle)} (median rms, share "
+        f"of the rms of all strokes); worst {percent(worst)}."
+    )
+    return Panel(id_, part, title, sentence, tuple(rows), charts)
+
+
+def held_out_summary(fit: FitResult) -> tuple[Number, Number]:
+    """Median and worst relative error on unseen strokes."""
+    shares = np.array([e.relative_rms for e in fit.held_out], dtype=np.float64)
+    shares = shares[np.isfinite(shares)]
+    return finite(median(shares)), finite(shares.max()) if len(shares) else None
+
+
+def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], id_: str) -> Chart:
+    kinds = dict.fromkeys(kind for *_, kind in marks)
+    series = tuple(
+        points(
+            kind_word(kind, fit.position_unit),
+            [speed for speed, _, own in marks if own == kind],
+            [error for _, error, own in marks if own == kind],
+            look_of(kind),
+        )
+        for kind in kinds
+    )
+    return Chart(
+        id_,
+        "Hold-out error over speed",
+        Axis("speed", channels_of(fit).rate_unit, log=True),
+        Axis("hold-out error", "%", low=0.0),
+        series,
+        "Each mark is a stroke, predicted by a fit that had not seen it.",
+    )
+
+
+def _key(fit: FitResult, name: StrokeName, pace: Mapping[float, float]) -> tuple[str, float]:
+    if against_of(name) == "time":
+        return f"z {name.anchor}", 0.0
+    kind = "" if fit.what == "friction" else name.kind
+    return kind, np.inf if name.speed is None else pace[name.speed]
+
+
+def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
+    """Each speed with the slowest of those that are nearly the same, within ``SAME_SPEED``."""
+    common: dict[float, float] = {}
+    slowest = -np.inf
+    for speed in sorted({speed for speed in speeds if speed is not None}):
+        if speed > (1.0 + SAME_SPEED) * slowest:
+            slowest = speed
+        common[speed] = slowest
+    return common
+
+
+def _title(fit: FitResult, members: Sequence[StrokeSamples]) -> str:
+    first = members[0].name
+    if against_of(first) == "time":
+        return first.label
+    kinds = " and ".join(sorted({kind_word(m.name.kind, fit.position_unit) for m in members}))
+    if first.speed is None:
+        return f"{kinds}, no planned speed"
+    speed = median(np.array([member.name.speed or np.nan for member in members]))
+    return f"{kinds} at {short(speed)} {fit.position_unit}/s"
+
+
+def _places(group: TorqueGroup) -> NDArray[np.int64]:
+    return np.concatenate([stroke.places for stroke in group.strokes])
+
+
+def _group_row(fit: FitResult, group: TorqueGroup) -> Row:
+    series, at, unit = fit.series, _places(group), fit.effort_unit
+    residual = series.measured[at] - series.predicted[at]
+    width = median(series.band_high[at] - series.band_low[at])
+    return Row(
+        group.title,
+        (
+            count("strokes", len(group.strokes)),
+            count("samples", len(at)),
+            number("rms residual", rms(residual), unit),
+            number("width of the band", width, unit, digits=2),
+        ),
+    )
+
+
+def _group_chart(
+    fit: FitResult, group: TorqueGroup, id_: str, limits: tuple[float, float] | None
+) -> Chart:
+    shown = [group.strokes[i] for i in thinned(np.arange(len(group.strokes)), MOST_STROKES)]
+    dots = MOST_DOTS // max(len(shown), 1)
+    series: list[Series] = []
+    for stroke in shown:
+        series += _drawn(fit, stroke, group.against, dots)
+    residual = fit.series.measured[_places(group)] - fit.series.predicted[_places(group)]
+    caption = (
+        f"{len(group.strokes)} stroke{'s' if len(group.strokes) != 1 else ''}, "
+        f"{len(residual)} samples; rms of measured minus model "
+        f"{with_unit(finite(rms(residual)), fit.effort_unit, 2)}."
+    )
+    if len(shown) < len(group.strokes):
+        caption += f" {len(shown)} of the strokes are drawn."
+    x, y = _axes(fit, group.against)
+    if limits and group.against == "opening":
+        y = Axis(y.label, y.unit, low=limits[0], high=limits[1])
+    return Chart(id_, group.title, x, y, tuple(series), caption)
+
+
+def _axes(fit: FitResult, against: Against) -> tuple[Axis, Axis]:
+    words = channels_of(fit)
+    x = Axis("time", "s") if against == "time" else Axis(words.position, words.unit)
+    return x, Axis(words.effort, words.effort_unit)
+
+
+def _drawn(fit: FitResult, stroke: StrokeSamples, against: Against, dots: int) -> list[Series]:
+    """A stroke's marks, and its model with the band, that are switched together."""
+    series, name = fit.series, stroke.name
+    start = series.time_s[stroke.places[0]]
+    scale = channels_of(fit).scale
+    where = scale * series.opening if against == "opening" else series.time_s - start
+    some = thinned(stroke.places, dots)
+    blocks = OPENING_BLOCKS if against == "opening" else TIME_BLOCKS
+    x, y, low, high = (
+        block_means(values[stroke.places], blocks)
+        for values in (where, series.predicted, series.band_low, series.band_high)
+    )
+    key, label = name.anchor, name.label
+    return [
+        points(
+            label, where[some], series.measured[some], look_of(name.kind), group=key, toggle=True
+        ),
+        band("band of the model", x, low, high, group=key),
+        curve(f"model, {label}", x, y, group=key),
+    ]
+
+
+def _card(fit: FitResult, stroke: StrokeSamples) -> Chart:
+    against = against_of(stroke.name)
+    x, y = _axes(fit, against)
+    residual = with_unit(finite(_rms(fit, stroke)), fit.effort_unit, 2)
+    series = tuple(
+        Series(**{**vars(one), "toggle": False})
+        for one in _drawn(fit, stroke, against, MOST_DOTS // 3)
+    )
+    caption = f"Rms residual {residual}."
+    return Chart(stroke.name.anchor, stroke.name.label, x, y, series, caption, small=True)
+
+
+def _rms(fit: FitResult, stroke: StrokeSamples) -> float:
+    at = stroke.places
+    return rms(fit.series.measured[at] - fit.series.predicted[at])
+
+
+def _residual_row(fit: FitResult, stroke: StrokeSamples, carded: set[str]) -> Row:
+    series, at, words = fit.series, stroke.places, channels_of(fit)
+    residual = series.measured[at] - series.predicted[at]
+    scale, error = rms(series.measured[at]), rms(residual)
+    known = np.flatnonzero(np.isfinite(residual))
+    worst = known[np.argmax(np.abs(residual[known]))] if len(known) else None
+    anchor = stroke.name.anchor
+
+    def at_worst(values: Array) -> float | None:
+        return None if worst is None else values[worst]
+
+    return Row(
+        stroke.name.label,
+        (
+            number("rms", error, fit.effort_unit),
+            percent_of("relative", error / scale if scale > 0 else None),
+            number("mean", mean(residual), fit.effort_unit, digits=2),
+            number("largest", at_worst(residual), fit.effort_unit, digits=2),
+            number(f"at {words.position}", at_worst(words.scale * series.opening[at]), words.unit),
+            number("at time", at_worst(series.time_s[at]), "s", digits=4),
+            count("samples", len(at)),
+        ),
+        link=anchor if anchor in carded else "",
+        anchor="" if anchor in carded else anchor,
+    )
+
+
+def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], id_: str) -> Chart:
+    size = [_rms(fit, stroke) for stroke in ranked]
+    at = fit.series.measured - fit.series.predicted
+    bias = [abs(mean(at[stroke.places])) for stroke in ranked]
+    series = [
+        Series(
+            kind_word(kind, fit.position_unit),
+            "bars",
+            tuple(finite(v) for v, s in zip(size, ranked, strict=True) if s.name.kind == kind),
+            tuple(float(i) for i, s in enumerate(ranked) if s.name.kind == kind),
+            look=look_of(kind),
+        )
+        for kind in dict.fromkeys(stroke.name.kind for stroke in ranked)
+    ]
+    series.append(points("size of the mean", bias, range(len(ranked)), "ink"))
+    caption = (
+        "Bars are the rms of measured minus model, dots the size of its mean: a dot at the end of "
+        "its bar shows an offset, one near zero scatter or ripple."
+    )
+    if len(ranked) < len(rows):
+        caption += f" The {len(ranked)} worst of {len(rows)} strokes; the table has all."
+    return Chart(
+        id_,
+        "Strokes from the worst",
+        Axis("rms residual", fit.effort_unit, low=0.0),
+        Axis(
+            "",
+            categories=tuple(stroke.name.label for stroke in ranked),
+            links=tuple(stroke.name.anchor for stroke in ranked),
+            reverse=True,
+        ),
+        tuple(series),
+        caption,
+    )
+
+
+def _spread(
+    fit: FitResult, strokes: Sequence[StrokeSamples], against: Literal["opening", "rate"], id_: str
+) -> Chart:
+    series, words = fit.series, channels_of(fit)
+    residual = series.measured - series.predicted
+    over = against == "opening"
+    where = words.scale * series.opening if over else series.opening_rate
+    kinds = list(dict.fromkeys(stroke.name.kind for stroke in strokes))
+    marks = []
+    for kind in kinds:
+        places = np.concatenate([s.places for s in strokes if s.name.kind == kind])
+        some = thinned(places, SPREAD_DOTS // len(kinds))
+        name = kind_word(kind, fit.position_unit)
+        marks.append(points(name, where[some], residual[some], look_of(kind), toggle=True))
+    label = words.position if over else f"{words.position} rate"
+    return Chart(
+        id_,
+        f"Residuals over the {label}",
+        Axis(label, words.unit if over else words.rate_unit),
+        Axis("measured − model", fit.effort_unit),
+        tuple(marks),
+        "All strokes. A bend or a step that recurs is structure that the model lacks.",
+    )

@@ -1,0 +1,186 @@
+"""The trust check: whether the intervals of a fit hold the truth as often as they claim."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.verify.result import Calibration, VerifyResult
+from scissorcal.report.numbers import percent, short, significant
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Look,
+    Panel,
+    Row,
+    Style,
+    absent,
+    band,
+    curve,
+    number,
+    percent_of,
+    words,
+)
+
+LOOKS: tuple[tuple[Look, Style], ...] = (
+    ("blue", "full"),
+    ("vermillion", "dashed"),
+    ("green", "dotted"),
+    ("purple", "dashed"),
+    ("orange", "dotted"),
+)
+LARGE_Z = 3.0
+
+
+def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple[Panel, ...]:
+    """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
+    title, id_ = "Trust check", f"{part}-verify"
+    if check is None:
+        why = f"It has not been made for this fit: run `scissorcal verify {fit.what}`."
+        return (absent(id_, part, title, why),)
+    panels = []
+    if check.calibration is not None:
+        panels.append(_calibration(check.calibration, part, id_))
+    if check.halves is not None:
+        panels.append(_halves(check, part, id_))
+    if check.sensitivity is not None:
+        panels.append(_sensitivity(check, part, id_))
+    if check.not_done or not panels:
+        why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.what}`."
+        panels.append(absent(f"{id_}-open", part, f"{title}: not done", why))
+    return tuple(panels)
+
+
+def coverage_found(check: VerifyResult | None) -> str:
+    """In a sentence, how often intervals held the truth; empty where that was not tested."""
+    found = check.calibration if check is not None else None
+    if found is None:
+        return ""
+    covers = [(c, q.name) for q in found.quantities for c in q.coverage if c.level >= 0.9]
+    if not covers:
+        return ""
+    level = min(c.level for c, _ in covers)
+    shares = [c.share for c, _ in covers if c.level == level]
+    worst, name = min(((c.share, name) for c, name in covers if c.level == level))
+    return (
+        f"{percent(level)} intervals held the truth in {percent(float(np.mean(shares)), 3)} of "
+        f"{found.fits} simulated fits; lowest {name} with {percent(worst, 3)}"
+    )
+
+
+def _calibration(found: Calibration, part: str, id_: str) -> Panel:
+    rows = []
+    for quantity in found.quantities:
+        covers = [
+            percent_of(f"{percent(c.level)} interval holds", c.share, 3, low=c.low, high=c.high)
+            for c in quantity.coverage
+        ]
+        rows.append(
+            Row(
+                quantity.name,
+                (
+                    *covers,
+                    number("uniformity p", quantity.ecdf_p, digits=2),
+                    number("too narrow by", quantity.width),
+                    number("shift", quantity.shift, "sd", digits=2),
+                ),
+                marked=any(not c.low <= c.share <= c.high for c in quantity.coverage),
+            )
+        )
+    out = [row.name for row in rows if row.marked]
+    sentence = (
+        f"Intervals do not hold the truth as often as they claim for {', '.join(out)}."
+        if out
+        else "Intervals hold the truth as often as they claim."
+    )
+    note = (
+        f"{found.fits} fits to data simulated from known values, with this fit's motion and size "
+        f"({found.generating}; {found.noise}). {percent(found.escalated)} of them went to a higher "
+        f"effort, {percent(found.unreliable)} failed their diagnostics, {len(found.broken)} gave "
+        "no result."
+    )
+    caption = (
+        "Share of intervals that held the truth; in brackets the range that correct intervals "
+        "keep to."
+    )
+    title = "Trust check: intervals on simulated data"
+    charts = (_ranks(found, f"{id_}-ranks"),)
+    return Panel(id_, part, title, sentence, tuple(rows), charts, notes=(note,), caption=caption)
+
+
+def _ranks(found: Calibration, id_: str) -> Chart:
+    """The ranks' distribution function less that of uniform ranks, with its simultaneous band."""
+    z, low, high = (np.array(v) for v in (found.band.z, found.band.low, found.band.high))
+    series = [band("correct intervals", z, low - z, high - z)]
+    outside = []
+    for place, quantity in enumerate(found.quantities):
+        ranks = (np.array(quantity.ranks) + 0.5) / found.levels
+        share = np.searchsorted(np.sort(ranks), z, side="right") / max(len(ranks), 1)
+        look, style = LOOKS[place % len(LOOKS)]
+        series.append(curve(quantity.name, z, share - z, look, style=style, toggle=True))
+        if np.any((share < low) | (share > high)):
+            outside.append(quantity.name)
+    caption = (
+        f"Each line is a quantity; one with correct intervals leaves the shade with probability "
+        f"{percent(found.band.alpha)}. "
+        + (f"Outside: {', '.join(outside)}." if outside else "None leaves it.")
+    )
+    x, y = Axis("share of the range of ranks"), Axis("ECDF − uniform")
+    return Chart(id_, "Ranks of the truth among the draws", x, y, tuple(series), caption)
+
+
+def _halves(check: VerifyResult, part: str, id_: str) -> Panel:
+    halves = check.halves
+    assert halves is not None
+    rows = tuple(
+        Row(
+            row.name,
+            (
+                number("first half", row.first, row.unit),
+                number("second half", row.second, row.unit),
+                number("sd of the difference", row.sd, row.unit, digits=2),
+                words("z", "prior alone") if row.z is None else number("z", row.z, digits=2),
+            ),
+            marked=row.z is not None and abs(row.z) > LARGE_Z,
+        )
+        for row in halves.rows
+    )
+    sentence = (
+        f"Fitted to each half alone, the predicted effort differs by "
+        f"{percent(halves.effort_difference)} rms ({percent(halves.effort_expected)} expected); "
+        f"probability {significant(halves.effort_p_value, 2)}, of all parameters together "
+        f"{significant(halves.p_value, 2)}."
+    )
+    note = f"Two fits to strokes that they do not share ({halves.split})."
+    title = "Trust check: two halves of the data"
+    caption = "The difference against the uncertainty that each half claims."
+    return Panel(f"{id_}-halves", part, title, sentence, rows, notes=(note,), caption=caption)
+
+
+def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
+    found = check.sensitivity
+    assert found is not None
+    rows = tuple(
+        Row(
+            row.name,
+            (
+                number("to the prior", row.prior, digits=2),
+                number("to the data", row.likelihood, digits=2),
+                words("diagnosis", row.diagnosis),
+            ),
+            marked=row.diagnosis != "fine",
+        )
+        for row in found.rows
+    )
+    odd = [row.name for row in rows if row.marked]
+    sentence = (
+        f"The prior matters for {', '.join(odd)}."
+        if odd
+        else "No quantity depends on the strength of the prior."
+    )
+    caption = (
+        "How far the posterior moves when prior or data count slightly more (power scaling); above "
+        f"{short(found.threshold)} it matters."
+    )
+    title = "Trust check: prior sensitivity"
+    return Panel(f"{id_}-sensitivity", part, title, sentence, rows, caption=caption)

@@ -1,0 +1,194 @@
+"""Photographs for ``--camera sim``: rendered blades and targets, a plate and a rig's card."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.live import Frame
+from scissorcal.vision.sim.blades import BladeShape, blade_layer, scissors_layers
+from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.looks import Looks, as_jpeg
+from scissorcal.vision.sim.photograph import Layer, render
+from scissorcal.vision.sim.plate_scene import PlateScene, plate_scene
+from scissorcal.vision.sim.targets import target_layers
+from scissorcal.vision.targets.boards import (
+    BLADE_MAT,
+    MAT_PIVOT_M,
+    PLATE_BOARD,
+    Board,
+    MarkedBoard,
+)
+
+if TYPE_CHECKING:
+    from scissorcal.recipe.schema import Recipe
+
+SIM_LENS = Lens(1900.0, (1003.2, 744.9), 2000, 1500, (-0.08, 0.03, 4e-4, -3e-4, 0.0))
+"""The lens of every rendered photograph."""
+
+ADVANCES_MM = (0.0, 15.0, 30.0)
+OPENINGS_DEG = (8.0, 22.0, 36.0)
+FRAMES_PER_S = 10.0
+
+_JPEG_QUALITY = 92
+_CORNERS = ((0.4, 0.35), (-0.4, 0.35), (0.4, -0.35), (-0.4, -0.35))
+_LOOKS = Looks(exposure=0.85, defocus_px=0.7, softness_px=0.6, vignetting=0.2, noise=0.008)
+
+
+def render_blade_photographs(
+    shape: BladeShape, folder: Path, seed: int, *, count: int = 3, both: bool = False
+) -> tuple[Path, ...]:
+    """Render photographs of a blade on the mat, or with ``both`` of open scissors.
+
+    Returns the files, in ``folder``.
+    """
+    look: dict[str, Any] = {
+        "shadow": 0.25,
+        "shadow_m": (-0.0006, 0.0009),
+        "shading": (0.15, 0.2),
+    }
+    paths = []
+    for number in range(count):
+        rng = np.random.default_rng([seed, 7, number])
+        pose = _view_of(BLADE_MAT, rng)
+        turn = float(rng.normal(0.0, 0.05))
+        if both:
+            opening = float(rng.uniform(0.5, 0.9))
+            middle = (0.1, 0.09)
+            things = scissors_layers(shape, shape, opening, pose, middle, turn, **look)
+        else:
+            things = [blade_layer(shape, pose, MAT_PIVOT_M, turn, **look)]
+        layers = [*target_layers(BLADE_MAT, pose), *things]
+        paths.append(_write(layers, rng, folder / f"blade-{number + 1:02d}.jpg"))
+    return tuple(paths)
+
+
+def render_board_photographs(
+    board: Board, folder: Path, seed: int, name: str, *, count: int = 15
+) -> tuple[Path, ...]:
+    """Render photographs of one target from many directions into a folder; returns the files.
+
+    Every other one has the target in a corner of the picture, where lens distortion is largest.
+    """
+    paths = []
+    for number in range(count):
+        rng = np.random.default_rng([seed, 8, number])
+        tilt = 0.6 if number else 0.05
+        near = float(rng.uniform(0.55, 1.0))
+        aside = _CORNERS[number // 2 % 4] if number % 2 else (0.0, 0.0)
+        pose = _view_of(board, rng, tilt=tilt, nearness=near, aside=aside)
+        path = folder / f"{name}-{number + 1:02d}.jpg"
+        paths.append(_write(target_layers(board, pose), rng, path))
+    return tuple(paths)
+
+
+def sim_plate_scene(recipe: "Recipe", seed: int) -> PlateScene:
+    """The scene that all rendered photographs of one seed show: the true poses."""
+    x, y = (1e-3 * value for value in recipe.plate.place_mm)
+    turn = float(np.radians(recipe.plate.turn_deg))
+    return plate_scene(np.random.default_rng([seed, 9]), (x, y), turn)
+
+
+def render_plate_photographs(
+    recipe: "Recipe",
+    folder: Path,
+    seed: int,
+    *,
+    target: MarkedBoard = PLATE_BOARD,
+    count: int = 5,
+) -> tuple[Path, ...]:
+    """Render photographs of the plate at rest into a folder; returns the files."""
+    scene = sim_plate_scene(recipe, seed)
+    paths = [folder / f"plate-{n:02d}.jpg" for n in range(1, count + 1)]
+    for path in paths:
+        path.write_bytes(_plate_jpeg(scene, target, (0.0, OPENINGS_DEG[0]), recipe, path, seed))
+    return tuple(paths)
+
+
+def render_card_photographs(
+    recipe: "Recipe", folder: Path, seed: int
+) -> dict[Path, tuple[float, float]]:
+    """Render photographs of the rig's card.
+
+    Returns the files with the rig's stance in each: advance (mm) and opening (deg).
+    """
+    scene = sim_plate_scene(recipe, seed)
+    stances = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
+    found = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
+    for path, stance in found.items():
+        path.write_bytes(_plate_jpeg(scene, PLATE_BOARD, stance, recipe, path, seed))
+    return found
+
+
+def render_frames(recipe: "Recipe", seed: int, count: int) -> Iterator[Frame]:
+    """Render what a camera sees while the plate moves 0.3 mm per picture along its cut.
+
+    Every eighth picture is black.
+    """
+    scene = sim_plate_scene(recipe, seed)
+    start = scene.rig_plate
+    for number in range(count):
+        shift = start.shift_m + 3e-4 * number * start.rotation[:, 0]
+        moved = replace(scene, rig_plate=Pose(start.rotation, shift))
+        rng = np.random.default_rng([seed, 11, number])
+        image = _plate_picture(moved, PLATE_BOARD, (0.0, OPENINGS_DEG[0]), recipe, rng)
+        if number % 8 == 7:
+            image = np.zeros_like(image)
+        yield Frame(number, number / FRAMES_PER_S, image, count)
+
+
+def _view_of(
+    board: Board,
+    rng: np.random.Generator,
+    *,
+    tilt: float = 0.15,
+    nearness: float = 0.85,
+    aside: tuple[float, float] = (0.0, 0.0),
+) -> Pose:
+    """Pose of a target before the camera; at ``nearness`` 1 it fills the picture.
+
+    ``aside`` shifts the aim from the target's centre, in its widths and heights.
+    """
+    lens = SIM_LENS
+    fills = max(board.width_m / lens.width, board.height_m / lens.height) * lens.focal_px
+    return Pose.looking_at(
+        ((0.5 + aside[0]) * board.width_m, (0.5 + aside[1]) * board.height_m),
+        1.12 * fills / nearness,
+        tilt=float(rng.uniform(0.3, 1.0) * tilt),
+        azimuth=float(rng.uniform(0.0, 2.0 * math.pi)),
+        turn=float(rng.normal(0.0, 0.05)),
+    )
+
+
+def _write(layers: Sequence[Layer], rng: np.random.Generator, path: Path) -> Path:
+    looks = replace(_LOOKS, light_slope=0.1)
+    path.write_bytes(as_jpeg(render(layers, SIM_LENS, looks, rng), _JPEG_QUALITY))
+    return path
+
+
+def _plate_jpeg(
+    scene: PlateScene,
+    target: MarkedBoard,
+    stance: tuple[float, float],
+    recipe: "Recipe",
+    path: Path,
+    seed: int,
+) -> bytes:
+    rng = np.random.default_rng([seed, 10, *path.name.encode()])
+    return as_jpeg(_plate_picture(scene, target, stance, recipe, rng), _JPEG_QUALITY)
+
+
+def _plate_picture(
+    scene: PlateScene,
+    target: MarkedBoard,
+    stance: tuple[float, float],
+    recipe: "Recipe",
+    rng: np.random.Generator,
+) -> NDArray[np.uint8]:
+    advance_mm, opening_deg = stance
+    angle = float(np.radians(opening_deg)) / recipe.rig.moving_blades
+    return render(scene.layers(target, 1e-3 * advance_mm, angle), SIM_LENS, _LOOKS, rng)

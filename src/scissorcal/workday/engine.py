@@ -1,0 +1,369 @@
+"""What state each step of the day is in, and the identity of what it is made from.
+
+The identity of a step is a digest over its settings, its version and the content of its inputs,
+recursively. A result carries the identity it was made from: where that differs from the one its
+inputs have now, it is stale.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from scissorcal.errors import InputError
+from scissorcal.identity import digest
+from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
+from scissorcal.recipe.schema import Recipe
+from scissorcal.workday.facts import UNFINISHED, photographs, rendering
+from scissorcal.workday.index import FileIndex
+from scissorcal.workday.recordings import (
+    RecordingRow,
+    completeness_counts,
+    exclude_hint,
+    list_recordings,
+    refuse_mixed_joints,
+)
+from scissorcal.workday.remedies import remedy
+from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
+from scissorcal.workday.workspace import Workspace
+
+State = Literal["missing", "incomplete", "stale", "failed", "unverified", "done", "excluded"]
+"""What a step may be in, in the order in which it is decided.
+
+missing: there is no result. stale: it was made from other inputs than there are now, or an input is
+missing or stale. incomplete: a capture lacks what the recipe plans, or a fit ran out of time.
+failed: a check of it failed, it cannot be read, or a person rejected it. unverified: no trust check
+of this very fit is there. done: none of these. excluded: the scene does not need it.
+"""
+
+WAITING: frozenset[State] = frozenset({"missing", "stale"})
+"""States of an input in which what builds on it is stale."""
+
+
+@dataclass(frozen=True)
+class StepState:
+    """One step as it stands: its state, what was found, and the command that comes next for it.
+
+    ``why`` says what the scene needs it for. ``command`` is empty where nothing is to be done.
+    ``content`` is the digest of its result, empty where there is none.
+    """
+
+    name: str
+    state: State
+    found: str
+    why: str = ""
+    command: str = ""
+    files: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    content: str = ""
+    failed: tuple[str, ...] = ()
+    optional: bool = False
+
+
+@dataclass
+class Engine:
+    """The states of a workspace's steps; each is worked out once for the life of the object."""
+
+    workspace: Workspace
+    recipe: Recipe
+    index: FileIndex
+    _states: dict[str, StepState] = field(default_factory=dict)
+
+    @cached_property
+    def _needs(self) -> Requirements:
+        return requirements(self.recipe)
+
+    @classmethod
+    def of(cls, workspace: Workspace) -> "Engine":
+        """The engine of a workspace as its files are now. InputError where its recipe is wrong."""
+        return cls(workspace, workspace.recipe(), FileIndex(workspace.root))
+
+    def state(self, name: str) -> StepState:
+        """The state of the step of this name."""
+        if name not in self._states:
+            self._states[name] = self._find(BY_NAME[name])
+        return self._states[name]
+
+    def states(self) -> tuple[StepState, ...]:
+        """The states of all steps that the scene needs, in the order of the day."""
+        found = tuple(self.state(step.name) for step in STEPS if self.needed(step.name))
+        self.index.save()
+        return found
+
+    def needed(self, name: str) -> bool:
+        """Whether the scene needs the step. Photographs may be fitted where it does not."""
+        return bool(BY_NAME[name].why(self._needs))
+
+    def refresh(self) -> None:
+        """Forget what was worked out, after a result was written."""
+        self._states.clear()
+        self.index.save()
+
+    def file(self, name: str) -> Path:
+        """Where the result of a step lies."""
+        step = BY_NAME[name]
+        assert step.file is not None, name
+        return step.file(self.workspace, self.recipe)
+
+    def facts(self, name: str) -> dict[str, Any]:
+        """What the result of a step says of itself. InputError where it cannot be read."""
+        step = BY_NAME[name]
+        assert step.read is not None, name
+        return self.index.facts(self.file(name), f"{name} {step.version}", step.read)
+
+    def identity(self, name: str, effort: str = "") -> str:
+        """Identity of what a result of this step would be made from now.
+
+        ``effort`` counts where the step depends on it.
+        """
+        step = BY_NAME[name]
+        if step.kind == "verify":
+            return self.index.digest(self.file(step.inputs[0]))
+        if step.kind == "sign":
+            return self.index.digest(self.file("report"))
+        return digest(
+            {
+                "step": name,
+                "version": step.version,
+                "settings": step.settings(self.recipe),
+                "effort": effort if step.by_effort else "",
+                "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
+            }
+        )
+
+    def review(self) -> dict[str, Any] | None:
+        """The signature that stands under the report, as stored; None where there is none."""
+        if self.state("report sign").state not in ("done", "failed"):
+            return None
+        found: dict[str, Any] = self.facts("report sign")["review"]
+        return found
+
+    def recordings(self, kind: CaptureKind) -> tuple[RecordingRow, ...]:
+        """The recordings of one kind, with the use that fits make of them."""
+        return list_recordings(self.workspace, self.recipe, kind, self.index)
+
+    def _counts(self, step: Step, item: str) -> bool:
+        """Whether an input counts: the scene needs it, or it does not need the step either."""
+        return self.needed(_plain(item)) or not self.needed(step.name)
+
+    def _content(self, step: Step, item: str) -> str:
+        """Content of an input; nothing where it does not count, or is optional and missing."""
+        state = self.state(_plain(item))
+        if not self._counts(step, item) or (item.endswith("?") and state.state in WAITING):
+            return ""
+        return state.content
+
+    def _find(self, step: Step) -> StepState:
+        why = step.why(self._needs)
+        if not why and not self._is_there(step):
+            return StepState(step.name, "excluded", "the scene does not need it")
+        find: Callable[[Step, str], StepState] = {
+            "recordings": self._of_recordings,
+            "photographs": self._of_photographs,
+            "render": self._of_render,
+        }.get(step.kind, self._of_result)
+        return find(step, why or "not needed by this scene")
+
+    def _is_there(self, step: Step) -> bool:
+        """Whether there are photographs of something, or a fit to them."""
+        if step.kind == "photographs":
+            return bool(self._photographs(step))
+        if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "photographs":
+            return False
+        return self.file(step.name).is_file() or bool(self._photographs(BY_NAME[step.inputs[0]]))
+
+    def _of_recordings(self, step: Step, why: str) -> StepState:
+        kind: CaptureKind = "friction" if step.what == "friction" else "cut"
+        rows = self.recordings(kind)
+        notes = tuple(self._row_note(row) for row in rows if row.use != "used")
+        broken = [row for row in rows if row.use == "unreadable"]
+        used = [row for row in rows if row.use == "used"]
+
+        def told(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
+            return StepState(step.name, state, found, why, command, **{"notes": notes, **more})
+
+        if broken:
+            name = broken[0].path.name
+            command = f"scissorcal recording exclude {name} --why 'cannot be read'"
+            return told("failed", f"{name} cannot be read", command)
+        if not used:
+            if not rows:
+                return told("missing", "nothing recorded yet")
+            if all(row.use == "excluded" for row in rows):
+                return told("missing", "every recording is excluded")
+            return told("stale", "recorded with another rig, material or scene")
+        try:
+            refuse_mixed_joints(rows)
+        except InputError as error:
+            return told("failed", "rotary and linear joints are mixed", notes=(*notes, str(error)))
+        notes = (*notes, *self._notes_of(used))
+        content = digest(sorted(str(row.facts["content"]) for row in used))
+        files = tuple(self.workspace.relative(row.path) for row in used)
+        found = f"{_count(len(used), 'recording')}, {sum(row.seconds for row in used):.0f} s"
+        missing = self.missing(kind, used)
+        if missing:
+            sentence = "; ".join(missing)
+            notes = (*notes, f"{step.name} lacks: {sentence}.")
+            found = f"{found}; lacks {missing[0]}" + (" ..." if len(missing) > 1 else "")
+            return told("incomplete", found, content=content, files=files, notes=notes)
+        return told("done", found, "", content=content, files=files, notes=notes)
+
+    def missing(self, kind: CaptureKind, used: Sequence[RecordingRow]) -> tuple[str, ...]:
+        """What the recipe plans for a capture and its used recordings lack, as sentences."""
+        from scissorcal.device.completeness import completeness
+
+        counts = [completeness_counts(row, self.recipe, kind, self.index) for row in used]
+        known = [count for count in counts if count and "refused" not in count]
+        return completeness(known, self.recipe, kind).missing
+
+    def _row_note(self, row: RecordingRow) -> str:
+        name = self.workspace.relative(row.path)
+        if row.use == "unreadable":
+            return f"{row.why} {exclude_hint(row.path)}"
+        reason = {"excluded": "excluded", "other recipe": "recorded otherwise"}[row.use]
+        return f"{name} is not used ({reason}): {row.why}."
+
+    def _notes_of(self, used: Sequence[RecordingRow]) -> tuple[str, ...]:
+        notes = []
+        for row in used:
+            name = self.workspace.relative(row.path)
+            if row.facts["joint"] != self.recipe.rig.joint:
+                notes.append(
+                    f"{name} is of a {row.facts['joint']} joint and the recipe states another: set "
+                    f'joint = "{row.facts["joint"]}" in its [rig].'
+                )
+            notes += [f"{name}: {sentence}" for sentence in row.facts["notes"]]
+        return tuple(notes)
+
+    def _of_photographs(self, step: Step, why: str) -> StepState:
+        paths = self._photographs(step)
+        try:
+            read = [self.index.facts(path, "photographs", photographs) for path in paths]
+        except InputError as error:
+            return StepState(step.name, "failed", str(error), why, step.command)
+        first = [path for path in paths if path.parent.name.startswith(f"{step.photographs[0]}-")]
+        if not first:
+            return self._without_photographs(step, why)
+        count = sum(int(facts["photographs"]) for facts in read)
+        return StepState(
+            step.name,
+            "done",
+            _count(count, "photograph"),
+            why,
+            files=tuple(self.workspace.relative(path.parent) for path in paths),
+            content=digest([facts["content"] for facts in read]),
+        )
+
+    def _photographs(self, step: Step) -> list[Path]:
+        """Index files of the folders of photographs that count for a step."""
+        paths: list[Path] = []
+        for kind in step.photographs:
+            own = sorted(self.workspace.captures_dir.glob(f"{kind}-*/capture.json"))
+            own = [path for path in own if not path.parent.name.endswith(".part")]
+            paths += own[-1:] if step.newest_only else own
+        return paths
+
+    def _without_photographs(self, step: Step, why: str) -> StepState:
+        """A camera may come from a file, which then takes the place of photographs."""
+        fit = f"fit {step.what}"
+        path = self.file(fit)
+        if step.what == "camera" and path.is_file():
+            try:
+                imported = self.facts(fit)["imported"]
+            except InputError:
+                imported = False
+            if imported:
+                files = (self.workspace.relative(path),)
+                return StepState(step.name, "done", "imported from a file", why, files=files)
+        return StepState(step.name, "missing", "no photographs yet", why, step.command)
+
+    def _of_result(self, step: Step, why: str) -> StepState:
+        """The state of a step that has one file as its result."""
+        path = self.file(step.name)
+        name = self.workspace.relative(path)
+
+        def told(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
+            return StepState(step.name, state, found, why, command, optional=step.optional, **more)
+
+        if not path.is_file():
+            return told("missing", "not there yet")
+        content = self.index.digest(path)
+        try:
+            facts = self.facts(step.name)
+        except InputError as error:
+            force = " --force" if step.kind in ("fit", "package") else ""
+            notes = (str(error),)
+            return told("failed", f"{name} cannot be read", f"{step.command}{force}", notes=notes)
+        failed = tuple(facts["failed"])
+        kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
+        notes = tuple(facts.get("little_used", ()))
+        imported = facts.get("imported") and not self.state(step.inputs[0]).content
+        behind = "" if imported else self._behind(step, facts)
+        if str(facts["inputs"]).startswith(UNFINISHED):
+            longer = f"{step.command} --max-minutes 60"
+            return told("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
+        if behind:
+            return told("stale", behind, notes=notes, **kept)
+        if failed:
+            command = remedy(step, failed, facts.get("effort", ""), self.state)
+            found = f"{facts['label']}; failed: {', '.join(failed)}"
+            return told("failed", found, command, notes=notes, **kept)
+        check = self.state(step.verified_by) if step.verified_by else None
+        if check and check.state == "failed":
+            found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
+            kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
+            return told("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
+        if check and check.state != "done":
+            return told("unverified", facts["label"], check.command, notes=notes, **kept)
+        return told("done", facts["label"], "", notes=notes, **kept)
+
+    def _behind(self, step: Step, facts: dict[str, Any]) -> str:
+        """Say why a result is stale; empty where it is current."""
+        waiting = [item for item in step.inputs if not item.endswith("?") and step.kind != "verify"]
+        for item in waiting:
+            state = self.state(item)
+            if state.state in WAITING and self._counts(step, item):
+                return f"{item} is {state.state}"
+        efforts = EFFORTS if step.by_effort else ("",)
+        if facts["inputs"] not in {self.identity(step.name, effort) for effort in efforts}:
+            return _CHANGED.get(step.kind, "its inputs or settings changed since")
+        if step.kind == "package" and facts["review"] != self.review():
+            return "it carries another review than there is now"
+        return ""
+
+    def _of_render(self, step: Step, why: str) -> StepState:
+        """A rendering is done where the newest one is of the package that is there."""
+        recordings = self.workspace.recordings("render")
+
+        def told(state: State, found: str, command: str = step.command) -> StepState:
+            files = tuple(self.workspace.relative(path) for path in recordings)
+            return StepState(step.name, state, found, why, command, files, optional=True)
+
+        if not recordings:
+            return told("missing", "not rendered yet")
+        path = self.file("package build")
+        try:
+            facts = self.index.facts(recordings[-1], "rendering", rendering)
+            package = self.facts("package build")["content"] if path.is_file() else ""
+        except InputError as error:
+            return told("failed", str(error))
+        if facts["package"] != package:
+            return told("stale", "of another package")
+        return told("done", _count(len(recordings), "recording"), "")
+
+
+_CHANGED = {
+    "verify": "of an earlier fit",
+    "sign": "the report changed since it was signed",
+    "report": "it shows other fits, trust checks or settings than there are now",
+    "package": "built from other fits or settings than there are now",
+}
+
+
+def _plain(item: str) -> str:
+    return item.rstrip("?")
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"

@@ -1,0 +1,123 @@
+"""What the file of each result says: which inputs it was made from, and what failed.
+
+One function a kind of file; each gives plain values, which the index keeps. Every one has
+``inputs`` (identity of what it was made from), ``label`` (its result in a few words) and
+``failed`` (names of failed checks).
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from scissorcal.errors import InputError
+from scissorcal.identity import file_digest
+
+Facts = dict[str, Any]
+
+UNFINISHED = "unfinished:"
+"""Prefix of the inputs of a fit that ran out of time."""
+
+
+def fit(path: Path) -> Facts:
+    """Facts of a fit; ``imported`` where a file gave it."""
+    from scissorcal.calibration.store import read_header
+
+    header = read_header(path)
+    return {
+        "inputs": header.inputs_hash,
+        "label": f"{header.model} ({header.effort})" if header.effort else header.model,
+        "failed": list(header.failed),
+        "what": header.what,
+        "model": header.model,
+        "effort": header.effort,
+        "imported": header.origin == "imported",
+    }
+
+
+def law_fit(path: Path) -> Facts:
+    """Facts of a fit of friction or of a cut, with the speeds of which little data were used."""
+    from scissorcal.calibration.store import load_fit
+
+    little = load_fit(path).diagnostics.get("little_used", ())
+    return {**fit(path), "little_used": list(little)}
+
+
+def trust_check(path: Path) -> Facts:
+    """Facts of a trust check; its inputs are the fit that it checked."""
+    from scissorcal.calibration.store import load
+    from scissorcal.calibration.verify.result import VerifyResult
+
+    check = load(path, VerifyResult)
+    done = {"ranks": check.calibration, "halves": check.halves, "prior": check.sensitivity}
+    label = ", ".join(name for name, part in done.items() if part is not None)
+    failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
+    return {"inputs": check.fit_content, "label": label or "nothing checked", "failed": failed}
+
+
+def report(path: Path) -> Facts:
+    """Facts of a report by its JSON twin."""
+    try:
+        twin = json.loads(path.read_text(encoding="utf-8"))
+        inputs = str(twin["inputs_hash"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} cannot be read ({error}): run 'scissorcal report'.") from None
+    if not path.with_suffix(".html").is_file():
+        raise InputError(f"{path.with_suffix('.html')} is gone: run 'scissorcal report'.")
+    return {"inputs": inputs, "label": "shows the current fits", "failed": []}
+
+
+def signature(path: Path) -> Facts:
+    """Facts of a signature; its inputs are the report that was signed."""
+    from pydantic import ValidationError
+
+    from scissorcal.package import Review
+
+    try:
+        review = Review.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        raise InputError(
+            f"{path} cannot be read: sign the report again with 'scissorcal report sign'."
+        ) from None
+    return {
+        "inputs": review.report_sha256,
+        "label": review.words,
+        "failed": ["rejected"] if review.decision == "reject" else [],
+        "review": review.model_dump(mode="json"),
+    }
+
+
+def package(path: Path) -> Facts:
+    """Facts of a model package."""
+    from scissorcal.package import open_package
+
+    manifest = open_package(path, warn=False).manifest
+    return {
+        "inputs": manifest.provenance.inputs_hash,
+        "label": f"error bound {manifest.bound.stated_Nm:.2g} N m",
+        "failed": list(manifest.failed_checks),
+        "content": manifest.content_hash,
+        "review": manifest.review.model_dump(mode="json") if manifest.review else None,
+    }
+
+
+def rendering(path: Path) -> Facts:
+    """Facts of a rendering: the content of the package that was rendered."""
+    from scissorcal.recording import read_attachments
+
+    for attached in read_attachments(path):
+        if attached.name == "package-manifest.json":
+            return {"package": json.loads(attached.data)["content_hash"]}
+    return {"package": ""}
+
+
+def photographs(path: Path) -> Facts:
+    """Facts of a folder of photographs by its index file."""
+    try:
+        index = json.loads(path.read_text(encoding="utf-8"))
+        count = len(index["photographs"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} cannot be read ({error}): remove {path.parent.name} and capture its "
+            "photographs again."
+        ) from None
+    return {"content": file_digest(path), "photographs": count}

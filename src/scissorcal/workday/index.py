@@ -1,0 +1,78 @@
+"""What the files of a workspace hold, read once for each content and kept in .scissorcal/."""
+
+import contextlib
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from scissorcal.identity import file_digest
+
+FORMAT = "scissorcal-index/1"
+
+Facts = dict[str, Any]
+
+
+class FileIndex:
+    """Facts of files, looked up by path, size and times of change.
+
+    A file that was written since has another time of change (ctime, which programs cannot set),
+    so that facts are never those of earlier content. The index only saves time: it may be removed
+    at any moment, and a workspace that cannot be written works without it.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.path = root / ".scissorcal" / "index.json"
+        self._entries = self._read()
+        self._changed = False
+
+    def facts(self, path: Path, what: str, read: Callable[[Path], Facts]) -> Facts:
+        """Give the facts named ``what`` of one file, by ``read`` where they are not known yet.
+
+        Facts are plain values, as JSON holds them. What ``read`` raises passes through.
+        """
+        key = str(path.relative_to(self.root)) if path.is_relative_to(self.root) else str(path)
+        stamp = _stamp(path)
+        entry = self._entries.get(key)
+        if entry is None or entry["stamp"] != stamp:
+            entry = self._entries[key] = {"stamp": stamp, "facts": {}}
+        if what not in entry["facts"]:
+            entry["facts"][what] = json.loads(json.dumps(read(path)))
+            self._changed = True
+        found: Facts = entry["facts"][what]
+        return found
+
+    def digest(self, path: Path) -> str:
+        """SHA-256 of a file's bytes."""
+        return str(self.facts(path, "sha256", lambda file: {"sha256": file_digest(file)})["sha256"])
+
+    def save(self) -> None:
+        """Keep what was read, where the workspace can be written; forget files that are gone."""
+        if not self._changed:
+            return
+        there = {key: entry for key, entry in self._entries.items() if (self.root / key).exists()}
+        text = json.dumps({"format": FORMAT, "files": there})
+        part = self.path.with_name(f"{self.path.name}.{os.getpid()}.part")
+        # Without the index every command still works, only slower.
+        with contextlib.suppress(OSError):
+            self.path.parent.mkdir(exist_ok=True)
+            part.write_text(text, encoding="utf-8")
+            part.replace(self.path)
+            self._changed = False
+
+    def _read(self) -> dict[str, Any]:
+        try:
+            found = json.loads(self.path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        if not isinstance(found, dict) or found.get("format") != FORMAT:
+            return {}
+        entries = found.get("files")
+        return entries if isinstance(entries, dict) else {}
+
+
+def _stamp(path: Path) -> list[int]:
+    stat = path.stat()
+    return [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino]

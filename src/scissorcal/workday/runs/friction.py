@@ -1,0 +1,48 @@
+"""The fit of friction: its run in a workspace."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from scissorcal.workday.facts import UNFINISHED
+from scissorcal.workday.recordings import used_recordings
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.result import FitResult
+    from scissorcal.workday.engine import Engine
+    from scissorcal.workday.runs.fit import Made, Request
+
+STREAM = 0
+"""Which stream of random numbers of a seed is this fit's."""
+
+
+def fit(engine: "Engine", request: "Request") -> "Made":
+    """Fit friction to the used recordings of empty motion."""
+    import numpy as np
+
+    from scissorcal.calibration.friction.fit import fit_friction
+    from scissorcal.workday.runs.fit import Made
+
+    request.progress(0.0, "friction: reading recordings")
+    result = fit_friction(
+        used_recordings(engine.workspace, engine.recipe, "friction", engine.index),
+        engine.recipe.fit.friction,
+        effort=request.effort,
+        rng=np.random.default_rng([request.seed, STREAM]),
+        progress=request.progress,
+        checkpoint=request.checkpoint,
+        last_chosen=request.last_model or None,
+        stop=request.stop,
+    )
+    return Made(finished(result, request))
+
+
+def finished(result: "FitResult", request: "Request") -> "FitResult":
+    """The result with the identity of its inputs; marked as unfinished where time ran out."""
+    if not (result.rejected and request.stop()):
+        return replace(result, inputs_hash=request.inputs_hash)
+    note = (
+        "The time allowed was used up before the fit was finished. Run 'scissorcal fit' again with "
+        "a larger --max-minutes."
+    )
+    marked = f"{UNFINISHED}{request.inputs_hash}"
+    return replace(result, inputs_hash=marked, notes=(*result.notes, note))

@@ -1,0 +1,87 @@
+"""Parameters of a friction fit: the recipe's priors, whatever the data are."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.friction.layout import Drive, friction_layout
+from scissorcal.calibration.friction.model import design
+from scissorcal.calibration.signals.weak_form import weigh
+from scissorcal.model.friction_terms import law_names
+from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.recipe.priors import JointPriors, LogNormalPrior
+from scissorcal.recording.recording import Joint
+from tests.calibration.truth import Truth, friction_recording
+
+
+def test_no_prior_depends_on_the_data_that_are_fitted():
+    """Ten times the torque, half the strokes: the same prior for every parameter but the delay."""
+    recording = friction_recording(Truth(), np.random.default_rng(1))
+    louder = recording.samples[: len(recording.samples) // 2].copy()
+    louder["motor_torque"] *= 10.0
+    layouts = []
+    for one in (recording, dataclasses.replace(recording, samples=louder)):
+        every = weigh((one,), 75.0)
+        windows = every.where(every.bins.moving)
+        law = design(
+            windows,
+            windows.bins.stroke,
+            law_names()[-1],
+            True,
+            one.joint,
+            JointPriors(),
+            ("rate^2",),
+            120.0,
+        )
+        layouts.append(law.layout)
+    assert layouts[0] == layouts[1]
+
+
+def test_a_stated_prior_is_the_parameters_prior():
+    stated = LogNormalPrior(median=0.5, factor_90=3.0)
+    default = JointPriors().rotary
+    priors = default.model_copy(update={"coulomb_Nm": stated})
+    layout = friction_layout("coulomb", False, Joint(), priors)
+    places = [layout.names.index(name) for name in ("coulomb_pos", "coulomb_neg")]
+    for place in places:
+        parameter = layout.parameters[place]
+        assert (parameter.mean, parameter.sd) == stated.normal()
+        assert parameter.transform == LOG
+
+
+@pytest.mark.parametrize("kind", ["rotary", "linear"])
+@pytest.mark.parametrize("law", law_names())
+def test_every_law_has_parameters_with_units_and_proper_priors(law, kind):
+    joint = Joint(kind)
+    drive = Drive(cogging=True, held_tick_s=1e-3)
+    layout = friction_layout(law, False, joint, JointPriors().of(kind), ("rate^2",), drive)
+    assert layout.names[0] == "inertia"
+    assert layout.names[-1] == "noise"
+    assert len(set(layout.names)) == len(layout.names)
+    assert np.all(np.isfinite(layout.mean))
+    assert np.all(layout.sd > 0)
+    units = {p.name: p.unit for p in layout.parameters}
+    assert units["coulomb_pos"] == joint.effort_unit
+    assert units["inertia"] == joint.inertia_unit
+    delay = layout.parameters[layout.names.index("delay")]
+    assert (delay.mean, delay.sd) == pytest.approx((1e-4, 1.5e-4))
+    if "presliding" in law:
+        assert layout.parameters[layout.names.index("presliding_share")].transform == LOGIT
+
+
+def test_nine_of_ten_draws_of_the_prior_are_hand_tools():
+    """Nine of ten draws have an inertia, levels and a Stribeck speed as hand tools have."""
+    layout = friction_layout("stribeck", True, Joint(), JointPriors().rotary)
+    rng = np.random.default_rng(3)
+    u = layout.mean + layout.sd * rng.standard_normal((4000, len(layout.names)))
+    values = layout.natural(u)
+    for name, low, high in (
+        ("inertia", 3e-6, 3e-2),
+        ("coulomb", 2e-4, 2.0),
+        ("viscous", 2e-5, 0.2),
+        ("stribeck", 4e-4, 0.09),
+        ("stribeck_rate", 0.01, 1.0),
+    ):
+        inside = np.mean((values[name] > low) & (values[name] < high))
+        assert inside == pytest.approx(0.9, abs=0.025), name

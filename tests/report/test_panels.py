@@ -1,0 +1,283 @@
+"""Panels: headlines, strokes over several recordings, groups, what was left out, completeness."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
+from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
+from scissorcal.report.headline import Headline, write_headline
+from scissorcal.report.inputs import Cell, Evidence
+from scissorcal.report.panel import Panel, Row, Value, columns
+from scissorcal.report.reduce import block_means
+from scissorcal.report.strokes import strokes_of
+from scissorcal.report.subjects.closing import left_out_panel, trace
+from scissorcal.report.subjects.decision import cells_of, data_panels, origin_of
+from scissorcal.report.subjects.torque import group_strokes, torque_panel
+from scissorcal.report.text import panel_text
+from scissorcal.verdicts import Verdict
+from tests.report.conftest import paper
+from tests.report.fits import (
+    cut_fit,
+    cut_recording,
+    friction_fit,
+    friction_recording,
+    linear_fit,
+)
+
+
+def headline_of(fit: FitResult) -> Headline:
+    return write_headline(fit)
+
+
+def good(fit: FitResult) -> FitResult:
+    """The same fit with nothing against it."""
+    passed = tuple(replace(verdict, status="pass") for verdict in fit.verdicts)
+    sure = tuple(replace(parameter, identifiability=0.1) for parameter in fit.parameters)
+    return replace(fit, verdicts=passed, parameters=sure)
+
+
+def test_a_fit_without_its_trust_check_is_unverified() -> None:
+    headline = headline_of(good(friction_fit()))
+    assert headline.stance == "unverified"
+    assert "is not verified: it passed all 4 checks, but" in headline.sentence
+    assert "trust" not in headline.sentence
+    assert headline.next_steps[0].startswith("Run `scissorcal verify friction`")
+
+
+def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
+    fit = good(friction_fit())
+    checked = (Verdict("verify.friction", "halves", "pass", 0.4, 0.0025, "They agree."),)
+    headline = write_headline(replace(fit, verdicts=fit.verdicts[:-1]), checked)
+    assert headline.stance == "trust"
+    assert "passed all 4 checks" in headline.sentence
+    assert "% (median; worst" in headline.sentence
+    assert headline.next_steps == ("Read on, and sign with `scissorcal report sign`.",)
+
+
+def test_one_failure_rejects_and_says_what_to_do() -> None:
+    headline = headline_of(cut_fit())
+    assert headline.stance == "reject"
+    assert "whiteness failed" in headline.sentence
+    assert "residuals are autocorrelated" in headline.next_steps[0]
+    assert "scissorcal fit cut" in headline.next_steps[-1]
+
+
+def test_an_unknown_failure_still_names_a_step() -> None:
+    odd = Verdict("fit.cut", "phase of the moon", "fail", 1.0, 0.5, "It waxes.")
+    headline = headline_of(replace(cut_fit(), verdicts=(odd,)))
+    assert "Read why phase of the moon failed" in headline.next_steps[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"verdicts": ()}, "nothing was checked"),
+        ({"effort": "draft"}, "intervals are those of a draft"),
+        (
+            {"verdicts": (Verdict("f", "trust check", "not_evaluated", None, None, "No."),)},
+            "trust check could not be evaluated",
+        ),
+    ],
+)
+def test_doubts_ask_for_care(change: dict[str, object], words: str) -> None:
+    headline = headline_of(replace(good(friction_fit()), **change))  # type: ignore[arg-type]
+    assert headline.stance == "care"
+    assert words in headline.sentence
+    assert headline.next_steps
+
+
+def test_a_parameter_that_repeats_its_prior_asks_for_care() -> None:
+    fit = good(friction_fit())
+    silent = replace(fit.parameters[-1], identifiability=0.97)
+    headline = headline_of(replace(fit, parameters=(*fit.parameters[:-1], silent)))
+    assert headline.stance == "care"
+    assert "`angle_slope` repeats the prior" in headline.sentence
+
+
+def test_strokes_are_numbered_on_over_recordings() -> None:
+    fit = cut_fit()
+    second = fit.series.stroke >= 6
+    series = replace(fit.series, recording=np.where(second, 1, 0).astype(np.int64))
+    fit = replace(fit, series=series, sources=("a.mcap sha256:aa", "b.mcap sha256:bb"))
+    strokes = cut_recording().strokes
+    halves = [
+        _summary("b.mcap", "bb", strokes[6:]),
+        _summary("elsewhere/a.mcap", "aa", strokes[:6]),
+    ]
+    found = [stroke.name for stroke in strokes_of(fit, "cut", halves)]
+    assert [name.stroke for name in found] == list(range(12))
+    assert [name.speed for name in found] == [stroke.speed for stroke in strokes]
+    assert found[7].label == "stroke 7, closing at 0.25 rad/s, recording 2"
+    assert found[7].recording == "b.mcap"
+
+
+def test_samples_of_a_stroke_stand_in_order_of_time() -> None:
+    """A cut's series has its elastic segments before the running ones."""
+    fit = cut_fit()
+    rng = np.random.default_rng(1)
+    mixed = rng.permutation(len(fit.series.stroke))
+    series = replace(
+        fit.series, **{name: values[mixed] for name, values in vars(fit.series).items()}
+    )
+    for stroke in strokes_of(replace(fit, series=series), "cut", []):
+        assert np.all(np.diff(series.time_s[stroke.places]) > 0.0)
+
+
+def test_without_recordings_the_direction_names_a_stroke() -> None:
+    named = [stroke.name for stroke in strokes_of(replace(friction_fit(), held_out=()), "f", [])]
+    assert [name.kind for name in named[:4]] == ["closing", "opening", "closing", "opening"]
+    assert all(name.speed is None for name in named)
+
+
+def test_what_slides_moves_forward_and_backward() -> None:
+    fit = linear_fit()
+    way = np.where(fit.series.opening_rate > 0, 1, 0).astype(np.int64)
+    fit = replace(fit, series=replace(fit.series, stroke=way), held_out=())
+    labels = [stroke.name.label for stroke in strokes_of(fit, "f", [])]
+    assert labels == ["stroke 0, backward", "stroke 1, forward"]
+
+
+def test_speeds_that_are_nearly_the_same_share_a_group() -> None:
+    fit, recording = cut_fit(), cut_recording()
+    uneven = tuple(
+        replace(stroke, speed=stroke.speed * (1 + 0.004 * stroke.index))
+        for stroke in recording.strokes
+    )
+    strokes = strokes_of(fit, "cut", [replace(recording, strokes=uneven)])
+    groups = group_strokes(fit, strokes)
+    assert [len(group.strokes) for group in groups] == [4, 4, 4]
+
+
+def test_groups_say_how_far_off_the_model_is() -> None:
+    fit = friction_fit()
+    strokes = strokes_of(fit, "friction", [friction_recording()])
+    panel = torque_panel(fit, strokes, "friction")
+    titles = [row.name for row in panel.rows]
+    assert titles[0] == "closing and opening at 0.05 rad/s"
+    assert titles[-1] == "stroke 20, excitation"
+    assert panel.charts[-1].x.label == "time"
+    values = {value.name: value.number for value in panel.rows[0].values}
+    assert values["samples"] == 4 * 1320
+    assert values["rms residual"] == pytest.approx(0.0011 / np.sqrt(1 - 0.25), rel=0.1)
+    assert values["width of the band"] == pytest.approx(0.0004)
+
+
+def test_block_means_skip_what_is_missing() -> None:
+    values = np.array([1.0, 3.0, np.nan, 5.0, np.nan, np.nan])
+    assert np.array_equal(block_means(values, 3), [2.0, 5.0, np.nan], equal_nan=True)
+    assert np.array_equal(block_means(values, 100), values, equal_nan=True)
+    assert len(block_means(np.zeros(0), 5)) == 0
+
+
+def test_many_strokes_do_not_swell_the_report() -> None:
+    fit = friction_fit()
+    many = np.sort(np.arange(len(fit.series.stroke)) % 1500)
+    strokes = strokes_of(replace(fit, series=replace(fit.series, stroke=many)), "friction", [])
+    charts = torque_panel(fit, strokes, "friction").charts
+    assert sum(len(series.x) for chart in charts for series in chart.series) <= 40_000
+
+
+def test_what_was_left_out_is_named() -> None:
+    recipe = paper()
+    told = left_out(left_out_panel(recipe, [friction_fit()], {}))
+    assert told["cut fit"][0] == "not there yet"
+    assert told["force along the cut"][0] == "not needed"
+    reason, why = told["friction: stribeck + angle, symmetric"]
+    assert reason == "not chosen"
+    assert "BIC is 0.9 higher" in why
+    assert "0.84 % smaller" in why
+    assert "friction: stribeck, symmetric" not in told
+
+
+def test_a_scene_that_only_presses_needs_no_toughness() -> None:
+    recipe = paper()
+    pressing = recipe.model_copy(update={"scene": recipe.scene.model_copy(update={"cut": False})})
+    told = left_out(left_out_panel(pressing, [], {}))
+    assert {"toughness and fracture", "press fit", "friction fit"} <= set(told)
+
+
+def left_out(panel: Panel) -> dict[str, tuple[str, ...]]:
+    """Reason and explanation by what was left out."""
+    return {row.name: tuple(value.text for value in row.values) for row in panel.rows}
+
+
+def test_every_planned_stroke_is_counted_as_recorded_and_used() -> None:
+    fit, summary = cut_fit(), cut_recording()
+    kept = fit.series.stroke != 0
+    series = replace(fit.series, **{n: v[kept] for n, v in vars(fit.series).items()})
+    fit = replace(fit, series=series)
+    strokes = strokes_of(fit, "cut", [summary])
+    cells = cells_of([(fit, strokes)], Evidence(recordings=(summary,)))
+    assert [(c.name, c.planned, c.recorded, c.used) for c in cells] == [
+        ("closing at 0.1 rad/s", 4, None, 3),
+        ("closing at 0.25 rad/s", 4, None, 4),
+        ("closing at 0.6 rad/s", 4, None, 4),
+    ]
+    decision, every = data_panels(cells)
+    assert "cut, closing at 0.1 rad/s: 3 of 4 used" in decision.sentence
+    assert [row.marked for row in every.rows] == [True, False, False]
+
+
+def test_a_capture_that_ended_early_says_how_to_complete_it() -> None:
+    remark = "Run `scissorcal capture cut --resume`."
+    short = Cell("cut", "closing at 0.6 rad/s", 4, 1, 1, remark=remark)
+    decision, every = data_panels([short])
+    assert "1 of 4 recorded" in decision.sentence
+    assert every.rows[0].note == remark
+
+
+def test_a_simulator_is_named_by_what_its_device_states() -> None:
+    summary = cut_recording()
+    simulated = replace(summary, device={"capabilities": 0x8003})
+    real = replace(summary, device={"capabilities": 0x0003})
+    assert origin_of([simulated]) == "simulated"
+    assert origin_of([real, real]) == "real"
+    assert origin_of([simulated, real]) == "mixed"
+    assert origin_of([summary]) == "unknown"
+
+
+def test_a_panel_in_the_terminal_has_its_numbers_units_and_limits() -> None:
+    rows = (
+        Row("a", (Value("mean", 0.0213, "N m", sd=0.0002), Value("used", 3))),
+        Row("b", (Value("mean", 1.5, "rad/s"),)),
+    )
+    verdict = Verdict("fit.cut", "held-out", "fail", 0.31, 0.2, "New strokes differ.")
+    text = panel_text(Panel("p", "cut", "Rows", "Two.", rows, verdicts=(verdict,)))
+    assert columns(rows) == (("mean", ""), ("used", ""))
+    assert "0.02130 ± 0.00020 N m" in text
+    assert "1.50 rad/s" in text
+    assert "FAIL  fit.cut held-out  0.31, at most 0.2  New strokes differ." in text
+
+
+def test_sources_whose_recording_is_missing_are_named_all_the_same() -> None:
+    fits = {"cut": cut_fit(), "friction": friction_fit()}
+    origin = trace(paper(), "", fits, [friction_recording()])
+    assert [row.used_by for row in origin.sources] == [("friction",), ("cut",)]
+    assert origin.sources[1].content_hash
+
+
+def test_a_recording_is_reduced_to_what_is_printed() -> None:
+    samples = np.zeros(3, SAMPLE_DTYPE)
+    samples["device_time_us"] = [0, 1000, 2500]
+    recording = Recording("cut", samples, (Stroke(0, "press"),), Joint("linear"), source="a/b.mcap")
+    summary = summarise_recording(recording)
+    assert (summary.name, summary.samples, summary.joint) == ("b.mcap", 3, "linear")
+    assert summary.duration_s == pytest.approx(0.0025)
+
+
+def test_a_sheet_takes_units_from_names() -> None:
+    facts = {"range": {"rate_rad_per_s": (0.05, 1.0)}, "file": "x.zip", "share": float("nan")}
+    sheet = sheet_from_mapping("Package", "package", facts)
+    told = [(fact.label, fact.value, fact.unit) for fact in sheet.facts]
+    assert told == [
+        ("range rate", "0.05, 1", "rad/s"),
+        ("file", "x.zip", ""),
+        ("share", None, ""),
+    ]
+
+
+def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
+    return replace(cut_recording(), source=source, content_hash=digest, strokes=strokes)

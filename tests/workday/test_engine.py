@@ -1,0 +1,279 @@
+"""States of the steps: what makes a result stale, incomplete, failed or unverified."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration import store
+from scissorcal.calibration.store import load_fit, save
+from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.recording import read_recording, write_recording
+from scissorcal.verdicts import Verdict
+from scissorcal.workday.engine import WAITING, Engine
+from scissorcal.workday.history import restore, versions
+from scissorcal.workday.index import FileIndex
+from scissorcal.workday.plan import make_plan
+from scissorcal.workday.recordings import exclude_recording, include_recording, used_recordings
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.package import build_workspace_package
+from scissorcal.workday.steps import BY_NAME, STEPS
+from scissorcal.workday.workspace import Workspace
+from tests.workday.made import quick_workspace, record_cut, record_friction
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Friction and a cut, recorded and fitted at draft effort."""
+    workspace = quick_workspace(tmp_path_factory.mktemp("engine") / "paper")
+    record_friction(workspace)
+    record_cut(workspace)
+    fit_workspace(workspace)
+    return workspace
+
+
+@pytest.fixture
+def copied(fitted: Workspace, tmp_path: Path) -> Workspace:
+    shutil.copytree(fitted.root, tmp_path / "copy")
+    return Workspace(tmp_path / "copy")
+
+
+def state(workspace: Workspace, name: str) -> str:
+    return Engine.of(workspace).state(name).state
+
+
+def fail(workspace: Workspace, check: str) -> None:
+    """Give the friction fit a failed check, keeping the identity of its inputs."""
+    path = workspace.fit_path("friction")
+    fit = load_fit(path)
+    wrong = Verdict("fit.friction", check, "fail", 1.0, 0.5, "Made to fail.")
+    save(replace(fit, verdicts=(wrong,)), path)
+
+
+def test_inputs_are_rows_above_and_no_step_builds_on_itself() -> None:
+    seen: set[str] = set()
+    for step in STEPS:
+        names = {item.rstrip("?") for item in step.inputs}
+        assert names <= seen, step.name
+        assert not step.verified_by or step.name in BY_NAME[step.verified_by].inputs
+        seen.add(step.name)
+
+
+def test_another_seed_of_friction_makes_the_cut_stale(copied: Workspace) -> None:
+    assert state(copied, "fit cut") == "unverified"
+    fit_workspace(copied, ("friction",), seed=7, force=True)
+    assert state(copied, "fit friction") == "unverified"
+    assert state(copied, "fit cut") == "stale"
+    assert make_plan(copied).next_command == "scissorcal fit cut"
+
+
+def test_the_same_fit_again_leaves_the_cut_current_and_adds_no_version(copied: Workspace) -> None:
+    fit_workspace(copied, force=True)
+    for version in versions(Engine.of(copied)):
+        if not version.current:
+            shutil.rmtree(version.path.parent)
+    fit_workspace(copied, ("friction",), force=True)
+    assert state(copied, "fit cut") == "unverified"
+    assert len(versions(Engine.of(copied), "friction")) == 1
+
+
+def test_an_earlier_version_is_kept_and_restored(copied: Workspace) -> None:
+    before = copied.fit_path("friction").read_bytes()
+    fit_workspace(copied, ("friction",), seed=7, force=True)
+    engine = Engine.of(copied)
+    current, earlier = versions(engine, "friction")
+    assert (current.current, earlier.current) == (True, False)
+    with pytest.raises(InputError, match="in use"):
+        restore(engine, current.name)
+    with pytest.raises(MissingError, match=earlier.name):
+        restore(engine, "nothing")
+    restore(engine, earlier.name)
+    assert copied.fit_path("friction").read_bytes() == before
+    assert state(copied, "fit cut") == "unverified"
+    assert [version.current for version in versions(Engine.of(copied), "friction")].count(True) == 1
+
+
+def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(
+    copied: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = copied.fit_path("friction").read_bytes()
+
+    def full(result: object, path: Path) -> None:
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store, "save", full)
+    with pytest.raises(OSError, match="No space"):
+        fit_workspace(copied, ("friction",), seed=7, force=True)
+    assert copied.fit_path("friction").read_bytes() == before
+    assert state(copied, "fit friction") == "unverified"
+
+
+def test_an_excluded_recording_is_not_used_until_it_is_included(copied: Workspace) -> None:
+    second = record_friction(copied, seed=5)
+    assert state(copied, "fit friction") == "stale"
+    exclude_recording(copied, second.name, "the cable was loose")
+    assert state(copied, "fit friction") == "unverified"
+    assert len(used_recordings(copied, copied.recipe(), "friction")) == 1
+    (note,) = Engine.of(copied).state("capture friction").notes
+    assert "the cable was loose" in note
+    with pytest.raises(InputError, match="--why"):
+        exclude_recording(copied, second.name, " ")
+    include_recording(copied, second.name)
+    assert state(copied, "fit friction") == "stale"
+    with pytest.raises(MissingError, match="is not excluded"):
+        include_recording(copied, second.name)
+
+
+def test_without_any_used_recording_the_capture_is_missing(copied: Workspace) -> None:
+    for path in copied.recordings("friction"):
+        exclude_recording(copied, path.name, "wrong rig")
+    assert state(copied, "capture friction") == "missing"
+    assert state(copied, "fit friction") == "stale"
+
+
+@pytest.mark.parametrize(
+    ("check", "command"),
+    [
+        ("k-hat", "scissorcal fit friction --effort thorough"),
+        ("held-out", "scissorcal capture friction --device PORT"),
+    ],
+)
+def test_a_failed_fit_leads_to_its_remedy(copied: Workspace, check: str, command: str) -> None:
+    fail(copied, check)
+    fit = Engine.of(copied).state("fit friction")
+    assert (fit.state, fit.failed, fit.command) == ("failed", (check,), command)
+    assert make_plan(copied).next_command == command
+
+
+def test_a_package_of_a_failed_fit_is_refused_unless_allowed(copied: Workspace) -> None:
+    fail(copied, "held-out")
+    fit_workspace(copied, ("cut",))
+    with pytest.raises(
+        VerdictError, match=r"held-out.*scissorcal capture friction.*--allow-failed"
+    ):
+        build_workspace_package(Engine.of(copied))
+    assert not Engine.of(copied).file("package build").exists()
+    built = build_workspace_package(Engine.of(copied), allow_failed=True)
+    assert built.path.is_file()
+
+
+def test_a_fit_that_ran_out_of_time_is_incomplete(copied: Workspace) -> None:
+    path = copied.fit_path("friction")
+    fit = load_fit(path)
+    save(replace(fit, inputs_hash=f"unfinished:{fit.inputs_hash}"), path)
+    found = Engine.of(copied).state("fit friction")
+    assert found.state == "incomplete"
+    assert found.command == "scissorcal fit friction --max-minutes 60"
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A whole capture of friction on the virtual rig, in virtual time."""
+    workspace = quick_workspace(tmp_path_factory.mktemp("captured") / "paper")
+    recipe = workspace.recipe()
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    link = LockstepLink("office-paper", np.random.default_rng(1))
+    path = workspace.new_recording("friction")
+    with open_writer(path, "friction", link, recipe, text) as writer:
+        capture_friction(link, recipe, writer)
+    return workspace
+
+
+def test_a_whole_capture_is_done(captured: Workspace) -> None:
+    found = Engine.of(captured).state("capture friction")
+    assert (found.state, found.command) == ("done", "")
+
+
+@pytest.mark.parametrize(
+    ("kept", "words"),
+    [
+        (
+            0.5,
+            ("strokes at 0.1, 0.3, 0.8 rad/s: 1 of 2 recorded each", "excitation: 0.0 s of 10 s"),
+        ),
+        (0.95, ("excitation:",)),
+    ],
+)
+def test_half_a_capture_is_incomplete_and_says_what_is_missing(
+    captured: Workspace, tmp_path: Path, kept: float, words: tuple[str, ...]
+) -> None:
+    (path,) = captured.recordings("friction")
+    whole = read_recording(path)
+    workspace = quick_workspace(tmp_path / "half")
+    count = int(kept * len(whole.samples))
+    write_recording(
+        replace(whole, samples=whole.samples[:count]), workspace.new_recording("friction")
+    )
+    found = Engine.of(workspace).state("capture friction")
+    assert found.state == "incomplete"
+    assert found.command == "scissorcal capture friction --device PORT"
+    for word in words:
+        assert any(word in note for note in found.notes), found.notes
+
+
+def test_two_halves_make_a_whole_capture(captured: Workspace, tmp_path: Path) -> None:
+    """What one capture lacks another may hold: cells, strokes and excitation are summed."""
+    (path,) = captured.recordings("friction")
+    whole = read_recording(path)
+    label = whole.samples["stroke"]
+    cut = int(np.flatnonzero(label == label.max() // 2)[-1]) + 50
+    workspace = quick_workspace(tmp_path / "halves")
+    for samples in (whole.samples[:cut], whole.samples[cut:]):
+        write_recording(replace(whole, samples=samples), workspace.new_recording("friction"))
+    assert state(workspace, "capture friction") == "done"
+
+
+def test_an_import_has_no_plan_to_be_complete_against(fitted: Workspace) -> None:
+    assert state(fitted, "capture friction") == "done"
+
+
+def test_the_index_reads_a_file_once_and_again_when_it_changed(tmp_path: Path) -> None:
+    reads: list[str] = []
+
+    def read(path: Path) -> dict[str, str]:
+        reads.append(path.read_text())
+        return {"text": reads[-1]}
+
+    path = tmp_path / "a.txt"
+    path.write_text("one")
+    first = FileIndex(tmp_path)
+    assert first.facts(path, "text", read) == first.facts(path, "text", read) == {"text": "one"}
+    first.save()
+    assert FileIndex(tmp_path).facts(path, "text", read) == {"text": "one"}
+    path.write_text("two")
+    assert FileIndex(tmp_path).facts(path, "text", read) == {"text": "two"}
+    assert reads == ["one", "two"]
+
+
+def damaged(path: Path) -> None:
+    path.write_text("{")
+
+
+def foreign(path: Path) -> None:
+    path.write_text(json.dumps({"format": "another", "files": {"x": 1}}))
+
+
+def removed(path: Path) -> None:
+    shutil.rmtree(path.parent)
+
+
+@pytest.mark.parametrize("change", [damaged, foreign, removed])
+def test_a_damaged_index_changes_no_state(
+    copied: Workspace, change: Callable[[Path], None]
+) -> None:
+    before = [step.state for step in make_plan(copied).steps]
+    change(copied.root / ".scissorcal" / "index.json")
+    assert [step.state for step in make_plan(copied).steps] == before
+
+
+def test_what_waits_for_a_step_is_stale_while_it_waits(copied: Workspace) -> None:
+    copied.fit_path("friction").unlink()
+    assert state(copied, "fit friction") in WAITING
+    assert Engine.of(copied).state("fit cut").found == "fit friction is missing"
