@@ -12,8 +12,8 @@ from tests.inference import reference
 Array = NDArray[np.float64]
 
 ANOTHER_OPTIMUM = (
-    "Depending on the libraries' rounding, the search without squares ends in another local optimum "
-    "of MGH09, on which it settles: one start does not show that."
+    "Depending on the libraries' rounding, the search without squares ends in another local "
+    "optimum of MGH09, on which it settles: one start does not show that."
 )
 PLATEAUS = (
     ("BoxBOD", 1),
