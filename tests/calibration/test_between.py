@@ -123,7 +123,7 @@ def test_one_recording_says_that_more_is_not_known():
     assert any("how much the law's parameters vary from recording" in n for n in fit.notes)
     assert "between_recordings_sd" not in fit.diagnostics
     why = next(v.why for v in halves(given, fit).verdicts if v.check == "halves")
-    assert "How much recordings differ is not known" in why
+    assert "the variation between recordings is unknown" in why
 
 
 def test_the_jackknife_on_a_true_law_agrees_with_the_fit():

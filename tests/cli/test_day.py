@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import zipfile
 from pathlib import Path
 
 import jsonschema
@@ -177,7 +178,9 @@ def test_a_package_whose_bytes_were_changed_is_refused(
     source = recorded.package_path(recorded.recipe())
     assert source.is_file()
     data = bytearray(source.read_bytes())
-    data[len(data) // 2] ^= 1
+    with zipfile.ZipFile(source) as archive:
+        member = archive.infolist()[-1]
+    data[member.header_offset + 30 + len(member.filename) + member.compress_size // 2] ^= 1
     changed = tmp_path / "changed.zip"
     changed.write_bytes(data)
     said = cli("package", "check", changed)

@@ -36,7 +36,7 @@ def test_a_fresh_recording_lies_in_the_band_as_often_as_promised(
     said = cli(*words)
     assert said.code == 0
     assert "90% band: +- " in said.out
-    assert "A measured sample of a new stroke" in said.out
+    assert "of the samples of a new stroke" in said.out
     assert "prediction: reading recordings" in said.err
     assert plot.read_text().startswith("<?xml")
     head, *rows = table.read_text().splitlines()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Truth
@@ -43,7 +44,7 @@ def test_it_prints_tables_and_verdicts(
     (check,) = envelope["result"]["checks"]
     assert check["what"] == "friction"
     assert check["calibration"] is None
-    assert envelope["files"] == [str(fitted.verify_path("friction"))]
+    assert envelope["files"] == [str(Engine.of(fitted).file("verify friction"))]
 
 
 def test_a_rig_that_changed_ends_with_three(

@@ -50,7 +50,7 @@ def test_surgical_tools_with_a_wrong_unit_in_the_heading(path: Path) -> None:
     )
     assert 19_900 < len(recording.samples) <= 20_000
     assert recording.duration_s == pytest.approx(20.0, abs=0.01)
-    assert any("although its heading says ms" in note for note in recording.notes)
+    assert any("although its heading has ms" in note for note in recording.notes)
     # 0.1 or 0.5 Hz for 20 s: two turns or ten.
     assert len(recording.strokes) in (4, 20)
     assert float(np.ptp(recording.samples["opening"])) == pytest.approx(1.02, abs=0.02)

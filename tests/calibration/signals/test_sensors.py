@@ -104,7 +104,7 @@ def test_a_resolution_is_found_only_in_a_quantised_channel():
 
 def test_a_note_states_that_near_zero_rates_are_left_out(clean):
     fit = fit_friction((clean,), SIMPLE, effort="draft", rng=np.random.default_rng(5))
-    assert any("leave the direction open" in note for note in fit.notes)
+    assert any("show the direction" in note for note in fit.notes)
 
 
 def quantised(recording: Recording, bits: int) -> Recording:

@@ -24,5 +24,5 @@ def test_what_no_demo_made_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     with pytest.raises(InputError, match="no demo made it"):
         demo_folder(tmp_path / "file")
-    with pytest.raises(InputError, match="cannot be used"):
+    with pytest.raises(InputError, match="is a file and not a folder"):
         demo_folder(tmp_path / "file" / "below")
