@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from scissorcal.calibration.fit_model import Experiment
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
-    from scissorcal.calibration.hashing import fit_inputs_hash
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
     from scissorcal.calibration.store import load, load_fit, read_header, save
 
@@ -24,7 +23,6 @@ __all__ = [
     "cutting_from",
     "fit_cut",
     "fit_friction",
-    "fit_inputs_hash",
     "friction_experiment",
     "load",
     "load_fit",
@@ -39,7 +37,6 @@ _HOMES = {
     "fit_model": ("Experiment",),
     "friction.fit": ("fit_friction", "friction_experiment"),
     "friction.model": ("FrictionExperiment",),
-    "hashing": ("fit_inputs_hash",),
     "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
     "store": ("load", "load_fit", "read_header", "save"),
 }

@@ -39,7 +39,8 @@ class Result:
     """What every stored result has, and a short ``repr``.
 
     ``title`` names the kind of result in messages, ``command`` computes it again. ``what`` names
-    the quantity, ``inputs_hash`` identifies all that the result depends on. Where a result has
+    the quantity, ``inputs_hash`` identifies all that the result depends on, as the
+    workspace states it (empty outside one). Where a result has
     them, ``effort``, ``rung`` (the chosen candidate model), ``rungs``, ``verdicts``, ``sources``
     and ``notes`` are fields. Subclasses are frozen dataclasses with ``repr=False``; the store
     writes their fields as they are annotated.

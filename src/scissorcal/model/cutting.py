@@ -129,8 +129,9 @@ def torque_at(
 def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array:
     """The response's force (N) while the edge sinks in or withdraws at the opening's rate.
 
-    g (1 + c d(delta)/dt) with d(delta)/dt = -lever rate / m, and never below 0: whoever withdraws
-    fast loses the material, which does not stick (Hunt and Crossley 1975, doi:10.1115/1.3423596).
+    g (1 + c d(delta)/dt) with d(delta)/dt = -lever rate / m, and never below 0: on fast
+    withdrawal contact is lost, because the material does not adhere (Hunt and Crossley 1975,
+    doi:10.1115/1.3423596).
     """
     if not np.any(cutting.rate_damping):
         return force

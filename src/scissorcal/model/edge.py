@@ -173,8 +173,8 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
 
     Solves x = s cos(beta) - e(s) sin(beta) for s by Newton steps, which are exact at once for a
     straight edge; phi = s sin(beta) + e(s) cos(beta). ``contact`` (m) and ``blade_angle`` (rad)
-    broadcast. Beyond the blade's ends the edge is continued smoothly; whoever asks decides what a
-    contact beyond the tip means. An edge bent so far that it stands upright before it reaches
+    broadcast. Beyond the blade's ends the edge is continued smoothly; the caller decides what
+    a contact beyond the tip means. An edge bent so far that it stands upright before it reaches
     ``contact`` has no point over it: the result is then finite and means nothing.
     """
     x, beta = np.broadcast_arrays(

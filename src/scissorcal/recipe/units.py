@@ -1,7 +1,7 @@
 """Units as they stand in names: ``thickness_mm``, ``torque_Nm``, ``toughness_J_per_m2``.
 
-Serves error messages (which key was meant, and what the number becomes) and whoever converts
-a column of numbers to SI.
+Used by error messages (which key was meant, and what the number becomes) and by conversions of
+columns to SI.
 """
 
 import math

@@ -1,6 +1,5 @@
 """Read a recording, also one that is cut off or damaged."""
 
-import hashlib
 import math
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.identity import file_digest
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.recording.scan import Attachment, Scan, Sheet, scan_file
 from scissorcal.recording.strokes import label_strokes
@@ -58,8 +58,7 @@ def content_hash(path: str | Path) -> str:
     Raises InputError if the file cannot be read.
     """
     try:
-        with Path(path).open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+        return file_digest(Path(path))
     except OSError as error:
         raise InputError(
             f"{path} cannot be read: {error.strerror}. Check the name and the folder."

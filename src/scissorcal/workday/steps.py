@@ -69,11 +69,6 @@ def steps_of(kind: Kind) -> tuple[Step, ...]:
     return tuple(step for step in STEPS if step.kind == kind)
 
 
-def step_of(name: str) -> Step:
-    """The row of this name; KeyError where there is none."""
-    return BY_NAME[name]
-
-
 def _of(rows: Callable[[Requirements], tuple[Requirement, ...]], name: str) -> Why:
     return lambda needs: next((item.why for item in rows(needs) if item.name == name), "")
 

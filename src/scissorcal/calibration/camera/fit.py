@@ -28,9 +28,6 @@ from scissorcal.vision.targets.detect import Detection
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-ALGORITHM = 2
-"""Raised whenever a fit of the same photographs would give other numbers."""
-
 _DRAWS = 500
 
 

@@ -4,7 +4,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.cut.fit import cut_experiment, fit_cut, settings_of
+    from scissorcal.calibration.cut.fit import cut_experiment, fit_cut
     from scissorcal.calibration.cut.model import CutExperiment
     from scissorcal.calibration.cut.structure import cutting_from, edge_of
 
@@ -14,11 +14,10 @@ __all__ = [
     "cutting_from",
     "edge_of",
     "fit_cut",
-    "settings_of",
 ]
 
 _HOMES = {
-    "fit": ("cut_experiment", "fit_cut", "settings_of"),
+    "fit": ("cut_experiment", "fit_cut"),
     "model": ("CutExperiment",),
     "structure": ("cutting_from", "edge_of"),
 }

@@ -34,11 +34,10 @@ from scissorcal.calibration.cut.scout import (
 )
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.cut.unknowns import SCENE_OF_BOUNDS, with_unknowns
+from scissorcal.calibration.cut.unknowns import with_unknowns
 from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
-from scissorcal.calibration.hashing import cut_upstream, fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.stated_prior import StatedPrior
@@ -67,7 +66,6 @@ class _Data:
     recordings: tuple[Recording, ...]
     recipe: Recipe
     friction: FitResult
-    edge: EdgeBelief | None
     geometry: Geometry
     known: KnownFriction
     sensors: Sensors
@@ -86,7 +84,7 @@ class _Data:
         known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
         sensors = inspect_sensors(recordings, "fit.cut")
         motions = path_motion(recordings, known.inertia, sensors.usable)
-        return cls(recordings, recipe, friction, edge, geometry, known, sensors, motions)
+        return cls(recordings, recipe, friction, geometry, known, sensors, motions)
 
     @property
     def names(self) -> str:
@@ -162,18 +160,6 @@ def cut_experiment(
     ended |= {p.name: p.mean for p in fit.nuisance}
     return make_experiment(
         scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.accepted_line
-    )
-
-
-def settings_of(recipe: Recipe) -> str:
-    """The parts of a recipe that a cut fit depends on, as canonical JSON text."""
-    return recipe.model_dump_json(
-        include={
-            "rig": {"joint", "moving", "handle_radius_mm", "edge", "opening_zero_sd_deg"},
-            "material": {"thickness_mm", "thickness_sd_mm"},
-            "scene": {"cut", "closure", *SCENE_OF_BOUNDS},
-            "fit": {"cut", "friction"},
-        }
     )
 
 
@@ -264,7 +250,6 @@ def _assembled(
     chosen, design = inferred.law.fitted, inferred.law.design
     recordings, point = data.recordings, chosen.optimum.point
     between = compare_cuts(design, point, recordings, rng)
-    upstream = cut_upstream(data.friction.inputs_hash, data.edge)
     return assemble(
         what="cut",
         effort=effort,
@@ -278,7 +263,6 @@ def _assembled(
         contact=design.contact(point),
         recordings=recordings,
         joint=recordings[0].joint,
-        inputs_hash=fit_inputs_hash("cut", recordings, settings_of(data.recipe), effort, upstream),
         nuisance=NUISANCE,
         rng=rng,
         critic=data.recipe.fit.cut.critic,

@@ -21,14 +21,6 @@ BY_EYE_M = 0.5e-3
 """A blade's tip is rounded and worn: by eye or ruler its line is known to 0.5 mm
 (docs/decisions/062-the-centreline-halves-the-blade.md)."""
 OPENINGS, CONTACTS = 9, 7
-SCENE_OF_BOUNDS = (
-    "opening_deg",
-    "opening_rate_rad_per_s",
-    "contact_mm",
-    "tolerance_percent",
-    "render_friction",
-)
-"""Fields of a recipe's scene that the bounds depend on."""
 SURE = 2.0
 """Standard deviations of a measured zero or a fitted share that a bound includes."""
 

@@ -24,9 +24,6 @@ from scissorcal.vision.blade.measure import BladeMeasurement
 Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
-ALGORITHM = 4
-"""Raised whenever a fit of the same photographs would give other numbers."""
-
 PLACES = 41
 MOST_SPOILT = 0.15
 MOST_DISAGREEMENT = 3.5

@@ -33,7 +33,6 @@ from scissorcal.calibration.friction.noise import (
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.hashing import fit_inputs_hash
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
@@ -114,7 +113,6 @@ def fit_friction(
         contact=np.full_like(law.observed, np.nan),
         recordings=recordings,
         joint=joint,
-        inputs_hash=fit_inputs_hash("friction", recordings, settings.model_dump_json(), effort),
         nuisance=NUISANCE,
         rng=rng,
         critic=settings.critic,

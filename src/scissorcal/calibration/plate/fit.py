@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ALGORITHM = 7
-"""Raised whenever a fit of the same photographs would give other numbers."""
-
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 

@@ -1,6 +1,7 @@
 """A workspace's track: the plate's pose from picture to picture, a line of JSON for each."""
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -63,12 +64,10 @@ def track_plate(
     try:
         with path.open("x", encoding="utf-8") as file:
             _append(file, head)
-            try:
+            with suppress(KeyboardInterrupt):
                 for seen in track(counted, (PLATE_BOARD, PLATE_STRIP), fitted.camera):
                     rows.append(track_row(seen, fitted.camera, back, rig))
                     _append(file, rows[-1])
-            except KeyboardInterrupt:
-                pass
     finally:
         if not any(row.pose for row in rows):
             path.unlink(missing_ok=True)
