@@ -25,7 +25,7 @@ def fit(path: Path) -> Facts:
     header = read_header(path)
     return {
         "inputs": header.inputs_hash,
-        "label": f"{header.model} ({header.effort})" if header.effort else header.model,
+        "label": f"{header.model} ({header.effort})" if header.effort else header.model or "fitted",
         "failed": list(header.failed),
         "what": header.what,
         "model": header.model,

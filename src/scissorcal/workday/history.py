@@ -84,7 +84,9 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     if len(found) != 1:
         earlier = ", ".join(version.name for version in every if not version.current) or "none"
         how = "names several versions" if found else "names no version"
-        raise MissingError(f"{name} {how} of a fit. Earlier versions: {earlier}.")
+        raise MissingError(
+            f"{name} {how} of a fit. Earlier versions: {earlier}. 'scissorcal fit log' shows them."
+        )
     (version,) = found
     if version.current:
         raise InputError(f"{version.name} is the version in use: nothing was changed.")
