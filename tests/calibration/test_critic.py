@@ -5,9 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
+from scipy.stats import wilcoxon
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.critic import FEWEST_STROKES, RECURS, criticise
+from scissorcal.calibration.critic import (
+    FEWEST_STROKES,
+    RECURS,
+    criticise,
+    is_consistent,
+    signed_rank_chance,
+)
 from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.model.friction_terms import TERMS
@@ -130,3 +137,18 @@ def test_emps_leaves_a_drag_that_grows_with_the_square_of_the_rate():
     assert proposal.coefficient == pytest.approx(-318, rel=0.2)
     assert proposal.held_out_gain == pytest.approx(0.025, abs=0.015)
     assert proposal.unit == "N s^2/m^2"
+
+
+@pytest.mark.parametrize("count", [6, 13, 40])
+def test_the_chance_of_signed_ranks_is_scipys(count):
+    gained = np.random.default_rng(count).normal(0.2, 1.0, count)
+    expected = wilcoxon(gained, alternative="greater", method="exact").pvalue
+    assert signed_rank_chance(gained) == pytest.approx(expected, rel=1e-12)
+
+
+def test_one_stroke_alone_proposes_no_term():
+    gained = np.full(12, -0.1)
+    gained[3] = 50.0
+    assert not is_consistent(gained)
+    assert is_consistent(np.full(12, 0.5))
+    assert not is_consistent(np.full(12, 0.1)), "consistent, but less than 3 nats"

@@ -117,7 +117,7 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
     facts: dict[str, Any] = {
         "what": "friction",
         "effort": "standard",
-        "candidate": "linear",
+        "rung": "linear",
         "structure": {},
         "verdicts": (),
         "parameters": fitted[:3],
