@@ -12,7 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.diagnosis import Measurements, Percentiles, adapter_timer_path, judge
+from scissorcal.device.diagnosis import (
+    Measurements,
+    Percentiles,
+    adapter_timer_path,
+    diagnose,
+)
 from scissorcal.device.link import PortLink
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
@@ -67,7 +72,7 @@ def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = No
         realtime_priority=_realtime_priority(),
     )
     tell(1.0, "done")
-    return Examination(measured, judge(measured, link.name))
+    return Examination(measured, diagnose(measured, link.name))
 
 
 def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
