@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 from scissorcal.errors import InputError, file_error
+from scissorcal.files import replacing
 from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.parquetfile import require_pyarrow
@@ -35,12 +36,10 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
         raise InputError(f"{path} exists. Choose another name, or allow overwriting.")
     if not path.parent.is_dir():
         raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
-    draft = path.with_name(path.name + layout.PART_SUFFIX)
     try:
-        _WRITERS[path.suffix.lower()](recording, draft)
-        draft.replace(path)
+        with replacing(path) as part:
+            _WRITERS[path.suffix.lower()](recording, part)
     except OSError as error:
-        draft.unlink(missing_ok=True)
         raise file_error(error, path, "The recording is unchanged.") or error from None
     return path
 
