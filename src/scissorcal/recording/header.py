@@ -46,10 +46,6 @@ class Joint:
     def effort_unit(self) -> str:
         return "N m" if self.kind == "rotary" else "N"
 
-    @property
-    def inertia_unit(self) -> str:
-        return "kg m^2" if self.kind == "rotary" else "kg"
-
 
 @dataclass(frozen=True)
 class Stroke:
