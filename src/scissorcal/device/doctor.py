@@ -21,6 +21,7 @@ from scissorcal.device.diagnosis import (
 from scissorcal.device.link import PortLink
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
+from scissorcal.recording.summarising import missing_frames
 from scissorcal.verdicts import Verdict
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = No
         unanswered=int(len(trips) - len(answered)),
         interval=Percentiles.of(np.diff(arrival)),
         frames=len(arrival),
-        lost=_lost(sequence),
+        lost=int(missing_frames(sequence).sum()),
         garbled=garbled,
         drift_ppm=drift,
         drift_se_ppm=error,
@@ -131,11 +132,6 @@ def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, 
     sequence = np.array([state.sequence for state in states], dtype=np.int64)
     cut_by_flush = 1
     return np.array(arrivals), unwrapped, sequence, max(garbled - cut_by_flush, 0)
-
-
-def _lost(sequence: Integers) -> int:
-    jumps = np.diff(sequence) % U32
-    return int(np.sum(jumps[jumps > 0] - 1))
 
 
 def _lateness() -> Array:

@@ -103,7 +103,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         if the reference leaves the device's limits.
         """
         path = approach(*self.position, reference, self.tick_s)
-        whole = path + reference
+        whole = Reference.joined([path, reference])
         check_reference(reference, self.identity)
         self._approach_ticks = len(path)
         self.set_reference(whole)

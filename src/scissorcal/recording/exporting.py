@@ -2,7 +2,6 @@
 
 import csv
 import json
-import math
 from pathlib import Path
 
 from scissorcal.errors import InputError, file_error
@@ -11,7 +10,7 @@ from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
+from scissorcal.recording.schema import describe
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -54,26 +53,21 @@ def _write_csv(recording: Recording, path: Path) -> None:
 
 def _write_parquet(recording: Recording, path: Path) -> None:
     pa, pq = require_pyarrow()
+    metadata = describe(
+        recording.kind,
+        recording.joint,
+        recording.handle_radius_m,
+        recording.strokes,
+        recording.recipe_toml,
+        recording.device,
+    )
     table = pa.table(layout.columns(recording)).replace_schema_metadata(
         {
-            METADATA_NAME: _description(recording).model_dump_json(),
+            METADATA_NAME: metadata.model_dump_json(),
             "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
         }
     )
     pq.write_table(table, path, compression="zstd")
-
-
-def _description(recording: Recording) -> RecordingMetadata:
-    radius = recording.handle_radius_m
-    return RecordingMetadata(
-        kind=recording.kind,
-        joint=recording.joint.kind,
-        handle_radius_m=radius if math.isfinite(radius) else None,
-        strokes=stroke_records(recording.strokes),
-        recipe_toml=recording.recipe_toml,
-        device=dict(recording.device),
-        versions=versions(),
-    )
 
 
 _WRITERS = {".parquet": _write_parquet, ".csv": _write_csv}
