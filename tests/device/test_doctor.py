@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.diagnosis import Measurements, Percentiles, diagnose
+from scissorcal.device.diagnosis import Measurements, diagnose
 from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
 from scissorcal.device.link import open_link
+from scissorcal.device.motion import Percentiles
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.verdicts import failed
 

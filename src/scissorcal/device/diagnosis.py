@@ -4,9 +4,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scissorcal.device.motion import Percentiles
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 ROUND_TRIP_LIMIT_TICKS = 4.0
@@ -17,23 +15,6 @@ DRIFT_LIMIT_PPM = 500.0
 TIMER_LIMIT_NS = 1000.0
 ADAPTER_LIMIT_MS = 1.0
 LEAST_PRIORITY = 1.0
-
-
-@dataclass(frozen=True)
-class Percentiles:
-    """Middle and tail of a set of times, in milliseconds."""
-
-    p50: float
-    p99: float
-    p999: float
-    worst: float
-
-    @classmethod
-    def of(cls, seconds: NDArray[np.float64]) -> "Percentiles":
-        if len(seconds) == 0:
-            return cls(math.nan, math.nan, math.nan, math.nan)
-        quantiles = np.quantile(1e3 * seconds, [0.5, 0.99, 0.999, 1.0])
-        return cls(*(float(value) for value in quantiles))
 
 
 @dataclass(frozen=True)
