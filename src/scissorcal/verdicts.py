@@ -32,7 +32,7 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     ),
     "fit r-squared": ("at least", TORQUE + "share of its variance that the law explains"),
     "fit strokes": ("at least", f"{_DATA}: ratio of the fastest to the slowest stroke"),
-    "fit held-out": (
+    "fit hold-out": (
         "at most",
         TORQUE + "median rms error on unseen strokes, share of the rms of all strokes",
     ),
