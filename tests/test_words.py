@@ -11,7 +11,7 @@ from tests.test_docs import ROOT, words_not_used
 
 PACKAGE = Path(scissorcal.__file__).parent
 NAME = re.compile(r"`+[^`]*`+|\w+ = ")
-ROOMS = ("cli", "device", "kernel", "model", "recording")
+ROOMS = ("cli", "device", "inference", "kernel", "model", "recording")
 """Rooms whose sentences are held to the list; the modules beside the rooms are, too."""
 
 HELD = sorted(
