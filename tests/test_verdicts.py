@@ -8,7 +8,7 @@ import pytest
 import scissorcal
 from scissorcal.verdicts import MEANINGS, TORQUE, Verdict
 
-BUILDERS = ("Verdict", "judge", "not_evaluated", "_verdict")
+BUILDERS = ("Verdict", "judge", "not_evaluated")
 PACKAGE = Path(scissorcal.__file__).parent
 DOCS = PACKAGE.parents[1] / "docs"
 
@@ -22,10 +22,9 @@ def checks_in_source() -> set[str]:
                 continue
             if node.func.id not in BUILDERS:
                 continue
-            first = 0 if node.func.id == "_verdict" else 1
             words = [
                 argument.value
-                for argument in node.args[first:2]
+                for argument in node.args[1:2]
                 if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
             ]
             if words:

@@ -1,6 +1,5 @@
 """Build a package from a recipe and its fits."""
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ import scissorcal
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
@@ -159,13 +159,13 @@ def package_inputs_hash(
     }
     if plate:
         facts["plate"] = plate.inputs_hash
-    return hashlib.sha256(canonical(facts)).hexdigest()
+    return bytes_digest(canonical(facts))
 
 
 def _fingerprint(fit: FitResult) -> str:
     """Distinguishes fits of the same inputs with different seeds."""
     numbers = np.concatenate([fit.map_point, fit.draws.ravel()])
-    return fit.inputs_hash + hashlib.sha256(np.ascontiguousarray(numbers).tobytes()).hexdigest()
+    return fit.inputs_hash + bytes_digest(np.ascontiguousarray(numbers).tobytes())
 
 
 def _wanted(
@@ -245,7 +245,7 @@ def _provenance(
     return Provenance(
         scissorcal_version=scissorcal.__version__,
         recipe=text.decode("utf-8"),
-        recipe_sha256=hashlib.sha256(text).hexdigest(),
+        recipe_sha256=bytes_digest(text),
         inputs_hash=package_inputs_hash(recipe, friction, cut, plate),
         cut=CutRecord(
             **_record(cut), structure=CutStructure(**_known(cut.structure, CutStructure))
