@@ -7,10 +7,11 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.live import Frame, look
-from scissorcal.vision.targets.boards import PRINT_SCALE_SD, MarkedBoard
+from scissorcal.vision.targets.boards import MarkedBoard
 
 ODDS = 20.0
 """Below these odds against the second pose that a plane allows, a picture is ambiguous."""
@@ -43,7 +44,10 @@ class Tracked:
 
 
 def track(
-    frames: Iterable[Frame], boards: Sequence[MarkedBoard], camera: Camera
+    frames: Iterable[Frame],
+    boards: Sequence[MarkedBoard],
+    camera: Camera,
+    priors: PlatePriors = PlatePriors(),
 ) -> Iterator[Tracked]:
     """Locate a target in every picture independently; the first board that is seen is the target.
 
@@ -65,7 +69,7 @@ def track(
         still = np.zeros(len(seen.ids), dtype=np.int64)
         corners = Corners(seen.pixels, seen.points, still, seen.ids)
         try:
-            found = locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+            found = locate_board(corners, camera, priors)
         except ValueError:
             count = len(seen.ids)
             yield Tracked(frame.number, frame.time_s, "no pose", boards[0], count, None)

@@ -81,7 +81,7 @@ def photographs(
 def boards(photos: list[CameraPhoto]) -> list[SeenBoard]:
     size = (CAMERA_BOARD.width_m, CAMERA_BOARD.height_m)
     return [
-        SeenBoard(photo.name, photo.detection.points, photo.detection.pixels, size)
+        SeenBoard(photo.name, photo.detection.points, photo.detection.pixels, size, 1e-3)
         for photo in photos
     ]
 

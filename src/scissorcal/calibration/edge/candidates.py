@@ -21,6 +21,7 @@ from scissorcal.inference.infer import infer
 from scissorcal.inference.posterior import Effort
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief
+from scissorcal.recipe.photograph_priors import BladePriors
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -80,6 +81,7 @@ def compare_edges(
     effort: Effort,
     rng: np.random.Generator,
     families: tuple[Family, ...] = FAMILIES,
+    priors: BladePriors = BladePriors(),
     progress: Progress | None = None,
 ) -> EdgeComparison:
     """Compare families of edges by their evidence, and fit the chosen one.
@@ -97,7 +99,7 @@ def compare_edges(
     found, evidences = [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")
-        evidences.append(EdgeEvidence(data, basis_of(data, family)))
+        evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
         found.append(search(evidences[-1]))
     scores = tuple(
         _score(data, family, one.optimum.point, one.evidence)

@@ -17,6 +17,7 @@ from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow, Ru
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
@@ -63,10 +64,11 @@ def fit_blade(
             "leave one kind out."
         )
     metric = sized[0].metric
+    priors = recipe.fit.blade.priors if recipe else BladePriors()
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    best = compare_edges(cells, length, effort, rng, progress=progress)
+    best = compare_edges(cells, length, effort, rng, priors=priors, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
