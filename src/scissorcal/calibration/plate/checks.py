@@ -124,7 +124,7 @@ def _rig(rig: RigPose | None) -> Verdict:
             f"The rig's motion does not determine: {', '.join(rig.untold)}. Photograph the rig "
             "markers at several advances and several openings."
         )
-        return Verdict(SCOPE, "rig frame", "fail", float(len(rig.untold)), 0.0, why)
+        return judge(SCOPE, "rig frame", len(rig.untold), 0.0, why)
     off = rig.rms_px / np.sqrt(2.0)
     bad = (
         f"The card's corner residuals have a standard deviation of {off:.2g} px (limit "
