@@ -2,8 +2,8 @@
 
 Every default is an argument about boards, printers, cameras and blades. Shapes and roughness of a
 blade are in shares of its length, so that one default serves photographs with and without a scale;
-the length itself is measured and no parameter of the fit. A quantity of either sign that has no
-preferred one is normal about zero: its key ends in ``_sd`` and gives the standard deviation.
+the length itself is measured and no parameter of the fit. A key with ``_sd`` in its name is the
+standard deviation of a quantity that is normal about zero.
 """
 
 from typing import Annotated
@@ -65,6 +65,9 @@ class BladePriors(PrintPriors):
     )
     scale_sd_percent: _SizeOrNone = Field(
         default=0.5, description="error of a scale that is stated where no mat is seen (--scale)"
+    )
+    pivot_sd_px: _SizeOrNone = Field(
+        default=1.0, description="error of a pivot that is stated where no hole shows it (--pivot)"
     )
     offset_sd_percent: _Size = Field(
         default=40.0,

@@ -8,13 +8,10 @@ import numpy as np
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.photograph_priors import PlatePriors
-from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
+from scissorcal.vision.geometry.board_pose import ODDS, BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.live import Frame, look
 from scissorcal.vision.targets.boards import MarkedBoard
-
-ODDS = 20.0
-"""Below these odds against the second pose that a plane allows, a picture is ambiguous."""
 
 BLANK_LEVELS = 8.0
 """A picture is blank where 98 % of it lies within fewer grey levels than these."""
@@ -66,10 +63,8 @@ def track(
             yield Tracked(frame.number, frame.time_s, state, None, 0, None)
             continue
         boards = tuple(board for board in boards if board == seen.board)
-        still = np.zeros(len(seen.ids), dtype=np.int64)
-        corners = Corners(seen.pixels, seen.points, still, seen.ids)
         try:
-            found = locate_board(corners, camera, priors)
+            found = locate_board(Corners.of(seen), camera, priors)
         except ValueError:
             count = len(seen.ids)
             yield Tracked(frame.number, frame.time_s, "no pose", boards[0], count, None)

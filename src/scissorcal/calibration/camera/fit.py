@@ -18,12 +18,12 @@ from scissorcal.calibration.camera.checks import (
 from scissorcal.calibration.camera.result import CameraFit, ViewError
 from scissorcal.calibration.camera.uncertainty import (
     camera_covariance,
-    camera_of,
     halves,
     pixel_map,
 )
 from scissorcal.errors import MissingError
 from scissorcal.recipe.photograph_priors import CameraPriors
+from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def fit_camera(
         raise MissingError(_too_few(len(photos)))
     width, height = photos[0].width, photos[0].height
     views = [seen_board(photo.name, photo.detection, priors) for photo in photos]
-    start = guess(width, height)
+    start = usual_camera(width, height).parameters
     refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
     first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))
@@ -75,7 +75,7 @@ def fit_camera(
     bundle = chosen.bundle
     refuse_undetermined(bundle, width, height)
     spread = camera_covariance(bundle)
-    camera = camera_of(bundle.camera, width, height, spread.covariance)
+    camera = Camera.of(bundle.camera, width, height, spread.covariance)
     region, share = seen_region([view.pixels for view in views], width, height)
     tell(0.85, "camera: two halves apart")
     places, cross = pixel_map(camera, spread, halves(views, bundle), region)
@@ -105,13 +105,6 @@ def seen_board(name: str, detection: Detection, priors: CameraPriors) -> SeenBoa
     """Give a detection as the bundle's arrays."""
     size = detection.board.width_m, detection.board.height_m
     return SeenBoard(name, detection.points, detection.pixels, size, 1e-3 * priors.bulge_sd_mm)
-
-
-def guess(width: int, height: int) -> Array:
-    """Nine parameters of a camera of middling field of view, to start from."""
-    focal = 1.1 * max(width, height)
-    middle = (0.5 * (width - 1), 0.5 * (height - 1))
-    return np.array([focal, focal, *middle, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def seen_region(pixels: Sequence[Array], width: int, height: int) -> tuple[Array, float]:

@@ -260,7 +260,7 @@ class Found:
 def search(evidence: EdgeEvidence) -> Found:
     """The most probable sizes, from each start by a quasi-Newton method, and the evidence there.
 
-    Distinct optima are kept, since photographs that disagree can be told from noise in two ways.
+    Distinct optima are kept, since disagreement of photographs can be explained in two ways.
     """
     from scipy.optimize import minimize
 

@@ -65,7 +65,7 @@ def fit_plate(
                 f"{photo.name} shows the {photo.detection.board.name}, {photos[0].name} the "
                 f"{target}: a plate has one target; leave one of them out."
             )
-    corners = _together(photos)
+    corners = Corners.of(*(photo.detection for photo in photos))
     alone = [
         _located(corners.where(corners.frame == i), camera, priors, photo)
         for i, photo in enumerate(photos)
@@ -115,16 +115,6 @@ def _located(
             f"{names}: {error}, so the plate's pose is undetermined. Show the whole "
             f"{photos[0].detection.board.name} in good light, or leave the photograph out."
         ) from None
-
-
-def _together(photos: Sequence[PlatePhoto]) -> Corners:
-    found = [photo.detection for photo in photos]
-    return Corners(
-        np.concatenate([one.pixels for one in found]),
-        np.concatenate([one.points for one in found]),
-        np.repeat(np.arange(len(found)), [len(one.ids) for one in found]),
-        np.concatenate([one.ids for one in found]),
-    )
 
 
 def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | None:

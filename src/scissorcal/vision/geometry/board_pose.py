@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -17,6 +18,9 @@ LEAST_SD_PX = 0.02
 
 FAR_OFF = 6.0
 """Residuals above this many robust standard deviations are outliers and left out."""
+
+ODDS = 20.0
+"""A pose must be this many times likelier than the second one that a plane allows."""
 
 FEWEST = 4
 ROUNDS = 100
@@ -35,6 +39,16 @@ class Corners:
     points: Array
     frame: Integers
     corner: Integers
+
+    @classmethod
+    def of(cls, *detections: Detection) -> "Corners":
+        """The corners of one target, a frame for each of its detections."""
+        return cls(
+            np.concatenate([one.pixels for one in detections]),
+            np.concatenate([one.points for one in detections]),
+            np.repeat(np.arange(len(detections)), [len(one.ids) for one in detections]),
+            np.concatenate([one.ids for one in detections]),
+        )
 
     def where(self, keep: NDArray[np.bool_]) -> "Corners":
         """The corners that ``keep`` selects."""

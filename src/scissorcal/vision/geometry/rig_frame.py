@@ -43,8 +43,7 @@ class CardView:
 
 def card_view(detection: Detection, stance: tuple[float, float], moving_blades: int) -> CardView:
     """The card as detected in one photograph; ``stance`` is advance (mm) and opening (deg)."""
-    frame = np.zeros(len(detection.ids), dtype=np.int64)
-    corners = Corners(detection.pixels, detection.points, frame, detection.ids)
+    corners = Corners.of(detection)
     return CardView(corners, 1e-3 * stance[0], float(np.radians(stance[1]) / moving_blades))
 
 
@@ -153,7 +152,7 @@ def _motion(view: CardView) -> Pose:
 def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array) -> Array:
     """Axes from the pictures' own poses: advances give x, turns give z and the pivot's place."""
     first = views[0]
-    shifts, turns, places = [], [], []
+    shifts, turns = [], []
     for view, pose in zip(views[1:], seen[1:], strict=True):
         moved = view.advance_m - first.advance_m
         turned = view.blade_angle_rad - first.blade_angle_rad
