@@ -17,8 +17,6 @@ from scissorcal.model.friction_terms import TERMS, law_names
 from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
 from scissorcal.recipe.priors import CutPriors, JointPriors, LogNormalPrior, Section
 
-FORMAT = "scissorcal-recipe/1"
-
 
 class OneOf:
     """One of some names: a literal whose names come from a table."""

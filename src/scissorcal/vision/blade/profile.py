@@ -132,7 +132,7 @@ def crossings(light: Light, points: Array, normals: Array, reach: float) -> Cros
         state[better], model[better], J[better] = tried[better], new_model[better], new_J[better]
         cost = np.where(better, new_cost, cost)
         damping = np.where(better, damping * 0.3, damping * 8.0)
-    return _judged(profile, u, state, J, cost, reach)
+    return _judged(u, state, J, cost, reach)
 
 
 def _start(profile: Array, u: Array) -> Array:
@@ -163,9 +163,7 @@ def _model(state: Array, u: Array) -> tuple[Array, Array]:
     return model, J
 
 
-def _judged(
-    profile: Array, u: Array, state: Array, J: Array, cost: Array, reach: float
-) -> Crossings:
+def _judged(u: Array, state: Array, J: Array, cost: Array, reach: float) -> Crossings:
     contrast = state[:, 2] - state[:, 0]
     variance = cost / max(len(u) - 6, 1) + _NOISE_FLOOR**2
     normal = np.einsum("nmk,nml->nkl", J, J) + 1e-12 * np.eye(6)

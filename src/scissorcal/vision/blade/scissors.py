@@ -72,7 +72,7 @@ def find_scissors(shape: Silhouette, source: str) -> Scissors:
     if crotch is None:
         return _closed(shape, outline[first], handles, rings)
     second, notch = crotch
-    return _open(shape, source, (first, second), notch, handles, rings)
+    return _open(shape, source, (first, second), notch, rings)
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
@@ -142,12 +142,11 @@ def _open(
     source: str,
     tips: tuple[int, int],
     notch: int,
-    handles: Array,
     rings: tuple[Array, ...],
 ) -> Scissors:
     outline = shape.outer
     crotch = outline[notch]
-    sides = [_sides_of(outline, tip, notch, handles) for tip in tips]
+    sides = [_sides_of(outline, tip, notch) for tip in tips]
     lines = []
     for (edge, back), tip in zip(sides, tips, strict=True):
         length = float(np.linalg.norm(outline[tip] - crotch))
@@ -257,7 +256,7 @@ def _best_screw(
     return best[1] * shape.pixel + np.asarray(shape.origin), best[2] * shape.pixel
 
 
-def _sides_of(outline: Array, tip: int, notch: int, handles: Array) -> tuple[Array, Array]:
+def _sides_of(outline: Array, tip: int, notch: int) -> tuple[Array, Array]:
     """The edge, from the notch to the tip, and the back, from the tip as far again."""
     count = len(outline)
     ahead = (notch - tip) % count
