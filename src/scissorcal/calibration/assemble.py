@@ -14,6 +14,7 @@ from scissorcal.calibration.predictive import predictive_of
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.usage import Usage
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion
 from scissorcal.recording.recording import Joint, Recording
@@ -44,6 +45,7 @@ def assemble(
     nuisance: tuple[str, ...],
     rng: np.random.Generator,
     critic: bool,
+    usage: Usage,
     load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
@@ -56,13 +58,8 @@ def assemble(
     ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
     common ones. ``critic``
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
-    what the joint bore, where that was measured.
+    what the joint bore, where that was measured. ``usage`` says which samples the fit uses.
     """
-    layout = chosen.candidate.layout
-    fitted = layout.fitted(posterior.draws)
-    wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
-    others = [i for i, name in enumerate(layout.names) if name in nuisance]
-    natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
     predictions = _predictions(chosen, posterior, measured, thin)
@@ -73,6 +70,7 @@ def assemble(
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, load, joint, rng)
+    tables = _parameters(chosen, posterior, nuisance, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(
         what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
@@ -82,9 +80,6 @@ def assemble(
         effort=effort,
         rung=chosen.candidate.name,
         structure=structure,
-        parameters=tuple(fitted[i] for i in wanted),
-        draws=natural[:, wanted],
-        map_point=layout.columns(chosen.optimum.point)[wanted],
         series=series,
         held_out=held_out,
         rungs=rows,
@@ -94,6 +89,7 @@ def assemble(
         position_unit=joint.position_unit,
         inputs_hash="",
         sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
+        used=usage.spans,
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
         selection=comparison_text(compared, chosen, bins, contact, joint),
         critic=critique.proposals,
@@ -105,11 +101,30 @@ def assemble(
             tuple(recording.source for recording in recordings),
             refit=what == "cut" and effort != "draft",
         ),
-        prior_draws=_prior_draws(chosen, rng)[:, wanted],
-        nuisance=tuple(fitted[i] for i in others),
-        nuisance_draws=natural[:, others],
         predictive=predictive_of(compared, chosen, predictions, thin, effort, rng.spawn(1)[0]),
+        **tables,
     )
+
+
+def _parameters(
+    chosen: FittedCandidate,
+    posterior: Posterior,
+    nuisance: tuple[str, ...],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """The fields of a result that have a column for each parameter, in natural units."""
+    layout = chosen.candidate.layout
+    fitted, natural = layout.fitted(posterior.draws), layout.columns(posterior.draws)
+    wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
+    others = [i for i, name in enumerate(layout.names) if name in nuisance]
+    return {
+        "parameters": tuple(fitted[i] for i in wanted),
+        "draws": natural[:, wanted],
+        "map_point": layout.columns(chosen.optimum.point)[wanted],
+        "prior_draws": _prior_draws(chosen, rng)[:, wanted],
+        "nuisance": tuple(fitted[i] for i in others),
+        "nuisance_draws": natural[:, others],
+    }
 
 
 def _diagnostics(
