@@ -67,6 +67,12 @@ def test_each_setting_says_where_it_is_from():
     }
 
 
+def test_every_default_of_a_prior_gives_its_reason():
+    priors = [one for one in recipe_settings(parse_recipe(TEXT), TEXT) if "priors" in one.table]
+    assert {one.table[1] for one in priors} == {"camera", "blade", "plate", "friction", "cut"}
+    assert all(one.origin.startswith("default: ") for one in priors)
+
+
 def test_every_prior_has_a_default_that_is_proper():
     for kind in ("rotary", "linear"):
         priors = JointPriors().of(kind)

@@ -66,6 +66,30 @@ def test_inputs_are_rows_above_and_no_step_builds_on_itself() -> None:
         seen.add(step.name)
 
 
+@pytest.mark.parametrize(
+    ("step", "setting"),
+    [
+        ("fit camera", "[fit.camera.priors]\nbulge_sd_mm = 2.0"),
+        ("fit blade", "[fit.blade.priors]\nslope_sd = 0.2"),
+        ("fit blade", "[fit.blade.priors]\nprint_scale_sd_percent = 0.02"),
+        ("fit plate", "[fit.plate.priors]\nprint_scale_sd_percent = 0.02"),
+        ("fit friction", "[fit.friction.priors.rotary]\noffset_Nm = { mean = 0.0, sd = 0.2 }"),
+    ],
+)
+def test_another_prior_is_another_identity_of_its_own_fit_only(
+    tmp_path: Path, step: str, setting: str
+) -> None:
+    workspace = quick_workspace(tmp_path / "made-up")
+    fits = [row.name for row in STEPS if row.kind == "fit"]
+    before = {name: Engine.of(workspace).identity(name) for name in fits}
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    workspace.recipe_path.write_text(f"{text}\n{setting}\n", encoding="utf-8")
+    after = {name: Engine.of(workspace).identity(name) for name in fits}
+    # a cut takes the priors of the friction that it is fitted with
+    others = {"fit cut"} if step == "fit friction" else set()
+    assert {name for name in fits if before[name] != after[name]} == {step} | others
+
+
 def test_another_seed_of_friction_makes_the_cut_stale(copied: Workspace) -> None:
     assert state(copied, "fit cut") == "unverified"
     fit_workspace(copied, ("friction",), seed=7, force=True)

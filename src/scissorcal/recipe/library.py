@@ -40,11 +40,6 @@ def recipe_names() -> tuple[str, ...]:
     return _names(recipes_dir())
 
 
-def specimen_names() -> tuple[str, ...]:
-    """Return the names of the specimens that come with scissorcal, sorted."""
-    return _names(specimens_dir())
-
-
 def recipe_path(name: str) -> Path:
     """Return the file of the recipe called ``name``; InputError naming the others if none is."""
     return _named(recipes_dir(), name, "recipe")

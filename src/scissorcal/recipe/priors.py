@@ -1,12 +1,12 @@
-"""Priors as a recipe states them, and those of friction, one key for each row of its table.
+"""The forms of a prior in a recipe, and the priors of friction and of a cut.
 
-Every default is an argument about machines of the kind, written beside its number
-(:mod:`scissorcal.model.friction_terms`); none is taken from the data that a fit then judges.
+Every default is an argument about machines of the kind, written beside its number (that of a row of
+friction in :mod:`scissorcal.model.friction_terms`); none is taken from the data that a fit judges.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
@@ -21,66 +21,53 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
-class LogNormalPrior(Section):
+class AnyPrior(Section):
+    """A prior, normal in its ``transform``: two keys, its centre and then its width."""
+
+    transform: ClassVar[Transform]
+
+    def normal(self) -> tuple[float, float]:
+        """Mean and standard deviation of what the transform makes of the quantity."""
+        centre, width = (getattr(self, name) for name in type(self).model_fields)
+        return self.transform.normal_prior(centre, width)
+
+
+class LogNormalPrior(AnyPrior):
     """A positive quantity, log-normal: ``median``, and the factor that holds 90 % of it.
 
     ``{ median = 3000, factor_90 = 10 }`` says: between 300 and 30000 with 90 % probability.
     """
 
+    transform = LOG
     median: Annotated[float, Field(ge=1e-9, le=1e9, allow_inf_nan=False)]
     factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
-
-    @property
-    def transform(self) -> Transform:
-        """What the prior is normal in."""
-        return LOG
 
     @property
     def log_sd(self) -> float:
         """Standard deviation of the logarithm."""
         return self.normal()[1]
 
-    def normal(self) -> tuple[float, float]:
-        """Mean and standard deviation of the logarithm."""
-        return LOG.normal_prior(self.median, self.factor_90)
 
-
-class NormalPrior(Section):
+class NormalPrior(AnyPrior):
     """A quantity of either sign, normal with ``mean`` and standard deviation ``sd``."""
 
+    transform = IDENTITY
     mean: Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
     sd: Annotated[float, Field(ge=1e-12, le=1e9, allow_inf_nan=False)]
 
-    @property
-    def transform(self) -> Transform:
-        """What the prior is normal in."""
-        return IDENTITY
 
-    def normal(self) -> tuple[float, float]:
-        """Mean and standard deviation."""
-        return IDENTITY.normal_prior(self.mean, self.sd)
-
-
-class LogitNormalPrior(Section):
+class LogitNormalPrior(AnyPrior):
     """A share between 0 and 1: its ``median``, and the factor that holds 90 % of its odds.
 
     ``{ median = 0.7, odds_factor_90 = 5 }``: odds of 7 to 3, times or over 5, are 0.32 and 0.92.
     """
 
+    transform = LOGIT
     median: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
     odds_factor_90: Annotated[float, Field(gt=1, le=1e6, allow_inf_nan=False)]
 
-    @property
-    def transform(self) -> Transform:
-        """What the prior is normal in."""
-        return LOGIT
 
-    def normal(self) -> tuple[float, float]:
-        """Mean and standard deviation of the logarithm of the odds."""
-        return LOGIT.normal_prior(self.median, self.odds_factor_90)
-
-
-AnyPrior = LogNormalPrior | NormalPrior | LogitNormalPrior
+_FORMS: tuple[type[AnyPrior], ...] = (LogNormalPrior, NormalPrior, LogitNormalPrior)
 
 
 class FrictionPriors(Section):
@@ -115,15 +102,10 @@ def _section(name: str, kind: JointKind) -> type[FrictionPriors]:
 
 
 def _field(transform: Transform, prior: Prior, kind: JointKind, meaning: str) -> tuple[Any, Any]:
-    centre, width, why = prior.of(kind)
-    stated: AnyPrior
-    if transform is LOG:
-        stated = LogNormalPrior(median=centre, factor_90=width)
-    elif transform is LOGIT:
-        stated = LogitNormalPrior(median=centre, odds_factor_90=width)
-    else:
-        stated = NormalPrior(mean=centre, sd=width)
-    return type(stated), Field(default=stated, description=f"{meaning}: {why}")
+    *numbers, why = prior.of(kind)
+    form = next(form for form in _FORMS if form.transform is transform)
+    stated = form(**dict(zip(form.model_fields, numbers, strict=True)))
+    return form, Field(default=stated, description=f"{meaning}: {why}")
 
 
 if TYPE_CHECKING:

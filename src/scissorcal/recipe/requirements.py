@@ -46,7 +46,7 @@ def requirements(recipe: Recipe) -> Requirements:
 
     A scene that renders no friction ships no friction table, and still captures and fits friction:
     what the motor measures while it cuts is cutting *and* friction, so the response of the material
-    cannot be told from the friction of the pivot unless that is known from an empty stroke.
+    cannot be separated from the friction of the pivot unless that is known from an empty stroke.
     A scene that only presses needs neither toughness nor fracture. A linear joint carries no
     blades: it has friction and inertia, and nothing is cut with it.
 

@@ -14,9 +14,8 @@ from pydantic import Field, GetCoreSchemaHandler, Strict, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from scissorcal.model.friction_terms import TERMS, law_names
+from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
 from scissorcal.recipe.priors import CutPriors, JointPriors, LogNormalPrior, Section
-
-FORMAT = "scissorcal-recipe/1"
 
 
 class OneOf:
@@ -250,8 +249,23 @@ class FitCut(Section):
     priors: CutPriors = CutPriors()
 
 
+class FitCamera(Section):
+    priors: CameraPriors = CameraPriors()
+
+
+class FitBlade(Section):
+    priors: BladePriors = BladePriors()
+
+
+class FitPlate(Section):
+    priors: PlatePriors = PlatePriors()
+
+
 class Fit(Section):
     effort: Literal["draft", "standard", "thorough"] = "standard"
+    camera: FitCamera = FitCamera()
+    blade: FitBlade = FitBlade()
+    plate: FitPlate = FitPlate()
     friction: FitFriction = FitFriction()
     cut: FitCut = FitCut()
 

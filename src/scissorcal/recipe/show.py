@@ -8,11 +8,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from scissorcal.recipe.locate import key_lines
-from scissorcal.recipe.priors import LogitNormalPrior, LogNormalPrior, NormalPrior
+from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
-
-INLINE = (LogNormalPrior, NormalPrior, LogitNormalPrior)
-"""Tables that are written in one line, as one setting."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,8 @@ def _walk(
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
         stated = given and name in model.model_fields_set
-        if isinstance(value, BaseModel) and not isinstance(value, INLINE):
+        # a prior is written in one line, as one setting
+        if isinstance(value, BaseModel) and not isinstance(value, AnyPrior):
             inner.append((name, value, stated))
             continue
         plain = value.model_dump() if isinstance(value, BaseModel) else value

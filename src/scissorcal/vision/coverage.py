@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.vision.geometry.camera import usual_camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
 from scissorcal.vision.targets.detect import SMALL_PX, Detection
@@ -67,15 +68,13 @@ class ViewCoverage:
 
 
 def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
-    """How a board is turned from square-on, to the right and up (rad), by a guess of the camera.
+    """How a board is turned from square-on, to the right and up (rad), by the usual camera.
 
-    A focal length of 1.1 times the picture's longer side is within a third of most cameras', which
-    is enough to classify slants.
+    That is enough to classify slants.
     """
     import cv2
 
-    focal = 1.1 * max(width, height)
-    matrix = np.array([[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]])
+    matrix = usual_camera(width, height).matrix
     _, turns, _, _ = cv2.solvePnPGeneric(
         detection.points, detection.pixels, matrix, None, flags=cv2.SOLVEPNP_IPPE
     )

@@ -7,13 +7,11 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.errors import InputError
-from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
+from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.vision.geometry.board_pose import ODDS, BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.live import Frame, look
-from scissorcal.vision.targets.boards import PRINT_SCALE_SD, MarkedBoard
-
-ODDS = 20.0
-"""Below these odds against the second pose that a plane allows, a picture is ambiguous."""
+from scissorcal.vision.targets.boards import MarkedBoard
 
 BLANK_LEVELS = 8.0
 """A picture is blank where 98 % of it lies within fewer grey levels than these."""
@@ -43,7 +41,10 @@ class Tracked:
 
 
 def track(
-    frames: Iterable[Frame], boards: Sequence[MarkedBoard], camera: Camera
+    frames: Iterable[Frame],
+    boards: Sequence[MarkedBoard],
+    camera: Camera,
+    priors: PlatePriors = PlatePriors(),
 ) -> Iterator[Tracked]:
     """Locate a target in every picture independently; the first board that is seen is the target.
 
@@ -62,10 +63,8 @@ def track(
             yield Tracked(frame.number, frame.time_s, state, None, 0, None)
             continue
         boards = tuple(board for board in boards if board == seen.board)
-        still = np.zeros(len(seen.ids), dtype=np.int64)
-        corners = Corners(seen.pixels, seen.points, still, seen.ids)
         try:
-            found = locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+            found = locate_board(Corners.of(seen), camera, priors)
         except ValueError:
             count = len(seen.ids)
             yield Tracked(frame.number, frame.time_s, "no pose", boards[0], count, None)

@@ -97,12 +97,18 @@ def _friction_settings(recipe: Recipe) -> object:
     return recipe.fit.friction.model_dump(mode="json")
 
 
+def _camera_settings(recipe: Recipe) -> object:
+    return recipe.fit.camera.model_dump(mode="json")
+
+
 def _blade_settings(recipe: Recipe) -> object:
-    return [recipe.scene.opening_deg, recipe.scene.contact_mm, recipe.rig.moving]
+    scene = [recipe.scene.opening_deg, recipe.scene.contact_mm, recipe.rig.moving]
+    return [*scene, recipe.fit.blade.model_dump(mode="json")]
 
 
 def _plate_settings(recipe: Recipe) -> object:
-    return [recipe.plate.model_dump(mode="json"), recipe.rig.moving]
+    fit = recipe.fit.plate.model_dump(mode="json")
+    return [recipe.plate.model_dump(mode="json"), recipe.rig.moving, fit]
 
 
 def _cut_settings(recipe: Recipe) -> object:
@@ -158,6 +164,7 @@ STEPS: tuple[Step, ...] = (
         "scissorcal fit camera",
         _geometry("camera"),
         inputs=("capture camera",),
+        settings=_camera_settings,
         version=3,
         file=_in_fits("camera.nc"),
         read=facts.fit,

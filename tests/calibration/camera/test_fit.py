@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, seen
 from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
-from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, guess, seen_region
+from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, seen_region
 from scissorcal.calibration.camera.pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.calibration.camera.uncertainty import (
     camera_covariance,
-    camera_of,
     halves,
     pixel_map,
 )
 from scissorcal.errors import MissingError, VerdictError
+from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.sim import Lens, Pose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
@@ -81,7 +81,7 @@ def photographs(
 def boards(photos: list[CameraPhoto]) -> list[SeenBoard]:
     size = (CAMERA_BOARD.width_m, CAMERA_BOARD.height_m)
     return [
-        SeenBoard(photo.name, photo.detection.points, photo.detection.pixels, size)
+        SeenBoard(photo.name, photo.detection.points, photo.detection.pixels, size, 1e-3)
         for photo in photos
     ]
 
@@ -109,7 +109,7 @@ def test_slopes_of_seen_corners_are_right() -> None:
 
 def test_exact_corners_give_the_exact_camera_and_bend() -> None:
     photos = photographs(np.random.default_rng(1), 6, noise_px=0.0, bulge_m=(8e-4, -3e-4))
-    start = np.append(guess(WIDTH, HEIGHT), [0.0, 0.0])
+    start = np.append(usual_camera(WIDTH, HEIGHT).parameters, [0.0, 0.0])
     bundle = fit_bundle(boards(photos), BROWN, start)
     assert bundle.converged
     assert bundle.camera[:4] == pytest.approx(TRUE[:4], abs=0.02)
@@ -139,7 +139,7 @@ def z_scores(seed: int, **how: float) -> tuple[Array, float, float]:
     spread = camera_covariance(bundle)
     free = [0, 2, 3, 4, 5, 6, 7]
     off = (bundle.camera - TRUE[:9])[free]
-    camera = camera_of(bundle.camera, WIDTH, HEIGHT, spread.covariance)
+    camera = Camera.of(bundle.camera, WIDTH, HEIGHT, spread.covariance)
     region, _ = seen_region([view.pixels for view in views], WIDTH, HEIGHT)
     _, cross = pixel_map(camera, spread, halves(views, bundle), region)
     assert cross is not None
@@ -189,7 +189,7 @@ def test_the_model_has_as_many_coefficients_as_data_want(
 ) -> None:
     # Of 45 simulated fits 37 chose the true model and 8 a richer one, none a poorer one.
     lens = replace(LENS, distortion=bend)
-    start = np.append(guess(WIDTH, HEIGHT), [0.0, 0.0])
+    start = np.append(usual_camera(WIDTH, HEIGHT).parameters, [0.0, 0.0])
     names = []
     for seed in range(3):
         photos = photographs(np.random.default_rng(100 + seed), 12, lens=lens)
@@ -233,7 +233,7 @@ def test_the_map_says_what_drawn_cameras_do(fitted) -> None:  # type: ignore[no-
     rays = np.column_stack([fit.camera.rays(places), np.ones(len(places))])
     moved = []
     for draw in fit.draws[:150]:
-        seen_px = camera_of(draw, WIDTH, HEIGHT).project(rays)
+        seen_px = Camera.of(draw, WIDTH, HEIGHT).project(rays)
         slope = np.zeros((2 * len(rays), 3))
         for axis in range(3):
             turn = np.zeros(3)

@@ -100,7 +100,7 @@ def test_simpler_families_that_the_evidence_rejects_are_not_chosen():
     rng = np.random.default_rng(4)
     compared = compare_edges((cells("arc", rng),), LENGTH, "draft", rng, ("line", "arc"))
     assert compared.best.family == "arc"
-    assert compared.scores[1].evidence > compared.scores[0].evidence + 20.0
+    assert compared.rows[1].evidence > compared.rows[0].evidence + 20.0
 
 
 @pytest.mark.parametrize("family", ["cubic", "spline"])

@@ -6,11 +6,11 @@ import pytest
 
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe, recipe_names, specimen_names
+from scissorcal.recipe.library import builtin_recipe, recipe_names, specimens_dir
 from tests.device.sim.build import specimen
 
 
-@pytest.mark.parametrize("name", specimen_names())
+@pytest.mark.parametrize("name", sorted(path.stem for path in specimens_dir().glob("*.toml")))
 def test_specimens_that_come_along_load(name: str) -> None:
     assert load_specimen(name).name == name
 

@@ -21,9 +21,6 @@ DEGREES_OF_FREEDOM = 5.0
 SHARED = (*PARAMETERS, "bulge_x", "bulge_y")
 """What the views of a fit share: the camera's nine parameters, and the board's bulges in metres."""
 
-BULGE_SD_M = 1e-3
-"""Prior standard deviation of a bulge: a sheet glued to something stiff bends less than that."""
-
 LEAST_SD_PX = 0.01
 _ROUNDS = 20
 _SETTLED = 1e-3
@@ -36,13 +33,15 @@ _PRECISION = 1e-8
 class SeenBoard:
     """Corners of a board in one photograph: ``points`` (n, 3) in its frame, ``pixels`` (n, 2).
 
-    ``size_m`` are the board's width and height.
+    ``size_m`` are the board's width and height, ``bulge_sd_m`` is the prior standard deviation of
+    either bulge.
     """
 
     name: str
     points: Array
     pixels: Array
     size_m: tuple[float, float]
+    bulge_sd_m: float
 
     @property
     def bulges(self) -> Array:
@@ -182,6 +181,7 @@ class _Place:
         self, views: Sequence[SeenBoard], structure: Structure, shared: Array, poses: Array
     ) -> None:
         self.structure, self.shared, self.poses = structure, shared, poses
+        self.bulge_sd_m = views[0].bulge_sd_m
         self.residuals: list[Array] = []
         self.by_pose: list[Array] = []
         self.by_shared: list[Array] = []
@@ -280,11 +280,10 @@ class _Place:
             converged,
         )
 
-    @staticmethod
-    def _precision(sd_px: float) -> Array:
+    def _precision(self, sd_px: float) -> Array:
         """The prior's weight (11,) on squares of the shared parameters, as a corner's has it."""
         weight = np.zeros(len(SHARED))
-        weight[len(PARAMETERS) :] = (sd_px / BULGE_SD_M) ** 2
+        weight[len(PARAMETERS) :] = (sd_px / self.bulge_sd_m) ** 2
         return weight
 
 

@@ -33,7 +33,7 @@ def refuse_parallel(views: Sequence[SeenBoard], start: Array) -> None:
 
     A plane fixes the focal length by how its parallel lines meet, and all parallel planes meet in
     the same places (Zhang 2000, doi:10.1109/34.888718). The slants are found under a guessed
-    camera, which is good enough to tell parallel ones.
+    camera, which is good enough to recognise parallel ones.
     """
     normals = _normals(np.array([first_pose(view, start) for view in views]))
     widest = _widest_deg(normals)

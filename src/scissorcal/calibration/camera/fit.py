@@ -18,11 +18,12 @@ from scissorcal.calibration.camera.checks import (
 from scissorcal.calibration.camera.result import CameraFit, ViewError
 from scissorcal.calibration.camera.uncertainty import (
     camera_covariance,
-    camera_of,
     halves,
     pixel_map,
 )
 from scissorcal.errors import MissingError
+from scissorcal.recipe.photograph_priors import CameraPriors
+from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
@@ -45,6 +46,7 @@ def fit_camera(
     photos: Sequence[CameraPhoto],
     *,
     rng: np.random.Generator,
+    priors: CameraPriors = CameraPriors(),
     inputs_hash: str = "",
     progress: Progress | None = None,
 ) -> CameraFit:
@@ -53,7 +55,7 @@ def fit_camera(
     Corner errors follow a Student-t, so that a bad corner does little harm. The distortion model is
     the simplest that photographs left out do not distinguish from the best. The covariance counts
     that the corners of one photograph err together. Photographs that fit far worse than the others
-    are named, none is dropped.
+    are named, none is dropped. ``priors`` are the recipe's.
 
     Raises MissingError with fewer than three photographs, VerdictError where they do not determine
     the focal length: all taken with the board at one slant.
@@ -62,8 +64,8 @@ def fit_camera(
     if len(photos) < FEWEST_VIEWS:
         raise MissingError(_too_few(len(photos)))
     width, height = photos[0].width, photos[0].height
-    views = [seen_board(photo.name, photo.detection) for photo in photos]
-    start = guess(width, height)
+    views = [seen_board(photo.name, photo.detection, priors) for photo in photos]
+    start = usual_camera(width, height).parameters
     refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
     first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))
@@ -73,7 +75,7 @@ def fit_camera(
     bundle = chosen.bundle
     refuse_undetermined(bundle, width, height)
     spread = camera_covariance(bundle)
-    camera = camera_of(bundle.camera, width, height, spread.covariance)
+    camera = Camera.of(bundle.camera, width, height, spread.covariance)
     region, share = seen_region([view.pixels for view in views], width, height)
     tell(0.85, "camera: two halves apart")
     places, cross = pixel_map(camera, spread, halves(views, bundle), region)
@@ -99,17 +101,10 @@ def fit_camera(
     )
 
 
-def seen_board(name: str, detection: Detection) -> SeenBoard:
+def seen_board(name: str, detection: Detection, priors: CameraPriors) -> SeenBoard:
     """Give a detection as the bundle's arrays."""
-    board = detection.board
-    return SeenBoard(name, detection.points, detection.pixels, (board.width_m, board.height_m))
-
-
-def guess(width: int, height: int) -> Array:
-    """Nine parameters of a camera of middling field of view, to start from."""
-    focal = 1.1 * max(width, height)
-    middle = (0.5 * (width - 1), 0.5 * (height - 1))
-    return np.array([focal, focal, *middle, 0.0, 0.0, 0.0, 0.0, 0.0])
+    size = detection.board.width_m, detection.board.height_m
+    return SeenBoard(name, detection.points, detection.pixels, size, 1e-3 * priors.bulge_sd_mm)
 
 
 def seen_region(pixels: Sequence[Array], width: int, height: int) -> tuple[Array, float]:

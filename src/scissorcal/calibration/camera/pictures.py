@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.bundle import SeenBoard, seen
 from scissorcal.calibration.camera.result import CameraFit, PixelMap, ViewError
-from scissorcal.calibration.camera.uncertainty import parameters_of
 from scissorcal.files import replacing
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ _ARROW_SHARE = 0.02
 
 def left_over(fit: CameraFit, view: ViewError, board: SeenBoard) -> Array:
     """Seen minus predicted pixels (n, 2) of one photograph."""
-    shared = np.append(parameters_of(fit.camera), 1e-3 * np.asarray(fit.bulge_mm))
+    shared = np.append(fit.camera.parameters, 1e-3 * np.asarray(fit.bulge_mm))
     predicted, _, _ = seen(board, np.asarray(view.pose), shared)
     return np.asarray(board.pixels - predicted)
 

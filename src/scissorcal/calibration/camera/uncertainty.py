@@ -13,7 +13,7 @@ from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 Array = NDArray[np.float64]
 
 GRID = (21, 15)
-FEWEST_VIEWS = 6
+FEWEST_TO_HALVE = 6
 """Fewer photographs than these cannot be halved."""
 
 _DRAWS = 2000
@@ -64,7 +64,7 @@ def _inverse_root(symmetric: Array) -> Array:
 
 def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] | None:
     """Fit two halves of the photographs apart, every other one; None where there are too few."""
-    if len(views) < FEWEST_VIEWS:
+    if len(views) < FEWEST_TO_HALVE:
         return None
     first, second = (
         fit_bundle(views[at::2], bundle.structure, bundle.shared, bundle.poses[at::2])
@@ -108,9 +108,8 @@ def pixel_map(
 
 def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Array:
     """Slopes (n, 2, 9) of pixels by the camera's parameters, the best rotation taken out."""
-    parameters = parameters_of(camera)
     points = np.column_stack([np.nan_to_num(rays), np.ones(len(rays))])
-    _, by_pose, by_camera = projected(points, np.zeros(6), parameters)
+    _, by_pose, by_camera = projected(points, np.zeros(6), camera.parameters)
     turn, own = by_pose[:, :3], by_camera
     rows = np.repeat(within, 2)
     absorbed, *_ = np.linalg.lstsq(turn[rows], own[rows], rcond=None)
@@ -119,7 +118,7 @@ def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Arr
 
 def _difference(pixels: Array, parts: tuple[Bundle, Bundle], within: NDArray[np.bool_]) -> Array:
     """Where the second half's camera sees what the first one sees at ``pixels``, less those."""
-    rays = camera_of(parts[0].camera, 0, 0).rays(pixels)
+    rays = Camera.of(parts[0].camera, 0, 0).rays(pixels)
     points = np.column_stack([rays, np.ones(len(rays))])
     used = within & np.isfinite(rays).all(axis=1)
     safe = np.nan_to_num(points)
@@ -146,16 +145,3 @@ def _judged(
     return CrossValidation(
         float(np.sqrt(seen)), float(np.sqrt(expected.mean())), float(np.mean(expected >= seen))
     )
-
-
-def parameters_of(camera: Camera) -> Array:
-    """The nine parameters of a camera as one array."""
-    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5]])
-
-
-def camera_of(
-    parameters: Array, width: int, height: int, covariance: Array | None = None
-) -> Camera:
-    """Make a camera of nine parameters."""
-    fx, fy, cx, cy, *bend = (float(value) for value in parameters)
-    return Camera(fx, fy, cx, cy, tuple(bend), width, height, covariance)

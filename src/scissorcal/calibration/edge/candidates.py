@@ -10,17 +10,19 @@ from scissorcal.calibration.candidates import Account, compare
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.calibration.edge.model import (
     FAMILIES,
-    Basis,
     CellData,
     EdgeEvidence,
     Family,
+    Found,
     basis_of,
     search,
 )
+from scissorcal.calibration.edge.result import RungRow
 from scissorcal.inference.infer import infer
 from scissorcal.inference.posterior import Effort
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief
+from scissorcal.recipe.photograph_priors import BladePriors
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -34,34 +36,15 @@ _COUNT = {"draft": 200, "standard": 300, "thorough": 600}
 
 
 @dataclass(frozen=True)
-class EdgeScore:
-    """One family compared with the others, its errors' sizes at their optimum.
-
-    ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` and
-    ``roughness_length_m`` tell what is left of the edge beyond its family, ``noise_factor`` how
-    much noisier points are than the picture's light says, ``between_m`` how much photographs
-    disagree.
-    """
-
-    family: Family
-    evidence: float
-    noise_factor: float
-    roughness_m: float
-    roughness_length_m: float
-    between_m: float
-
-
-@dataclass(frozen=True)
 class EdgeComparison:
-    """All families compared, and the ``chosen`` one (an index) fitted to all photographs.
+    """All families compared, their errors' sizes at the optimum, and the chosen one fitted.
 
     ``belief`` is the edge with its covariance, ``draws`` (n, k) are of its parameters, ``residual``
     (n,) is of all cells in the order of the photographs. ``status`` and ``sentence`` are the
     sampler's, ``evaluations`` counts those of the likelihood over all families.
     """
 
-    scores: tuple[EdgeScore, ...]
-    chosen: int
+    rows: tuple[RungRow, ...]
     belief: EdgeBelief
     draws: Array
     residual: Array
@@ -70,8 +53,8 @@ class EdgeComparison:
     evaluations: int
 
     @property
-    def best(self) -> EdgeScore:
-        return self.scores[self.chosen]
+    def best(self) -> RungRow:
+        return next(row for row in self.rows if row.chosen)
 
 
 def compare_edges(
@@ -80,6 +63,7 @@ def compare_edges(
     effort: Effort,
     rng: np.random.Generator,
     families: tuple[Family, ...] = FAMILIES,
+    priors: BladePriors = BladePriors(),
     progress: Progress | None = None,
 ) -> EdgeComparison:
     """Compare families of edges by their evidence, and fit the chosen one.
@@ -97,13 +81,14 @@ def compare_edges(
     found, evidences = [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")
-        evidences.append(EdgeEvidence(data, basis_of(data, family)))
+        evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
         found.append(search(evidences[-1]))
-    scores = tuple(
-        _score(data, family, one.optimum.point, one.evidence)
-        for family, one in zip(families, found, strict=True)
+    sizes = [evidence.basis.columns.shape[1] for evidence in evidences]
+    chosen = _chosen(families, sizes, [one.evidence for one in found])
+    rows = tuple(
+        _row(data, family, one, index == chosen)
+        for index, (family, one) in enumerate(zip(families, found, strict=True))
     )
-    chosen = _chosen(scores, [evidence.basis for evidence in evidences])
     evidence = evidences[chosen]
     posterior = infer(
         evidence.problem(),
@@ -120,8 +105,7 @@ def compare_edges(
     others = sum(one.evaluations for index, one in enumerate(found) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
     return EdgeComparison(
-        scores,
-        chosen,
+        rows,
         belief,
         natural,
         residual,
@@ -131,24 +115,19 @@ def compare_edges(
     )
 
 
-def _score(data: CellData, family: Family, point: Array, evidence: float) -> EdgeScore:
-    sizes = np.exp(point)
-    between = float(sizes[4]) if data.several else 0.0
-    noise, rough, length = (float(size) for size in sizes[:3])
-    return EdgeScore(family, evidence, noise, rough, length, between)
+def _row(data: CellData, family: Family, found: Found, chosen: bool) -> RungRow:
+    noise, rough, length, _, *more = (float(size) for size in np.exp(found.optimum.point))
+    between = more[0] if data.several else 0.0
+    return RungRow(family, found.evidence, chosen, noise, rough, length, between)
 
 
-def _chosen(scores: tuple[EdgeScore, ...], bases: Sequence[Basis]) -> int:
+def _chosen(families: Sequence[Family], sizes: Sequence[int], evidences: Sequence[float]) -> int:
     """The simplest family that the evidence does not distinguish from the best.
 
     The evidence is the log density of all cells, each predicted from those before it: one unit, as
     photographs of one blade share its roughness.
     """
-    rows = compare(
-        [score.family for score in scores],
-        [basis.columns.shape[1] for basis in bases],
-        [Account(np.array([[score.evidence] for score in scores]))],
-    )
+    rows = compare(families, sizes, [Account(np.array(evidences)[:, None])])
     return next(index for index, row in enumerate(rows) if row.chosen)
 
 
@@ -172,7 +151,7 @@ def _draw(evidence: EdgeEvidence, u: Array, rng: np.random.Generator) -> Array:
 
 
 def _belief(data: CellData, family: Family, draws: Array) -> tuple[EdgeBelief, Array]:
-    """The draws in the edge's own parameters, and the normal belief that they amount to."""
+    """The normal distribution that the draws amount to, and the draws in the edge's parameters."""
     natural = draws.copy()
     if family == "spline":
         names = tuple(f"spline_m_{index}" for index in range(draws.shape[1]))

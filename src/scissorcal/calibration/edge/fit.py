@@ -13,10 +13,11 @@ from scissorcal.calibration.edge.candidates import (
     compare_edges,
 )
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
-from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow, RungRow
+from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
@@ -63,10 +64,11 @@ def fit_blade(
             "leave one kind out."
         )
     metric = sized[0].metric
+    priors = recipe.fit.blade.priors if recipe else BladePriors()
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    best = compare_edges(cells, length, effort, rng, progress=progress)
+    best = compare_edges(cells, length, effort, rng, priors=priors, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -81,7 +83,7 @@ def fit_blade(
         name,
         best.belief,
         best.draws,
-        _rung_rows(best),
+        best.rows,
         station,
         _band(edges.offset_at(station)),
         _band(np.arctan(edges.slope_at(station))),
@@ -97,21 +99,6 @@ def fit_blade(
         _notes(sized, best, metric),
     )
     return replace(fit, verdicts=_verdicts(fit, best, effort))
-
-
-def _rung_rows(compared: EdgeComparison) -> tuple[RungRow, ...]:
-    return tuple(
-        RungRow(
-            score.family,
-            score.evidence,
-            index == compared.chosen,
-            score.noise_factor,
-            score.roughness_m,
-            score.roughness_length_m,
-            score.between_m,
-        )
-        for index, score in enumerate(compared.scores)
-    )
 
 
 def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
@@ -228,7 +215,7 @@ def _verdicts(fit: BladeFit, best: EdgeComparison, effort: Effort) -> tuple[Verd
             f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
         )
     ]
-    checks.append(_agreement(fit, scope))
+    checks.append(_agreement(fit, best, scope))
     if best.status in UNTRUSTED:
         checks.append(
             Verdict(
@@ -244,13 +231,13 @@ def _verdicts(fit: BladeFit, best: EdgeComparison, effort: Effort) -> tuple[Verd
     return tuple(checks)
 
 
-def _agreement(fit: BladeFit, scope: str) -> Verdict:
+def _agreement(fit: BladeFit, best: EdgeComparison, scope: str) -> Verdict:
     """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
     check = "photographs agree"
     if len(fit.photographs) < 2:
         why = "One photograph does not show how far others of the same blade would agree."
         return not_evaluated(scope, check, why)
-    apart = next(rung.between_m for rung in fit.rungs if rung.chosen) / fit.belief.edge.length_m
+    apart = best.best.between_m / fit.belief.edge.length_m
     if apart > MOST_APART:
         return judge(
             scope,

@@ -10,14 +10,12 @@ from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.inference import Cluster, Optimum, Problem
 from scissorcal.inference.status import SearchStatus
 from scissorcal.model.bspline import spline_design
+from scissorcal.recipe.photograph_priors import BladePriors
 
 Array = NDArray[np.float64]
 Family = Literal["line", "arc", "cubic", "spline"]
 
 FAMILIES: tuple[Family, ...] = ("line", "arc", "cubic", "spline")
-PRIOR_SD = (0.4, 0.3, 0.1, 0.4)
-"""Before any photograph, for a blade of length 1: offset, slope, curvature and its change."""
-
 KNOT_SHARE = 0.1
 """Distance of the spline's knots, in shares of the measured length."""
 
@@ -99,20 +97,26 @@ class Basis:
         return self.loose if self.bent is None else self.loose + bend**2 * self.bent
 
 
-def basis_of(data: CellData, family: Family) -> Basis:
+def basis_of(data: CellData, family: Family, priors: BladePriors = BladePriors()) -> Basis:
     """A family's columns at the cells' stations."""
     s = data.station
+    shape_sd = (
+        0.01 * priors.offset_sd_percent,
+        priors.slope_sd,
+        priors.curvature_sd_per_length,
+        priors.bend_sd_per_length2,
+    )
     if family != "spline":
         powers = (np.ones_like(s), s, 0.5 * s**2, s**3 / 6.0)
         count = FAMILIES.index(family) + 2
-        sd = np.array(PRIOR_SD) * data.length ** (1.0 - np.arange(4))
+        sd = np.array(shape_sd) * data.length ** (1.0 - np.arange(4))
         return Basis(np.stack(powers[:count], axis=1), np.diag(sd[:count] ** 2), None)
     count = max(round((data.length - data.start) / (KNOT_SHARE * data.length)), 2) + 3
     columns = spline_design(count, data.start, data.length, s)
     width = (data.length - data.start) / (count - 3)
     place = data.start + width * (np.arange(count) - 1.0)
     straight = np.stack([np.ones(count), place], axis=1)
-    loose = straight @ np.diag([(PRIOR_SD[0] * data.length) ** 2, PRIOR_SD[1] ** 2]) @ straight.T
+    loose = straight @ np.diag([(shape_sd[0] * data.length) ** 2, shape_sd[1] ** 2]) @ straight.T
     curve = np.diff(np.eye(count), 2, axis=0)
     return Basis(columns, loose, np.asarray(np.linalg.pinv(curve.T @ curve) * width**4))
 
@@ -125,23 +129,22 @@ class EdgeEvidence:
     the logarithms of the sizes; ``middle`` and ``sd`` (p,) their normal prior.
     """
 
-    def __init__(self, data: CellData, basis: Basis) -> None:
+    def __init__(self, data: CellData, basis: Basis, priors: BladePriors = BladePriors()) -> None:
         self.data, self.basis = data, basis
+        percent = 0.01 * data.length
         rows = [
-            ("noise_factor", 1.2, 0.4),
-            ("roughness_m", 4e-5 * data.length, 1.5),
-            ("roughness_length_m", 0.02 * data.length, 0.6),
-            ("streak_m", 3e-5 * data.length, 1.2),
+            ("noise_factor", 1.0, priors.noise_factor),
+            ("roughness_m", percent, priors.roughness_percent),
+            ("roughness_length_m", percent, priors.roughness_length_percent),
+            ("streak_m", percent, priors.streak_percent),
         ]
-        # photographs on the mat agree to micrometres, those of two blades may differ by a tenth
-        # of the length: the prior must hold both, or the optimum lies on a bound
         if data.several:
-            rows.append(("between_m", 7e-5 * data.length, 1.5))
+            rows.append(("between_m", percent, priors.between_percent))
         if basis.bent is not None:
-            rows.append(("bending_per_m", 0.1 / data.length, 2.0))
-        self.names = tuple(row[0] for row in rows)
-        self.middle = np.log([row[1] for row in rows])
-        self.sd = np.array([row[2] for row in rows])
+            rows.append(("bending_per_m", 1.0 / data.length, priors.bending_per_length))
+        self.names = tuple(name for name, _, _ in rows)
+        self.middle = np.array([prior.normal()[0] + np.log(unit) for _, unit, prior in rows])
+        self.sd = np.array([prior.log_sd for _, _, prior in rows])
         columns = basis.columns
         self._fixed: Array = data.known + columns @ basis.loose @ columns.T
         self._bent = None if basis.bent is None else columns @ basis.bent @ columns.T
@@ -257,7 +260,7 @@ class Found:
 def search(evidence: EdgeEvidence) -> Found:
     """The most probable sizes, from each start by a quasi-Newton method, and the evidence there.
 
-    Distinct optima are kept, since photographs that disagree can be told from noise in two ways.
+    Distinct optima are kept, since disagreement of photographs can be explained in two ways.
     """
     from scipy.optimize import minimize
 

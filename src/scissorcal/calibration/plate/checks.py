@@ -6,14 +6,12 @@ import numpy as np
 
 from scissorcal.calibration.plate.result import Halves, PlateView
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-from scissorcal.vision.geometry.board_pose import BoardPose
+from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import SMALL_PX
 
 SCOPE = "fit.plate"
-ODDS = 20.0
-"""The pose must be this many times likelier than the second one that a plane allows."""
 FALSE_ALARM = 0.001
 """False-alarm rate of the two splits into halves together."""
 LEFT_OVER_PX = 0.3
@@ -124,7 +122,7 @@ def _rig(rig: RigPose | None) -> Verdict:
             f"The rig's motion does not determine: {', '.join(rig.untold)}. Photograph the rig "
             "markers at several advances and several openings."
         )
-        return Verdict(SCOPE, "rig frame", "fail", float(len(rig.untold)), 0.0, why)
+        return judge(SCOPE, "rig frame", len(rig.untold), 0.0, why)
     off = rig.rms_px / np.sqrt(2.0)
     bad = (
         f"The card's corner residuals have a standard deviation of {off:.2g} px (limit "

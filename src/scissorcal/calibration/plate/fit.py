@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.targets.boards import PRINT_SCALE_SD
 from scissorcal.vision.targets.detect import Detection
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+_EXACT_PRINT = {"print_scale_sd_percent": 0.0}
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ def fit_plate(
     photos: Sequence[PlatePhoto],
     camera: Camera,
     *,
+    priors: PlatePriors = PlatePriors(),
     plate_target: Pose = UNMOVED,
     rig: RigPose | None = None,
     inputs_hash: str = "",
@@ -46,7 +48,7 @@ def fit_plate(
     ``plate_target`` says how the target lies on the plate; the plate's frame has x along the cut
     from its near edge, z out of its upper face. Camera and plate are taken to be at rest; a
     photograph of another pose is detected by fitting it alone. Both poses that a plane allows
-    are refined and kept. ``rig`` takes the pose into the rig's frame.
+    are refined and kept. ``priors`` are the recipe's. ``rig`` takes the pose into the rig's frame.
 
     Raises MissingError without a photograph, InputError where photographs show different targets,
     VerdictError where the corners determine no pose.
@@ -63,12 +65,13 @@ def fit_plate(
                 f"{photo.name} shows the {photo.detection.board.name}, {photos[0].name} the "
                 f"{target}: a plate has one target; leave one of them out."
             )
-    corners = _together(photos)
+    corners = Corners.of(*(photo.detection for photo in photos))
     alone = [
-        _located(corners.where(corners.frame == i), camera, photo) for i, photo in enumerate(photos)
+        _located(corners.where(corners.frame == i), camera, priors, photo)
+        for i, photo in enumerate(photos)
     ]
-    whole = _located(corners, camera, *photos)
-    halves = _halves(corners, camera)
+    whole = _located(corners, camera, priors, *photos)
+    halves = _halves(corners, camera, priors)
     back = plate_target.inverse()
     views = tuple(
         _view(photo, found, whole, corners.frame == i)
@@ -101,9 +104,11 @@ def plate_target(recipe: "Recipe") -> Pose:
     return turn.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
 
 
-def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose:
+def _located(
+    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PlatePhoto
+) -> BoardPose:
     try:
-        return locate_board(corners, camera, print_sd=PRINT_SCALE_SD)
+        return locate_board(corners, camera, priors)
     except ValueError as error:
         names = ", ".join(photo.name for photo in photos)
         raise VerdictError(
@@ -112,17 +117,7 @@ def _located(corners: Corners, camera: Camera, *photos: PlatePhoto) -> BoardPose
         ) from None
 
 
-def _together(photos: Sequence[PlatePhoto]) -> Corners:
-    found = [photo.detection for photo in photos]
-    return Corners(
-        np.concatenate([one.pixels for one in found]),
-        np.concatenate([one.points for one in found]),
-        np.repeat(np.arange(len(found)), [len(one.ids) for one in found]),
-        np.concatenate([one.ids for one in found]),
-    )
-
-
-def _halves(corners: Corners, camera: Camera) -> Halves | None:
+def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | None:
     """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
 
     Every other group of four corners (a marker's, or neighbours on a chessboard, which err
@@ -132,14 +127,16 @@ def _halves(corners: Corners, camera: Camera) -> Halves | None:
     """
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
-    found = [halves for way in ways if (halves := _half_and_half(corners, camera, way))]
+    found = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
     return max(found, key=lambda halves: halves.square, default=None)
 
 
-def _half_and_half(corners: Corners, camera: Camera, way: NDArray[np.bool_]) -> Halves | None:
-    alone = replace(camera, covariance=None)
+def _half_and_half(
+    corners: Corners, camera: Camera, priors: PlatePriors, way: NDArray[np.bool_]
+) -> Halves | None:
+    alone = replace(camera, covariance=None), priors.model_copy(update=_EXACT_PRINT)
     try:
-        first, second = (locate_board(corners.where(half), alone) for half in (way, ~way))
+        first, second = (locate_board(corners.where(half), *alone) for half in (way, ~way))
     except ValueError:
         return None
     assert first.pose.covariance is not None
@@ -147,7 +144,7 @@ def _half_and_half(corners: Corners, camera: Camera, way: NDArray[np.bool_]) -> 
     away = difference(first.pose, second.pose)
     printed = first.by_print - second.by_print
     claimed = first.pose.covariance + second.pose.covariance
-    claimed = claimed + PRINT_SCALE_SD**2 * printed @ printed.T
+    claimed = claimed + (0.01 * priors.print_scale_sd_percent) ** 2 * printed @ printed.T
     if camera.covariance is not None:
         bent = first.by_camera - second.by_camera
         claimed = claimed + bent @ camera.covariance @ bent.T

@@ -1,15 +1,13 @@
 """A track: the plate's pose from picture to picture, one line of JSON for each."""
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from scissorcal.errors import InputError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
@@ -102,18 +100,6 @@ def track_row(seen: Tracked, camera: Camera, back: Pose, rig: RigPose | None) ->
     )
 
 
-def read_track(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
-    """Read a track; a last line that was cut short is left out. Raises InputError."""
-    try:
-        lines = path.read_text("utf-8").splitlines(keepends=True)
-        whole = [line for line in lines if line.endswith("\n")]
-        head = TrackHead.model_validate_json(whole[0] if whole else "")
-        return head, tuple(TrackRow.model_validate_json(line) for line in whole[1:])
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, ValidationError) as error:
-        why = str(error).splitlines()[0]
-        raise InputError(f"{path} is not a track of scissorcal, or it is damaged: {why}.") from None
-
-
 def track_schema() -> dict[str, Any]:
     """JSON schema of a track's lines: the first is a head, each other one a row."""
     schema: dict[str, Any] = TypeAdapter(TrackHead | TrackRow).json_schema()
@@ -147,8 +133,8 @@ def why_no_pose(rows: Sequence[TrackRow]) -> str:
     if not rows:
         return "The camera gave no picture."
     counts = {state: sum(row.state == state for row in rows) for state in STATES}
-    told = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items() if n)
-    return f"None of {len(rows)} pictures gave a pose of the plate's target ({told})."
+    causes = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items() if n)
+    return f"None of {len(rows)} pictures gave a pose of the plate's target ({causes})."
 
 
 def _worst(pose: PoseRecord) -> tuple[float, float]:

@@ -56,7 +56,7 @@ def find_border(
     if there.sum() < 20:
         raise InputError(f"{source}: too little of the blade's {what} is visible.")
     s, e = _thinned(frame[there])
-    rough = _in_pixels(view, parts, s, e)
+    rough = view.to_pixels(parts.points(s, e))
     count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
     stations = np.linspace(s[0], s[-1], count)
     per_unit = count / max(s[-1] - s[0], 1e-12)
@@ -158,23 +158,15 @@ def fit_circle(points: Array) -> tuple[Array, float]:
 
 def _thinned(frame: Array) -> tuple[Array, Array]:
     """One offset per station, smoothed over a few flat pixels."""
+    from scipy.ndimage import median_filter
+
     order = np.argsort(frame[:, 0])
     s, e = frame[order, 0], frame[order, 1]
     cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
     index = np.digitize(s, cells)
     kept = [(s[index == k].mean(), np.median(e[index == k])) for k in np.unique(index)]
     thin = np.array(kept)
-    return thin[:, 0], _median_filtered(thin[:, 1], 5)
-
-
-def _median_filtered(values: Array, width: int) -> Array:
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(values, size=width, mode="nearest"))
-
-
-def _in_pixels(view: View, parts: BladeParts, s: Array, e: Array) -> Array:
-    return view.to_pixels(parts.pivot + s[:, None] * parts.axis + e[:, None] * parts.up)
+    return thin[:, 0], np.asarray(median_filter(thin[:, 1], size=5, mode="nearest"))
 
 
 def _with_normals(
@@ -184,11 +176,11 @@ def _with_normals(
     from scipy.ndimage import gaussian_filter1d
 
     smooth = gaussian_filter1d(e, 8.0, mode="nearest")
-    points = _in_pixels(view, parts, s, e)
-    line = _in_pixels(view, parts, s, smooth)
+    points = view.to_pixels(parts.points(s, e))
+    line = view.to_pixels(parts.points(s, smooth))
     along = np.gradient(line, axis=0)
     normals = np.column_stack([along[:, 1], -along[:, 0]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     step = outward * 0.01 * parts.length
-    leads = _in_pixels(view, parts, s, smooth + step) - line
+    leads = view.to_pixels(parts.points(s, smooth + step)) - line
     return points, normals * np.sign(np.sum(leads * normals, axis=1))[:, None]

@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
 from scissorcal.vision.blade.modes import (
     SHARP,
@@ -55,12 +56,18 @@ class BladeMeasurement:
 
 
 def measure_blade(
-    light: Light, view: View, parts: BladeParts, source: str, *, search: float = 0.035
+    light: Light,
+    view: View,
+    parts: BladeParts,
+    source: str,
+    priors: BladePriors = BladePriors(),
+    *,
+    search: float = 0.035,
 ) -> BladeMeasurement:
     """Measure a blade whose parts are roughly known, in the photograph's pixels.
 
     Nothing is resampled: borders are found in the picture and mapped to the sheet. Each error
-    source has a linear response (see `edge_modes`).
+    source has a linear response (see `edge_modes`), and ``priors`` state what no picture shows.
     ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
@@ -71,7 +78,7 @@ def measure_blade(
     seen = SeenBorders(edge, back, find_hole(light, view, parts))
     frame = _framed(view, parts, seen)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
-    columns, names = edge_modes(view, seen, frame, parts)
+    columns, names = edge_modes(view, seen, frame, parts, priors)
     there = view.to_sheet(edge.pixels)
     station, offset = frame.of(there)
     # noise along the normals in pixels becomes noise along ``up`` in sheet units

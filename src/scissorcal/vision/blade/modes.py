@@ -6,17 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, BladeParts
 from scissorcal.vision.blade.view import View
 
 Array = NDArray[np.float64]
-
-TONE_SHARE = 0.12
-"""Shift of a border as a share of its blur, since a camera's tone curve differs from sRGB."""
-
-GRAIN_SHARE = 0.5
-"""Share of a crossing's noise in common with its neighbours, by streaks of brushed metal."""
 
 SHARP = 1.4
 """Largest blur, relative to the median, of points that determine the centreline."""
@@ -54,7 +49,7 @@ def halving_stations(length: float) -> Array:
 
 
 def edge_modes(
-    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts
+    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts, priors: BladePriors
 ) -> tuple[Array, tuple[str, ...]]:
     """Effect on the edge of one standard deviation of each common error source.
 
@@ -72,20 +67,21 @@ def edge_modes(
     for name, moved in _mapping_moves(view, seen, frame, parts):
         rows.append(response.to(*moved))
         names.append(name)
-    tone = TONE_SHARE * seen.edge.blur_px
+    tone = 0.01 * priors.tone_sd_percent * seen.edge.blur_px
     rows.append(response.to(tone * outward.edge, tone * outward.back, tone * outward.pivot(frame)))
     names.append("tone")
     still = np.zeros(2)
-    rough = GRAIN_SHARE * float(np.median(seen.edge.sd_px))
+    grain = 0.01 * priors.grain_percent
+    rough = grain * float(np.median(seen.edge.sd_px))
     along = np.linspace(-1.0, 1.0, len(edge))
     rows += [
         response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still)
         for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0)
     ]
-    behind = GRAIN_SHARE * float(np.median(seen.back.sd_px))
+    behind = grain * float(np.median(seen.back.sd_px))
     rows.append(response.to(0.0 * edge, behind * outward.back, still))
     names += ["grain"] * 4
-    for shift in _pivot_shifts(outward, frame, seen, parts):
+    for shift in _pivot_shifts(outward, frame, seen, parts, grain):
         rows.append(response.to(0.0 * edge, 0.0 * back, shift))
         names.append("pivot")
     rows.append(-_turn_sd(*frame.of(back)) * response.swing)
@@ -221,9 +217,12 @@ def _mapping_errors(view: View) -> list[tuple[str, Array]]:
 
 
 def _pivot_shifts(
-    outward: _Outward, frame: BladeFrame, seen: SeenBorders, parts: BladeParts
+    outward: _Outward, frame: BladeFrame, seen: SeenBorders, parts: BladeParts, grain: float
 ) -> Array:
-    """Two shifts of the pivot, one standard deviation each."""
+    """Two shifts of the pivot, one standard deviation each.
+
+    ``grain`` is the share of a point's noise that its neighbours have too.
+    """
     if seen.hole is None or outward.hole is None or outward.hole_place is None:
         return np.eye(2) * parts.pivot_sd
     away = outward.hole_place - frame.pivot
@@ -233,8 +232,8 @@ def _pivot_shifts(
     spread = float(np.sqrt(np.mean(off**2)))
     information = radial.T @ radial / 4.0
     pixel = float(np.median(np.linalg.norm(outward.hole, axis=1)))
-    grain = GRAIN_SHARE * float(np.median(seen.hole.sd_px)) * pixel
-    covariance = np.linalg.inv(information) * spread**2 + grain**2 * np.eye(2)
+    common = grain * float(np.median(seen.hole.sd_px)) * pixel
+    covariance = np.linalg.inv(information) * spread**2 + common**2 * np.eye(2)
     return np.asarray(np.linalg.cholesky(covariance)).T
 
 

@@ -47,6 +47,10 @@ class BladeParts:
         away = points - self.pivot
         return np.column_stack([away @ self.axis, away @ self.up])
 
+    def points(self, station: Array, offset: Array) -> Array:
+        """Sheet points (n, 2) of stations and offsets (n,)."""
+        return np.asarray(self.pivot + station[:, None] * self.axis + offset[:, None] * self.up)
+
 
 def lone_blade(
     shape: Silhouette,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.parts import EdgeSide, lone_blade
 from scissorcal.vision.blade.scissors import Scissors, find_scissors
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 
 _SEARCH = 0.1
 """Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
-
-_SCALE_SD = 0.005
 
 
 @dataclass(frozen=True)
@@ -80,31 +79,35 @@ def photograph_blade(
     photo: Photo,
     camera: Camera | None = None,
     *,
+    priors: BladePriors = BladePriors(),
     edge_side: EdgeSide = "down",
     pivot_px: tuple[float, float] | None = None,
-    pivot_sd_px: float = 1.0,
 ) -> BladePhoto:
     """Measure one blade on the mat.
 
-    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it, known to
-    ``pivot_sd_px``.
-    Raises InputError where the photograph cannot be used, saying what is wrong with it.
+    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it. Raises
+    InputError where the photograph cannot be used, saying what is wrong with it.
     """
-    view = see_mat(photo, camera)
+    view = see_mat(photo, camera, priors)
     light = linear_light(photo.grey)
     outline = silhouette(light, view, photo.source)
     pivot, sd = None, 0.0
     if pivot_px is not None:
         beside = (pivot_px[0] + 1.0, pivot_px[1])
         there = view.to_sheet(photo.within([pivot_px, beside]))
-        pivot, sd = there[0], pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
+        pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
     parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
-    measured = measure_blade(light, view, parts, photo.source)
+    measured = measure_blade(light, view, parts, photo.source, priors)
     return BladePhoto(photo, view, outline, (measured,))
 
 
 def photograph_scissors(
-    photo: Photo, camera: Camera | None = None, *, mat: bool = True, scale: float | None = None
+    photo: Photo,
+    camera: Camera | None = None,
+    *,
+    priors: BladePriors = BladePriors(),
+    mat: bool = True,
+    scale: float | None = None,
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
@@ -114,18 +117,19 @@ def photograph_scissors(
     """
     light = linear_light(photo.grey)
     if mat:
-        view: View = see_mat(photo, camera)
+        view: View = see_mat(photo, camera, priors)
         outline = silhouette(light, view, photo.source)
     else:
         height, width = photo.image.shape[:2]
         read = scale * photo.reduction if scale else None
         unit = read or 1.0
         whole = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
-        view = PlainView(whole, read, _SCALE_SD if read else 0.0)
+        view = PlainView(whole, read, 0.01 * priors.scale_sd_percent if read else 0.0)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
     scissors = find_scissors(outline, photo.source)
     measured = tuple(
-        measure_blade(light, view, parts, photo.source, search=_SEARCH) for parts in scissors.blades
+        measure_blade(light, view, parts, photo.source, priors, search=_SEARCH)
+        for parts in scissors.blades
     )
     if len(measured) == 2:
         along = float(measured[0].parts.axis @ measured[1].parts.axis)

@@ -82,10 +82,7 @@ def _blade(
     marks: Sequence[NickMark],
 ) -> float:
     def on_picture(station: Array, offset: Array) -> Array:
-        parts = one.parts
-        return view.to_pixels(
-            parts.pivot + station[:, None] * parts.axis + offset[:, None] * parts.up
-        )
+        return view.to_pixels(one.parts.points(station, offset))
 
     canvas.line(np.array([one.pivot_px, one.axis_px]), AXIS)
     canvas.cross(one.pivot_px, PIVOT)

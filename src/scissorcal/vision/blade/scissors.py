@@ -1,6 +1,6 @@
 """Handles, blades, pivot and opening angle in the outline of scissors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,7 +72,7 @@ def find_scissors(shape: Silhouette, source: str) -> Scissors:
     if crotch is None:
         return _closed(shape, outline[first], handles, rings)
     second, notch = crotch
-    return _open(shape, source, (first, second), notch, handles, rings)
+    return _open(shape, source, (first, second), notch, rings)
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
@@ -142,12 +142,11 @@ def _open(
     source: str,
     tips: tuple[int, int],
     notch: int,
-    handles: Array,
     rings: tuple[Array, ...],
 ) -> Scissors:
     outline = shape.outer
     crotch = outline[notch]
-    sides = [_sides_of(outline, tip, notch, handles) for tip in tips]
+    sides = [_sides_of(outline, tip, notch) for tip in tips]
     lines = []
     for (edge, back), tip in zip(sides, tips, strict=True):
         length = float(np.linalg.norm(outline[tip] - crotch))
@@ -164,18 +163,9 @@ def _open(
         own = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
         stop = float(own.frame(np.concatenate([edge, back]))[:, 0].max())
         clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
-        blades.append(
-            BladeParts(
-                pivot,
-                axis,
-                up,
-                _between(own, edge, clear, stop * (1.0 - _TIP_SHARE)),
-                _between(own, back, clear, stop * (1.0 - _TIP_SHARE)),
-                np.empty((0, 2)),
-                stop,
-                sd,
-            )
-        )
+        last = stop * (1.0 - _TIP_SHARE)
+        edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
+        blades.append(replace(own, edge=edge, back=back, length=stop))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
@@ -266,7 +256,7 @@ def _best_screw(
     return best[1] * shape.pixel + np.asarray(shape.origin), best[2] * shape.pixel
 
 
-def _sides_of(outline: Array, tip: int, notch: int, handles: Array) -> tuple[Array, Array]:
+def _sides_of(outline: Array, tip: int, notch: int) -> tuple[Array, Array]:
     """The edge, from the notch to the tip, and the back, from the tip as far again."""
     count = len(outline)
     ahead = (notch - tip) % count

@@ -1,17 +1,18 @@
 """The mapping from pixels to the sheet under a blade, with its covariance."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board, project_pose
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M, PRINT_SCALE_SD, MarkerBoard
-from scissorcal.vision.targets.detect import find_board
+from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M
+from scissorcal.vision.targets.detect import Detection, find_board
 
 Array = NDArray[np.float64]
 
@@ -55,25 +56,26 @@ class View(Protocol):
     def to_pixels(self, points: Array) -> Array: ...
 
 
-def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT) -> "View":
+def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePriors()) -> "View":
     """Find the blade mat in a photograph and how it is seen.
 
     With a camera by the mat's pose; without one by a homography and one radial term of distortion.
-    Pixels are those of ``photo.image``. Raises InputError where no mat, another target, or too
-    little of it is seen, or where the camera is not that of the photograph.
+    Pixels are those of ``photo.image``; ``priors`` state the error of the print. Raises InputError
+    where no mat, another target, or too little of it is seen, or where the camera is not that of
+    the photograph.
     """
-    seen = find_board(photo, mat)
+    seen = find_board(photo, BLADE_MAT)
     if len(seen.ids) < 4 * LEAST_MARKERS:
         raise InputError(
-            f"{photo.source} shows {len(seen.ids) // 4} of the {mat.name}'s {len(mat.ids)} markers "
-            f"sharply; {LEAST_MARKERS} are needed. Photograph the whole mat, in focus and without "
-            "glare."
+            f"{photo.source} shows {len(seen.ids) // 4} of the {BLADE_MAT.name}'s "
+            f"{len(BLADE_MAT.ids)} markers sharply; {LEAST_MARKERS} are needed. Photograph the "
+            "whole mat, in focus and without glare."
         )
     height, width = photo.image.shape[:2]
-    pixels = (seen.pixels - photo.origin + 0.5) / photo.reduction - 0.5
-    sheet = seen.points[:, :2]
+    seen = replace(seen, pixels=photo.within(seen.pixels))
+    printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
-        return _homography_view(sheet, pixels, (width, height), MAT_FIELD_M, photo.source)
+        return _homography_view(seen, (width, height), printed, photo.source)
     if (camera.width, camera.height) != (photo.width, photo.height):
         raise InputError(
             f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
@@ -81,7 +83,7 @@ def see_mat(photo: Photo, camera: Camera | None, *, mat: MarkerBoard = BLADE_MAT
         )
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
-    return _camera_view(sheet, pixels, camera, MAT_FIELD_M, photo.source)
+    return _camera_view(seen, camera, printed, photo.source)
 
 
 @dataclass(frozen=True)
@@ -126,23 +128,29 @@ class PlainView:
 
 
 @dataclass(frozen=True)
-class CameraView:
-    """A sheet at a pose before a known camera.
+class _MatView:
+    """What views of the mat have in common; the last two of their values are the print's scale."""
+
+    covariance: Array
+    uncertainty: str
+    bounds: ClassVar[tuple[float, float, float, float]] = MAT_FIELD_M
+    metric: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class CameraView(_MatView):
+    """The mat at a pose before a known camera.
 
     Values are its rotation and shift, the camera's intrinsics, and the print's scale by axis.
     """
 
     camera: Camera
     pose: Array
-    covariance: Array
-    bounds: tuple[float, float, float, float]
-    uncertainty: str
-    metric: bool = True
-    shared: int = 11
+    shared: ClassVar[int] = 11
 
     @property
     def values(self) -> Array:
-        return np.concatenate([self.pose, _intrinsics(self.camera), np.ones(2)])
+        return np.concatenate([self.pose, self.camera.parameters, np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         import cv2
@@ -163,8 +171,8 @@ class CameraView:
 
 
 @dataclass(frozen=True)
-class HomographyView:
-    """A sheet seen by an unknown camera: a homography after one radial term about the middle.
+class HomographyView(_MatView):
+    """The mat seen by an unknown camera: a homography after one radial term about the middle.
 
     Values are the homography from pixels to the sheet (8, its last entry 1), the radial term,
     and the print's scale along either axis.
@@ -173,11 +181,7 @@ class HomographyView:
     matrix: Array
     radial: float
     size: tuple[int, int]
-    covariance: Array
-    bounds: tuple[float, float, float, float]
-    uncertainty: str
-    metric: bool = True
-    shared: int = 2
+    shared: ClassVar[int] = 2
 
     @property
     def values(self) -> Array:
@@ -196,18 +200,10 @@ class HomographyView:
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
-def _camera_view(
-    sheet: Array,
-    pixels: Array,
-    camera: Camera,
-    bounds: tuple[float, float, float, float],
-    source: str,
-) -> CameraView:
+def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
     import cv2
 
-    solid = np.column_stack([sheet, np.zeros(len(sheet))])
-    numbers = np.arange(len(sheet))
-    corners = Corners(pixels, solid, np.zeros_like(numbers), numbers)
+    corners = Corners.of(seen)
     try:
         board = locate_board(corners, camera)
     except ValueError as error:
@@ -225,26 +221,18 @@ def _camera_view(
     covariance[:6, 6:15] = follow @ known
     covariance[6:15, :6] = covariance[:6, 6:15].T
     covariance[6:15, 6:15] = known
-    covariance[15:, 15:] = PRINT_SCALE_SD**2 * np.eye(2)
-    return CameraView(
-        camera,
-        pose,
-        covariance,
-        bounds,
-        f"Fitted camera: the mat's corner residuals are {spread:.2f} px rms.",
-    )
+    covariance[15:, 15:] = printed
+    words = f"Fitted camera: the mat's corner residuals are {spread:.2f} px rms."
+    return CameraView(covariance, words, camera, pose)
 
 
 def _homography_view(
-    sheet: Array,
-    pixels: Array,
-    size: tuple[int, int],
-    bounds: tuple[float, float, float, float],
-    source: str,
+    seen: Detection, size: tuple[int, int], printed: Array, source: str
 ) -> HomographyView:
     import cv2
     from scipy.optimize import least_squares
 
+    sheet, pixels = seen.points[:, :2], seen.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
         raise InputError(f"{source}: the mat's markers do not fit a flat sheet.")
@@ -267,16 +255,12 @@ def _homography_view(
     own, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
     covariance = np.zeros((11, 11))
     covariance[:9, :9] = own
-    covariance[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
-    return HomographyView(
-        _matrix(solved.x[:8]),
-        float(solved.x[8]),
-        size,
-        covariance,
-        bounds,
+    covariance[9:, 9:] = printed
+    words = (
         "No camera fit: a homography and one radial term, with corner residuals of "
-        f"{spread:.2f} px rms.",
+        f"{spread:.2f} px rms."
     )
+    return HomographyView(covariance, words, _matrix(solved.x[:8]), float(solved.x[8]), size)
 
 
 def _covariance(J: Array, residual: Array, least: float = 1.0) -> tuple[Array, float]:
@@ -304,10 +288,6 @@ def _pixels_per_unit(matrix: Array, sheet: Array, size: tuple[int, int]) -> Arra
     down = _through(back, sheet + np.array([0.0, step])) - here
     area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
     return np.asarray(np.sqrt(area) / step * _half(size))
-
-
-def _intrinsics(camera: Camera) -> Array:
-    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:5]])
 
 
 def _with_intrinsics(camera: Camera, values: Array) -> Camera:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
+from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -17,9 +19,8 @@ LEAST_SD_PX = 0.02
 FAR_OFF = 6.0
 """Residuals above this many robust standard deviations are outliers and left out."""
 
-TYPICAL_SD_PX, TYPICAL_WEIGHT = 0.05, 2.0
-"""Prior standard deviation of a corner, and its weight in residuals: the four corners of a marker
-have only two degrees of freedom left."""
+ODDS = 20.0
+"""A pose must be this many times likelier than the second one that a plane allows."""
 
 FEWEST = 4
 ROUNDS = 100
@@ -38,6 +39,16 @@ class Corners:
     points: Array
     frame: Integers
     corner: Integers
+
+    @classmethod
+    def of(cls, *detections: Detection) -> "Corners":
+        """The corners of one target, a frame for each of its detections."""
+        return cls(
+            np.concatenate([one.pixels for one in detections]),
+            np.concatenate([one.points for one in detections]),
+            np.repeat(np.arange(len(detections)), [len(one.ids) for one in detections]),
+            np.concatenate([one.ids for one in detections]),
+        )
 
     def where(self, keep: NDArray[np.bool_]) -> "Corners":
         """The corners that ``keep`` selects."""
@@ -68,14 +79,16 @@ class BoardPose:
     by_print: Array
 
 
-def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> BoardPose:
+def locate_board(
+    corners: Corners, camera: Camera, priors: PlatePriors = PlatePriors()
+) -> BoardPose:
     """Find a flat target's pose, and the second one that may explain the picture as well.
 
     Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
     are refined on all corners, those far off left out; the better one is the pose. Its covariance
     has three parts: corner errors that are independent between frames, corner errors that
-    repeat in all frames (both estimated from the residuals), and the errors of camera and print:
-    ``print_sd`` is the relative standard deviation of the printer's scale along each axis.
+    repeat in all frames (both estimated from the residuals), and the errors of camera and print.
+    ``priors`` state what one frame leaves open of the first, and the printer's scale.
 
     Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
     """
@@ -95,11 +108,12 @@ def locate_board(corners: Corners, camera: Camera, *, print_sd: float = 0.0) -> 
             (_refine(found.pose, corners, camera, used) for found in refined), key=_square
         )
         best = refined[0]
-        noise, kept = _components(best.residuals, corners, used)
+        noise, kept = _components(best.residuals, corners, used, priors)
         own, by_camera, by_print = _covariance(best, corners, used, noise, kept)
     except np.linalg.LinAlgError:
         raise ValueError("the corners that were seen do not determine a pose") from None
     sd = float(np.sqrt(noise + kept))
+    print_sd = 0.01 * priors.print_scale_sd_percent
     covariance = own + print_sd**2 * by_print @ by_print.T
     if camera.covariance is not None:
         covariance = covariance + by_camera @ camera.covariance @ by_camera.T
@@ -201,7 +215,9 @@ def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(used & (distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0)))
 
 
-def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> tuple[float, float]:
+def _components(
+    residuals: Array, corners: Corners, used: NDArray[np.bool_], priors: PlatePriors
+) -> tuple[float, float]:
     """Variances of a coordinate: independent between frames, and constant for a corner."""
     frames = len(np.unique(corners.frame[used]))
     seen = residuals[used]
@@ -210,8 +226,8 @@ def _components(residuals: Array, corners: Corners, used: NDArray[np.bool_]) -> 
     spare = 2 * len(seen) - 6
     least = LEAST_SD_PX**2
     if frames == 1:
-        usual = TYPICAL_WEIGHT * TYPICAL_SD_PX**2
-        found = (usual + float(np.sum(seen**2))) / (TYPICAL_WEIGHT + spare)
+        usual = priors.corner_weight * priors.corner_sd_px**2
+        found = (usual + float(np.sum(seen**2))) / (priors.corner_weight + spare)
         return max(found, least), 0.0
     mean = np.stack([np.bincount(place, seen[:, k]) / count for k in (0, 1)], axis=1)
     within = float(np.sum((seen - mean[place]) ** 2)) / max(2 * (len(seen) - len(labels)), 1)

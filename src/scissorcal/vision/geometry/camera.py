@@ -14,6 +14,13 @@ _ROUND_TRIP_PX = 1e-3
 _UNDISTORT_STEPS = 200
 
 
+def usual_camera(width: int, height: int) -> "Camera":
+    """A camera of middling field of view: its focal length is within a third of most cameras'."""
+    focal = 1.1 * max(width, height)
+    middle = 0.5 * (width - 1), 0.5 * (height - 1)
+    return Camera(focal, focal, *middle, (0.0,) * 5, width, height)
+
+
 @dataclass(frozen=True)
 class Camera:
     """Intrinsics of one camera at one focus and picture size.
@@ -39,6 +46,19 @@ class Camera:
     width: int
     height: int
     covariance: Array | None = None
+
+    @classmethod
+    def of(
+        cls, parameters: Array, width: int, height: int, covariance: Array | None = None
+    ) -> "Camera":
+        """The camera of nine `PARAMETERS`."""
+        fx, fy, cx, cy, *bend = (float(value) for value in parameters)
+        return cls(fx, fy, cx, cy, tuple(bend), width, height, covariance)
+
+    @property
+    def parameters(self) -> Array:
+        """The nine `PARAMETERS`; k4 to k6 are not among them."""
+        return np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion[:5]])
 
     @property
     def matrix(self) -> Array:

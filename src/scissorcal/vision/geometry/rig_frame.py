@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
@@ -15,13 +16,13 @@ from scissorcal.vision.geometry.board_pose import (
 )
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
-from scissorcal.vision.targets.boards import PRINT_SCALE_SD
 from scissorcal.vision.targets.detect import Detection
 
 Array = NDArray[np.float64]
 
 OPEN = 3.0
-"""Prior standard deviation (rad and m) of both poses."""
+"""Prior standard deviation (rad and m) of both poses: a turn that may be any has 1.8 rad, and no
+camera stands so far away. It bounds what the motion leaves open, and decides nothing else."""
 
 UNTOLD = 0.1
 """A direction of the camera's pose with a larger standard deviation (rad or m) is undetermined by
@@ -42,8 +43,7 @@ class CardView:
 
 def card_view(detection: Detection, stance: tuple[float, float], moving_blades: int) -> CardView:
     """The card as detected in one photograph; ``stance`` is advance (mm) and opening (deg)."""
-    frame = np.zeros(len(detection.ids), dtype=np.int64)
-    corners = Corners(detection.pixels, detection.points, frame, detection.ids)
+    corners = Corners.of(detection)
     return CardView(corners, 1e-3 * stance[0], float(np.radians(stance[1]) / moving_blades))
 
 
@@ -72,7 +72,12 @@ class RigPose:
         return between(self.camera_rig, board.pose, shared)
 
 
-def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> RigPose:
+def locate_rig(
+    views: tuple[CardView, ...],
+    camera: Camera,
+    middle_m: Array,
+    priors: PlatePriors = PlatePriors(),
+) -> RigPose:
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
@@ -102,7 +107,7 @@ def locate_rig(views: tuple[CardView, ...], camera: Camera, middle_m: Array) -> 
     prior = np.diag(np.full(len(point), 1.0 / OPEN**2))
     inverse = np.linalg.inv(normal / noise + prior)
     known = np.zeros((11, 11))
-    known[9:, 9:] = PRINT_SCALE_SD**2 * np.eye(2)
+    known[9:, 9:] = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera.covariance is not None:
         known[:9, :9] = camera.covariance
     drawn = slopes / noise
@@ -147,7 +152,7 @@ def _motion(view: CardView) -> Pose:
 def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array) -> Array:
     """Axes from the pictures' own poses: advances give x, turns give z and the pivot's place."""
     first = views[0]
-    shifts, turns, places = [], [], []
+    shifts, turns = [], []
     for view, pose in zip(views[1:], seen[1:], strict=True):
         moved = view.advance_m - first.advance_m
         turned = view.blade_angle_rad - first.blade_angle_rad

@@ -150,7 +150,7 @@ def scissors_layers(
         tail = _handle(shape) if rings else None
         outlines = shape.outlines(tail=tail)
         if rings:
-            outlines.append(_ring_hole(shape))
+            outlines.append(_ring_hole())
         placed = []
         for outline in outlines:
             mirrored = outline * (1.0, side)
@@ -184,7 +184,7 @@ def _handle(shape: BladeShape) -> Array:
     return np.vstack([back, ring, edge])
 
 
-def _ring_hole(shape: BladeShape) -> Array:
+def _ring_hole() -> Array:
     x, y, along, across = _RING
     turn = -_ROUND
     inner = 0.68

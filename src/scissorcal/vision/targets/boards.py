@@ -16,9 +16,6 @@ Array = NDArray[np.float64]
 
 DICTIONARY = "DICT_5X5_250"
 
-PRINT_SCALE_SD = 1e-3
-"""Relative standard deviation of a laser printer's scale along each axis."""
-
 
 @dataclass(frozen=True)
 class CharucoBoard:

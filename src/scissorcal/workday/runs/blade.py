@@ -45,7 +45,7 @@ def capture_blade(
     _refuse_other_setup(photo_captures(workspace, "blade"), setup)
 
     def look(path: Path, photo: "Photo") -> Seen:
-        return Seen(_measured(photo, _camera_for(engine, photo, setup), setup).sentence())
+        return Seen(_measured(engine, photo, setup).sentence())
 
     board = BLADE_MAT if setup.mat else None
     return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
@@ -72,13 +72,16 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     return Made(result, lambda folder: _draw(seen, fits, folder))
 
 
-def _measured(photo: "Photo", camera: "Camera | None", setup: BladeSetup) -> "BladePhoto":
+def _measured(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "BladePhoto":
     from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
 
+    camera, priors = _camera_for(engine, photo, setup), engine.recipe.fit.blade.priors
     if setup.both:
         scale = setup.scale_mm_per_px * 1e-3 if setup.scale_mm_per_px else None
-        return photograph_scissors(photo, camera, mat=setup.mat, scale=scale)
-    return photograph_blade(photo, camera, edge_side=setup.edge_side, pivot_px=setup.pivot_px)
+        return photograph_scissors(photo, camera, priors=priors, mat=setup.mat, scale=scale)
+    return photograph_blade(
+        photo, camera, priors=priors, edge_side=setup.edge_side, pivot_px=setup.pivot_px
+    )
 
 
 def _camera_for(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "Camera | None":
@@ -115,7 +118,7 @@ def _all_measured(
         for photograph in capture.index.photographs:
             tell(0.6 * len(seen) / count, f"measuring {photograph.source}")
             photo = replace(read_photo(capture.path(photograph)), source=photograph.source)
-            seen.append(_measured(photo, _camera_for(engine, photo, setup), setup))
+            seen.append(_measured(engine, photo, setup))
     return tuple(seen)
 
 

@@ -20,6 +20,7 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.camera.bundle import SeenBoard
     from scissorcal.calibration.camera.fit import CameraPhoto
     from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.vision.camera_files import CameraFile
@@ -71,14 +72,22 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     """Fit the camera to all photographs of boards; draw residuals and uncertainty."""
     import numpy as np
 
-    from scissorcal.calibration.camera.fit import fit_camera
+    from scissorcal.calibration.camera.fit import fit_camera, seen_board
     from scissorcal.workday.runs.fit import Made
 
     captures = photo_captures(engine.workspace, "camera")
     photos = _photos(captures)
     rng = np.random.default_rng([request.seed, STREAM])
-    result = fit_camera(photos, rng=rng, inputs_hash=request.inputs_hash, progress=request.progress)
-    return Made(result, lambda folder: _draw(result, photos, captures, folder))
+    priors = engine.recipe.fit.camera.priors
+    result = fit_camera(
+        photos,
+        rng=rng,
+        priors=priors,
+        inputs_hash=request.inputs_hash,
+        progress=request.progress,
+    )
+    boards = [seen_board(photo.name, photo.detection, priors) for photo in photos]
+    return Made(result, lambda folder: _draw(result, boards, captures, folder))
 
 
 def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFile", Path]:
@@ -137,12 +146,11 @@ def _photos(captures: Sequence[PhotoCapture]) -> list["CameraPhoto"]:
 
 def _draw(
     found: "CameraFit",
-    photos: Sequence["CameraPhoto"],
+    boards: Sequence["SeenBoard"],
     captures: Sequence[PhotoCapture],
     folder: Path,
 ) -> None:
     """Draw residuals over the picture, the uncertainty, and the worst photographs."""
-    from scissorcal.calibration.camera.fit import seen_board
     from scissorcal.calibration.camera.pictures import (
         left_over,
         residual_chart,
@@ -150,7 +158,6 @@ def _draw(
     )
     from scissorcal.vision.overlay import residual_overlay, write_picture
 
-    boards = [seen_board(photo.name, photo.detection) for photo in photos]
     residual_chart(found, boards, folder / "residuals.png")
     uncertainty_chart(found, folder / "uncertainty.png")
     files = [capture.path(photo) for capture in captures for photo in capture.index.photographs]

@@ -84,6 +84,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     result = fit_plate(
         photos,
         camera,
+        priors=engine.recipe.fit.plate.priors,
         plate_target=plate_target(engine.recipe),
         rig=locate_workspace_rig(engine, camera),
         inputs_hash=request.inputs_hash,
@@ -112,7 +113,7 @@ def locate_workspace_rig(engine: "Engine", camera: "Camera") -> "RigPose | None"
         return None
     middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
     try:
-        return locate_rig(tuple(views), camera, middle)
+        return locate_rig(tuple(views), camera, middle, engine.recipe.fit.plate.priors)
     except ValueError as error:
         raise VerdictError(f"{captures[0].folder}: {error}.") from None
 

@@ -60,12 +60,13 @@ def track_plate(
     workspace.captures_dir.mkdir(parents=True, exist_ok=True)
     path = _new_path(workspace)
     rows: list[TrackRow] = []
+    targets, priors = (PLATE_BOARD, PLATE_STRIP), engine.recipe.fit.plate.priors
     counted = _counted(frames, seconds, rows, progress)
     try:
         with path.open("x", encoding="utf-8") as file:
             _append(file, head)
             with suppress(KeyboardInterrupt):
-                for seen in track(counted, (PLATE_BOARD, PLATE_STRIP), fitted.camera):
+                for seen in track(counted, targets, fitted.camera, priors):
                     rows.append(track_row(seen, fitted.camera, back, rig))
                     _append(file, rows[-1])
     finally:
