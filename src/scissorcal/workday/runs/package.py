@@ -60,7 +60,7 @@ def build_workspace_package(
                 package = put_review(package, review, path)
             warnings = _void(engine) + package.warnings
             engine.refresh()
-            return Built(path, package.manifest, check_package(path), warnings, cached)
+            return Built(path, package.manifest, check_package(package), warnings, cached)
     summary = build_package(
         engine.recipe,
         fits["friction"],
