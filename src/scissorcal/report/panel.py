@@ -140,14 +140,14 @@ class Chart:
 class Picture:
     """A photograph that was drawn on: its file's name, caption, and in words what it shows.
 
-    On the page it is at most ``widest_px`` wide.
+    On the page it is at most ``widest_px`` wide: as fits draw them, so that lines stay sharp.
     """
 
     file: str
     title: str
     caption: str
     alt: str
-    widest_px: int = 900
+    widest_px: int = 1000
 
 
 @dataclass(frozen=True)

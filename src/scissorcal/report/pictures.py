@@ -20,7 +20,7 @@ class PictureFile:
     """A picture on disk, to be made at most ``widest_px`` wide."""
 
     path: Path
-    widest_px: int = 900
+    widest_px: int
 
 
 @dataclass(frozen=True)
