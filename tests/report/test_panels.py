@@ -217,7 +217,7 @@ def test_every_planned_stroke_is_counted_as_recorded_and_used() -> None:
         ("closing at 0.6 rad/s", 4, None, 4),
     ]
     decision, every = data_panels(cells)
-    assert "cut, closing at 0.1 rad/s: 3 of 4 used" in decision.sentence
+    assert "cut, closing at 0.1 rad/s: 3 of 4 strokes used" in decision.sentence
     assert [row.marked for row in every.rows] == [True, False, False]
 
 
@@ -225,8 +225,23 @@ def test_a_capture_that_ended_early_says_how_to_complete_it() -> None:
     remark = "Run `scissorcal capture cut --resume`."
     short = Cell("cut", "closing at 0.6 rad/s", 4, 1, 1, remark=remark)
     decision, every = data_panels([short])
-    assert "1 of 4 recorded" in decision.sentence
+    assert "1 of 4 strokes recorded" in decision.sentence
     assert every.rows[0].note == remark
+
+
+def test_what_was_counted_by_cell_takes_the_place_of_strokes() -> None:
+    fit, summary = cut_fit(), cut_recording()
+    counted = (
+        Cell("cut", "closing at 0.6 rad/s", 4, 4, 4),
+        Cell("cut", "closing at 0.6 rad/s", 8, 8, 3, "ranges of opening", "4.2 s recorded"),
+    )
+    evidence = Evidence(recordings=(summary,), completeness=counted)
+    cells = cells_of([(fit, strokes_of(fit, "cut", [summary]))], evidence)
+    assert cells == counted
+    decision, every = data_panels(cells)
+    assert [row.name for row in decision.rows] == ["cut strokes", "cut ranges of opening"]
+    assert "cut, closing at 0.6 rad/s: 3 of 8 ranges of opening used" in decision.sentence
+    assert [row.marked for row in every.rows] == [False, True]
 
 
 def test_a_simulator_is_named_by_what_its_device_states() -> None:

@@ -23,6 +23,7 @@ from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording, include_recording, used_recordings
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
+from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_cut, record_friction
@@ -189,6 +190,36 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 def test_a_whole_capture_is_done(captured: Workspace) -> None:
     found = Engine.of(captured).state("capture friction")
     assert (found.state, found.command) == ("done", "")
+
+
+def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: Path) -> None:
+    """At 0.05 rad/s the encoder of the virtual rig does not show the direction of motion."""
+    workspace = quick_workspace(tmp_path / "slow")
+    text = workspace.recipe_path.read_text(encoding="utf-8").replace("[0.1, 0.3", "[0.05, 0.3")
+    workspace.recipe_path.write_text(text, encoding="utf-8")
+    link = LockstepLink("office-paper", np.random.default_rng(2))
+    path = workspace.new_recording("friction")
+    with open_writer(path, "friction", link, workspace.recipe(), text) as writer:
+        capture_friction(link, workspace.recipe(), writer)
+    before = Engine.of(workspace).completeness("friction")
+    assert all(row.used is None for row in before.summary)
+    assert before.missing == ()
+    (outcome,) = fit_workspace(workspace, ("friction",))
+    assert any("used of the strokes at 0.05 per s" in note for note in outcome.result.notes)
+    engine = Engine.of(workspace)
+    notes = make_plan(workspace).notes
+    assert any(note.startswith("fit friction, closing at 0.05 rad/s: ") for note in notes)
+    assert not any("at 0.3 rad/s" in note for note in notes)
+    rows = {(row.name, row.unit): row for row in engine.completeness("friction").summary}
+    slow = rows["closing at 0.05 rad/s", "ranges of opening"]
+    fast = rows["closing at 0.3 rad/s", "ranges of opening"]
+    assert slow.used is not None
+    assert slow.used < slow.recorded == slow.planned
+    assert fast.used == fast.recorded == fast.planned
+    write_workspace_report(engine)
+    twin = json.loads(workspace.report_json.read_text(encoding="utf-8"))
+    (decision,) = [panel for panel in twin["panels"] if panel["id"] == "decision-data"]
+    assert "closing at 0.05 rad/s" in decision["sentence"]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from scissorcal.calibration.predictive import predictive_of
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.usage import Usage
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.model.terms import Motion
 from scissorcal.recording.recording import Joint, Recording
@@ -44,6 +45,7 @@ def assemble(
     nuisance: tuple[str, ...],
     rng: np.random.Generator,
     critic: bool,
+    usage: Usage,
     load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
@@ -56,7 +58,7 @@ def assemble(
     ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
     common ones. ``critic``
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
-    what the joint bore, where that was measured.
+    what the joint bore, where that was measured. ``usage`` says which samples the fit uses.
     """
     layout = chosen.candidate.layout
     fitted = layout.fitted(posterior.draws)
@@ -94,6 +96,7 @@ def assemble(
         position_unit=joint.position_unit,
         inputs_hash="",
         sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
+        used=usage.spans,
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
         selection=comparison_text(compared, chosen, bins, contact, joint),
         critic=critique.proposals,

@@ -255,7 +255,9 @@ class FitResult(Result):
     ``nuisance_draws`` (draws, nuisance) are parameters that are inferred and not reported, row by
     row with ``draws``. ``derived`` follow from parameters and the recipe, with ``derived_draws``
     (draws, derived) row by row; no model needs them. ``diagnostics`` are plain numbers and strings
-    (k_hat, ess, evaluations, whiteness_p, ...). ``inputs_hash`` identifies recordings, recipe and
+    (k_hat, ess, evaluations, whiteness_p, ...). ``sources`` names the
+    recordings, and ``used`` has an array (k, 2) for each: first and one past the last sample of
+    each part that the fit uses. ``inputs_hash`` identifies recordings, recipe and
     settings: equal hashes need no second fit.
     """
 
@@ -275,6 +277,7 @@ class FitResult(Result):
     position_unit: str
     inputs_hash: str
     sources: tuple[str, ...] = ()
+    used: tuple[Integers, ...] = ()
     notes: tuple[str, ...] = field(default=())
     selection: str = ""
     critic: tuple[Proposal, ...] = ()

@@ -1,6 +1,7 @@
 """``scissorcal recording list``, ``exclude`` and ``include``."""
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -8,6 +9,11 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
 
+if TYPE_CHECKING:
+    from scissorcal.device.completeness import Completeness
+    from scissorcal.recipe.requirements import CaptureKind
+
+KINDS: "tuple[CaptureKind, ...]" = ("friction", "cut")
 Name = Annotated[str, typer.Argument(help="File name of a recording, as 'recording list' shows.")]
 
 
@@ -15,7 +21,8 @@ Name = Annotated[str, typer.Argument(help="File name of a recording, as 'recordi
 def list_(folder: Folder = None) -> Answer:
     """List the recordings of friction and cuts: used, excluded, or why not used.
 
-    Below, what the recipe plans and the recordings lack.
+    Below, what the recipe plans, what is recorded of it, and what the fit uses: strokes, seconds
+    of motion, and ranges of opening with enough of it.
 
     \b
     Example:
@@ -24,6 +31,11 @@ def list_(folder: Folder = None) -> Answer:
       friction-20261121T131435Z.mcap    109.2  used
       cut-20261121T132227Z.mcap          72.8  excluded  the sheet was torn
       ...
+      friction               of                 planned  recorded  used  motion
+      closing at 0.05 rad/s  strokes                  2         2     1
+      ...
+      closing at 0.05 rad/s  ranges of opening        8         8     0  26.8 s recorded, ...
+      ...
     """
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.recordings import RecordingRow
@@ -31,21 +43,35 @@ def list_(folder: Folder = None) -> Answer:
     workspace = open_workspace(folder)
     engine = Engine.of(workspace)
     found: list[RecordingRow] = []
-    lacking = {}
-    for kind in ("friction", "cut"):
+    counted = {}
+    for kind in KINDS:
         rows = engine.recordings(kind)
         found += rows
-        used = [row for row in rows if row.use == "used"]
-        if used:
-            lacking[kind] = engine.missing(kind, used)
+        if any(row.use == "used" for row in rows):
+            counted[kind] = engine.completeness(kind)
     engine.index.save()
     lines = [["recording", "seconds", "use", "why"]]
     lines += [[row.path.name, f"{row.seconds:.1f}", row.use, row.why] for row in found]
     text = table(lines, right=[1]) if found else "There is no recording of friction or a cut yet."
-    text += "".join(
-        f"\ncapture {kind} lacks: {sentence}" for kind in lacking for sentence in lacking[kind]
-    )
-    return Answer({"recordings": found, "lacking": lacking}, text)
+    for kind, each in counted.items():
+        text += "".join(f"\n\n{part}" for part in _counted(kind, each))
+    return Answer({"recordings": found, "completeness": counted}, text)
+
+
+def _counted(kind: str, found: "Completeness") -> Iterator[str]:
+    """The table of what is planned, recorded and used, and what is missing."""
+    if found.summary:
+        lines = [[kind, "of", "planned", "recorded", "used", "motion"]]
+        for row in found.summary:
+            counts = [_number(count) for count in (row.planned, row.recorded, row.used)]
+            lines.append([row.name, row.unit, *counts, row.motion])
+        yield table(lines, right=[2, 3, 4])
+    if found.missing:
+        yield "\n".join(f"capture {kind} lacks: {sentence}" for sentence in found.missing)
+
+
+def _number(count: int | None) -> str:
+    return "-" if count is None else str(count)
 
 
 @command

@@ -1,10 +1,11 @@
-"""What a capture planned against what was recorded: cells of motion, strokes, excitation.
+"""What a capture planned against what was recorded, and what a fit uses of it.
 
-Plain values in, so that a plan is judged without loading arrays; `device.counting` makes them.
+Cells of motion, strokes, sheets and excitation. Plain values in, so that a plan is judged without
+loading arrays; `device.counting` makes them.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees
 from typing import Any
@@ -15,6 +16,9 @@ from scissorcal.recipe.schema import Recipe
 EXCITATION_SHARE = 0.95
 """Share of the planned excitation that must be recorded: its ramps are labelled as pauses."""
 
+LITTLE = 0.5
+"""A speed of which a fit uses a smaller share of the recorded motion is named."""
+
 NAMED = 3
 """Ranges of opening that a sentence lists before it only counts them."""
 
@@ -23,69 +27,127 @@ Counts = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class CellCount:
-    """One planned cell: direction, speed and range of opening, with seconds needed and recorded."""
+    """One planned cell: direction, speed and range of opening, with seconds needed and recorded.
+
+    ``used_s`` is what the fit uses; None where there is no fit.
+    """
 
     direction: str
     speed_rad_per_s: float
     opening_deg: tuple[float, float]
     needed_s: float
     recorded_s: float
+    used_s: float | None = None
 
 
 @dataclass(frozen=True)
 class StrokeCount:
-    """Strokes of one kind and speed: how many the plan has, and how many were recorded whole."""
+    """Strokes of one kind and speed: planned, recorded whole, and used by the fit."""
 
     kind: str
     speed_rad_per_s: float
     planned: int
     recorded: int
+    used: int | None = None
+
+
+@dataclass(frozen=True)
+class SheetCount:
+    """Closing strokes through one sheet, numbered across recordings: planned, recorded, used."""
+
+    sheet: int
+    planned: int
+    recorded: int
+    used: int | None = None
+
+
+@dataclass(frozen=True)
+class SummaryRow:
+    """How many ``unit`` of one motion or sheet are planned, recorded and used, for people."""
+
+    name: str
+    unit: str
+    planned: int
+    recorded: int
+    used: int | None
+    motion: str = ""
 
 
 @dataclass(frozen=True)
 class Completeness:
-    """Planned against recorded, over all recordings of one kind.
+    """Planned, recorded and used, over all recordings of one kind.
 
-    ``missing`` has one sentence for each thing that the plan has and the recordings lack.
+    ``missing`` has one sentence for each thing that the plan has and the recordings lack,
+    ``little_used`` one for each speed of which the fit uses less than half of the motion.
     """
 
-    cells: tuple[CellCount, ...]
-    strokes: tuple[StrokeCount, ...]
-    missing: tuple[str, ...]
+    cells: tuple[CellCount, ...] = ()
+    strokes: tuple[StrokeCount, ...] = ()
+    sheets: tuple[SheetCount, ...] = ()
+    missing: tuple[str, ...] = ()
+    little_used: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> tuple[SummaryRow, ...]:
+        """Strokes and ranges of opening by direction and speed, then strokes by sheet."""
+        strokes = [
+            SummaryRow(_motion(row.kind, row.speed_rad_per_s), "strokes", *_counts(row))
+            for row in self.strokes
+        ]
+        sheets = [
+            SummaryRow(f"sheet {row.sheet}", "closing strokes", *_counts(row))
+            for row in self.sheets
+        ]
+        ranges = [_ranges(*key, row) for key, row in _by_speed(self.cells).items()]
+        return (*strokes, *ranges, *sheets)
 
 
-def completeness(counts: Sequence[Counts], recipe: Recipe, kind: CaptureKind) -> Completeness:
-    """Put the counts of several recordings together and name what is missing.
+def completeness(
+    counts: Sequence[Counts],
+    recipe: Recipe,
+    kind: CaptureKind,
+    used: Sequence[Counts] | None = None,
+) -> Completeness:
+    """Put the counts of several recordings together, and name what is missing or hardly used.
 
-    Recordings by hand have no planned speeds: the strokes through each sheet are counted alone.
+    ``used`` has, for each of ``counts``, what a fit uses of that recording, empty where that is not
+    known. Recordings by hand have
+    no planned speeds: the strokes through each sheet are counted alone.
     """
-    counts = [count for count in counts if count]
-    if not counts:
-        return Completeness((), (), ())
-    driven = [count for count in counts if not count["by_hand"]]
+    taken = [None] * len(counts) if used is None else list(used)
+    pairs = [(count, use or None) for count, use in zip(counts, taken, strict=True) if count]
+    driven = [(count, use) for count, use in pairs if not count["by_hand"]]
+    if not pairs:
+        return Completeness()
     cells = _cells(driven)
-    strokes = _strokes(counts, driven, recipe)
+    strokes = _strokes(pairs, driven, recipe)
     missing = [*_missing_cells(cells), *_missing_strokes(strokes)]
     if kind == "friction":
         wanted = recipe.capture.friction.excitation_s
-        found = sum(count["excitation_s"] for count in counts)
+        found = sum(count["excitation_s"] for count, _ in pairs)
         if found < EXCITATION_SHARE * wanted:
             missing.append(f"excitation: {found:.1f} s of {wanted:g} s recorded")
-    return Completeness(cells, strokes, tuple(missing))
+    return Completeness(
+        cells, strokes, _sheets(pairs, recipe), tuple(missing), tuple(_little_used(cells))
+    )
 
 
-def _cells(counts: Sequence[Counts]) -> tuple[CellCount, ...]:
-    if not counts:
+_Pairs = Sequence[tuple[Counts, Counts | None]]
+
+
+def _cells(pairs: _Pairs) -> tuple[CellCount, ...]:
+    if not pairs:
         return ()
-    first = counts[0]
-    same = [count for count in counts if count["openings"] == first["openings"]]
+    first = pairs[0][0]
+    same = [pair for pair in pairs if pair[0]["openings"] == first["openings"]]
     return tuple(
         CellCount(
             direction,
             speed,
             (degrees(low), degrees(high)),
             first["needed_s"],
-            sum(count["seconds"][d][s][c] for count in same),
+            sum(count["seconds"][d][s][c] for count, _ in same),
+            _sum(use and use["seconds"][d][s][c] for _, use in same),
         )
         for d, direction in enumerate(first["directions"])
         for s, speed in enumerate(first["speeds"])
@@ -93,34 +155,102 @@ def _cells(counts: Sequence[Counts]) -> tuple[CellCount, ...]:
     )
 
 
-def _strokes(
-    counts: Sequence[Counts], driven: Sequence[Counts], recipe: Recipe
-) -> tuple[StrokeCount, ...]:
+def _strokes(pairs: _Pairs, driven: _Pairs, recipe: Recipe) -> tuple[StrokeCount, ...]:
     if not driven:
         capture = recipe.capture.cut
-        found = sum(kind != "opening" for count in counts for kind, _ in count["recorded"])
-        return (
-            StrokeCount("closing", float("nan"), capture.sheets * capture.strokes_per_sheet, found),
-        )
-    planned = Counter((kind, speed) for kind, speed in driven[0]["planned"])
-    recorded = Counter((kind, speed) for count in driven for kind, speed in count["recorded"])
+        found = sum(kind != "opening" for count, _ in pairs for kind, _ in count["recorded"])
+        used = _sum(use and sum(k != "opening" for k, _ in use["strokes"]) for _, use in pairs)
+        planned = capture.sheets * capture.strokes_per_sheet
+        return (StrokeCount("closing", float("nan"), planned, found, used),)
+    planned_strokes = Counter((kind, speed) for kind, speed in driven[0][0]["planned"])
+    recorded = Counter((kind, speed) for count, _ in driven for kind, speed in count["recorded"])
     return tuple(
-        StrokeCount(kind, speed, number, recorded[kind, speed])
-        for (kind, speed), number in planned.items()
+        StrokeCount(
+            kind,
+            speed,
+            number,
+            recorded[kind, speed],
+            _sum(use and use["strokes"].count([kind, speed]) for _, use in driven),
+        )
+        for (kind, speed), number in planned_strokes.items()
     )
 
 
-def _missing_cells(cells: Sequence[CellCount]) -> list[str]:
-    thin: dict[tuple[str, float], list[CellCount]] = {}
+def _sheets(pairs: _Pairs, recipe: Recipe) -> tuple[SheetCount, ...]:
+    rows = [
+        (int(recorded), None if use is None else int(use["sheets"][number]))
+        for count, use in pairs
+        for number, recorded in enumerate(count["sheets"])
+    ]
+    planned = recipe.capture.cut.strokes_per_sheet
+    return tuple(
+        SheetCount(number, planned, recorded, used)
+        for number, (recorded, used) in enumerate(rows, 1)
+    )
+
+
+def _sum(values: Iterable[Any]) -> Any:
+    """The sum; None where any value is."""
+    known = list(values)
+    return None if None in known else sum(known)
+
+
+def _by_speed(cells: Sequence[CellCount]) -> dict[tuple[str, float], list[CellCount]]:
+    found: dict[tuple[str, float], list[CellCount]] = {}
     for cell in cells:
-        if cell.recorded_s < cell.needed_s:
-            thin.setdefault((cell.direction, cell.speed_rad_per_s), []).append(cell)
+        found.setdefault((cell.direction, cell.speed_rad_per_s), []).append(cell)
+    return found
+
+
+def _motion(direction: str, speed_rad_per_s: float) -> str:
+    known = speed_rad_per_s == speed_rad_per_s
+    return f"{direction} at {speed_rad_per_s:g} rad/s" if known else f"{direction} by hand"
+
+
+def _counts(row: StrokeCount | SheetCount) -> tuple[int, int, int | None]:
+    return row.planned, row.recorded, row.used
+
+
+def _ranges(direction: str, speed: float, row: Sequence[CellCount]) -> SummaryRow:
+    recorded_s, used_s = sum(c.recorded_s for c in row), _sum(c.used_s for c in row)
+    return SummaryRow(
+        _motion(direction, speed),
+        "ranges of opening",
+        len(row),
+        sum(cell.recorded_s >= cell.needed_s for cell in row),
+        None if used_s is None else _filled(row),
+        f"{recorded_s:.3g} s recorded" + ("" if used_s is None else f", {used_s:.3g} s used"),
+    )
+
+
+def _filled(cells: Sequence[CellCount]) -> int:
+    """Of how many cells the fit uses enough."""
+    return sum(cell.used_s is not None and cell.used_s >= cell.needed_s for cell in cells)
+
+
+def _little_used(cells: Sequence[CellCount]) -> list[str]:
+    sentences = []
+    for (direction, speed), row in _by_speed(cells).items():
+        recorded = sum(cell.recorded_s for cell in row)
+        used = _sum(cell.used_s for cell in row)
+        if used is None or used >= LITTLE * recorded:
+            continue
+        reached = [cell for cell in row if cell.recorded_s >= cell.needed_s]
+        sentences.append(
+            f"{_motion(direction, speed)}: {used:.2g} s of {recorded:.3g} s of motion are used, "
+            f"in {_filled(reached)} of {len(reached)} ranges of opening"
+        )
+    return sentences
+
+
+def _missing_cells(cells: Sequence[CellCount]) -> list[str]:
+    thin = _by_speed([cell for cell in cells if cell.recorded_s < cell.needed_s])
     sentences = []
     for (direction, speed), rows in thin.items():
         ranges = [f"{row.opening_deg[0]:.0f}-{row.opening_deg[1]:.0f}" for row in rows]
         listed = ", ".join(ranges[:NAMED]) + (" ..." if len(ranges) > NAMED else "")
         sentences.append(
-            f"{direction} at {speed:g} rad/s: {len(rows)} ranges of opening ({listed} deg) have "
+            f"{_motion(direction, speed)}: {len(rows)} ranges of opening ({listed} deg) have "
             f"less than {rows[0].needed_s:g} s of motion"
         )
     return sentences

@@ -1,8 +1,9 @@
-"""Count what a recording holds of the recipe's plan, as plain values."""
+"""Count what a recording holds of the recipe's plan, and what a fit uses of it, as plain values."""
 
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.device.capture import identity_of
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
@@ -13,6 +14,9 @@ from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 
+Mask = NDArray[np.bool_]
+Labels = NDArray[np.int64]
+
 
 def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> dict[str, Any]:
     """Count what one recording holds of the recipe's plan, as plain values.
@@ -22,13 +26,10 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
     """
     if not recording.device:
         return {}
-    identity = identity_of(recording.device)
-    by_hand = kind == "cut" and _by_hand(recording, recipe)
-    grid = _grid(recipe, identity, kind, by_hand)
-    samples = recording.samples
-    label = np.asarray(samples["stroke"])
-    grid.add(samples[label >= 0])
-    strokes = [] if by_hand else _planned(recipe, identity, kind)
+    by_hand, grid = _grid(recording, recipe, kind)
+    label = _labels(recording)
+    grid.add(recording.samples[label >= 0])
+    strokes = [] if by_hand else _planned(recipe, identity_of(recording.device), kind)
     return {
         "by_hand": by_hand,
         "directions": list(grid.directions),
@@ -38,21 +39,56 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
         "seconds": grid.seconds.tolist(),
         "planned": strokes,
         "recorded": _recorded(recording, label),
+        "sheets": _sheets(recording, label, np.ones(len(label), dtype=bool)),
         "excitation_s": _excitation(recording, label),
     }
 
 
-def _grid(recipe: Recipe, identity: Identity, kind: CaptureKind, by_hand: bool) -> CoverageGrid:
+def count_used(
+    recording: Recording, recipe: Recipe, kind: CaptureKind, spans: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Count what a fit uses of one recording, on the cells of :func:`count_recorded`.
+
+    ``spans`` (k, 2) are the first and one past the last sample of each part that is used, as
+    ``FitResult.used`` has them.
+    """
+    if not recording.device:
+        return {}
+    _, grid = _grid(recording, recipe, kind)
+    label = _labels(recording)
+    used = _mask(spans, len(label))
+    grid.add(recording.samples[label >= 0], used[label >= 0])
+    return {
+        "seconds": grid.seconds.tolist(),
+        "strokes": [
+            [stroke.kind, stroke.speed]
+            for stroke in recording.strokes
+            if stroke.kind != "excitation" and np.any(used & (label == stroke.index))
+        ],
+        "sheets": _sheets(recording, label, used),
+    }
+
+
+def _grid(recording: Recording, recipe: Recipe, kind: CaptureKind) -> tuple[bool, CoverageGrid]:
+    """Whether a hand moved the blades, and the cells of the plan."""
+    identity = identity_of(recording.device)
     if kind == "friction":
-        return friction_coverage(recipe, identity)
-    return cut_coverage(recipe, identity, hand=by_hand)
-
-
-def _by_hand(recording: Recording, recipe: Recipe) -> bool:
-    """Whether the strokes have speeds that no plan of this recipe gives them."""
+        return False, friction_coverage(recipe, identity)
     planned = {round(speed, 9) for speed in recipe.capture.cut.speeds_rad_per_s}
     closing = [s for s in recording.strokes if s.kind in ("closing", "press")]
-    return bool(closing) and all(round(s.speed, 9) not in planned for s in closing)
+    by_hand = bool(closing) and all(round(s.speed, 9) not in planned for s in closing)
+    return by_hand, cut_coverage(recipe, identity, hand=by_hand)
+
+
+def _labels(recording: Recording) -> Labels:
+    return np.asarray(recording.samples["stroke"], dtype=np.int64)
+
+
+def _mask(spans: NDArray[np.int64], size: int) -> Mask:
+    edges = np.zeros(size + 1, dtype=np.int64)
+    np.add.at(edges, spans[:, 0], 1)
+    np.add.at(edges, spans[:, 1], -1)
+    return np.cumsum(edges)[:size] > 0
 
 
 def _planned(recipe: Recipe, identity: Identity, kind: CaptureKind) -> list[list[Any]]:
@@ -61,7 +97,7 @@ def _planned(recipe: Recipe, identity: Identity, kind: CaptureKind) -> list[list
     return [[s.kind, s.speed] for s in strokes if s.kind != "excitation"]
 
 
-def _recorded(recording: Recording, label: "np.ndarray[Any, Any]") -> list[list[Any]]:
+def _recorded(recording: Recording, label: Labels) -> list[list[Any]]:
     """Kind and speed of each stroke that was recorded to its end: other samples follow it."""
     found = []
     for stroke in recording.strokes:
@@ -71,7 +107,17 @@ def _recorded(recording: Recording, label: "np.ndarray[Any, Any]") -> list[list[
     return found
 
 
-def _excitation(recording: Recording, label: "np.ndarray[Any, Any]") -> float:
+def _sheets(recording: Recording, label: Labels, counted: Mask) -> list[int]:
+    """Closing strokes with samples that count, for each sheet of the recording in order."""
+    with_samples = set(np.unique(label[counted]).tolist())
+    closing = [s for s in recording.strokes if s.kind in ("closing", "press") and s.sheet >= 0]
+    return [
+        sum(s.sheet == sheet and s.index in with_samples for s in closing)
+        for sheet in sorted({s.sheet for s in closing})
+    ]
+
+
+def _excitation(recording: Recording, label: Labels) -> float:
     time = recording.device_time_s
     tick = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     wanted = [s.index for s in recording.strokes if s.kind == "excitation"]

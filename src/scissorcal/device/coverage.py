@@ -58,11 +58,12 @@ class CoverageGrid:
         self._time = np.zeros(0)
         self._opening = np.zeros(0)
 
-    def add(self, samples: NDArray[np.void]) -> None:
+    def add(self, samples: NDArray[np.void], counted: NDArray[np.bool_] | None = None) -> None:
         """Count a block of samples (SAMPLE_DTYPE) that follows what was added before.
 
         The rate at a sample is the difference over a window of 20 ms that ends there; a gap or a
-        repeat of the device's clock ends the window.
+        repeat of the device's clock ends the window. ``counted`` masks the samples that count, by
+        default all.
         """
         if len(samples) == 0:
             return
@@ -75,6 +76,8 @@ class CoverageGrid:
         new = new[new >= window]
         span = time[new] - time[new - window]
         sound = (span > 0) & (span < 1.5 * RATE_WINDOW_S)
+        if counted is not None:
+            sound &= counted[new - len(self._time)]
         new, span = new[sound], span[sound]
         rate = (opening[new] - opening[new - window]) / span
         middle = 0.5 * (opening[new] + opening[new - window])

@@ -125,7 +125,7 @@ def compose(
     scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
     provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
-    cells = evidence.completeness or decision.cells_of(
+    cells = decision.cells_of(
         [(fit, strokes[part]) for part, fit in keyed.items()], replace(evidence, geometry=geometry)
     )
     totals, every_cell = decision.data_panels(cells)

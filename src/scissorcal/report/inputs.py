@@ -131,7 +131,7 @@ class Evidence:
 
     ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
     checks by fit ("friction", "cut"), ``geometry`` what photographs gave, ``completeness`` what was
-    planned, recorded and used (without it, it is counted from recordings and fits).
+    planned, recorded and used of captures (one without it is counted from recordings and fits).
     """
 
     recordings: tuple[RecordingSummary, ...] = ()

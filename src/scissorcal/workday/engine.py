@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
@@ -19,7 +19,8 @@ from scissorcal.workday.facts import UNFINISHED, photographs, rendering
 from scissorcal.workday.index import FileIndex
 from scissorcal.workday.recordings import (
     RecordingRow,
-    completeness_counts,
+    counts_of,
+    counts_used,
     exclude_hint,
     list_recordings,
     refuse_mixed_joints,
@@ -27,6 +28,9 @@ from scissorcal.workday.recordings import (
 from scissorcal.workday.remedies import remedy
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.device.completeness import Completeness
 
 State = Literal["missing", "incomplete", "stale", "failed", "unverified", "done", "excluded"]
 """What a step may be in, in the order in which it is decided.
@@ -174,7 +178,7 @@ class Engine:
         return self.file(step.name).is_file() or bool(self._photographs(BY_NAME[step.inputs[0]]))
 
     def _of_recordings(self, step: Step, why: str) -> StepState:
-        kind: CaptureKind = "friction" if step.what == "friction" else "cut"
+        kind = _captured(step)
         rows = self.recordings(kind)
         notes = tuple(self._row_note(row) for row in rows if row.use != "used")
         broken = [row for row in rows if row.use == "unreadable"]
@@ -201,7 +205,7 @@ class Engine:
         content = digest(sorted(str(row.facts["content"]) for row in used))
         files = tuple(self.workspace.relative(row.path) for row in used)
         found = f"{_count(len(used), 'recording')}, {sum(row.seconds for row in used):.0f} s"
-        missing = self.missing(kind, used)
+        missing = self._completeness(kind, None).missing
         if missing:
             sentence = "; ".join(missing)
             notes = (*notes, f"{step.name} lacks: {sentence}.")
@@ -209,13 +213,25 @@ class Engine:
             return told("incomplete", found, content=content, files=files, notes=notes)
         return told("done", found, "", content=content, files=files, notes=notes)
 
-    def missing(self, kind: CaptureKind, used: Sequence[RecordingRow]) -> tuple[str, ...]:
-        """What the recipe plans for a capture and its used recordings lack, as sentences."""
+    def completeness(self, kind: CaptureKind) -> "Completeness":
+        """Planned, recorded, and used by the fit where there is a current one."""
+        fit = f"fit {kind}"
+        current = self.state(fit).state in ("done", "unverified", "failed", "incomplete")
+        there = current and bool(self.state(fit).content)
+        return self._completeness(kind, self.file(fit) if there else None)
+
+    def _completeness(self, kind: CaptureKind, fit: Path | None) -> "Completeness":
         from scissorcal.device.completeness import completeness
 
-        counts = [completeness_counts(row, self.recipe, kind, self.index) for row in used]
-        known = [count for count in counts if count and "refused" not in count]
-        return completeness(known, self.recipe, kind).missing
+        used = None
+        rows = [row for row in self.recordings(kind) if row.use == "used"]
+        counts = [counts_of(row, self.recipe, kind, self.index) for row in rows]
+        if fit is not None:
+            used = [
+                counts_used(row, self.recipe, kind, fit, self.index) if count else {}
+                for row, count in zip(rows, counts, strict=True)
+            ]
+        return completeness(counts, self.recipe, kind, used)
 
     def _row_note(self, row: RecordingRow) -> str:
         name = self.workspace.relative(row.path)
@@ -293,18 +309,18 @@ class Engine:
             facts = self.facts(step.name)
         except InputError as error:
             force = " --force" if step.kind in ("fit", "package") else ""
-            notes = (str(error),)
-            return told("failed", f"{name} cannot be read", f"{step.command}{force}", notes=notes)
+            why_not = (str(error),)
+            return told("failed", f"{name} cannot be read", f"{step.command}{force}", notes=why_not)
         failed = tuple(facts["failed"])
         kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
-        notes = tuple(facts.get("little_used", ()))
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
             return told("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         if behind:
-            return told("stale", behind, notes=notes, **kept)
+            return told("stale", behind, **kept)
+        notes = self._little_used(step)
         if failed:
             command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
@@ -317,6 +333,13 @@ class Engine:
         if check and check.state != "done":
             return told("unverified", facts["label"], check.command, notes=notes, **kept)
         return told("done", facts["label"], "", notes=notes, **kept)
+
+    def _little_used(self, step: Step) -> tuple[str, ...]:
+        """Which planned motion a fit hardly uses, as sentences."""
+        if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "recordings":
+            return ()
+        found = self._completeness(_captured(step), self.file(step.name))
+        return tuple(f"{step.name}, {sentence}." for sentence in found.little_used)
 
     def _behind(self, step: Step, facts: dict[str, Any]) -> str:
         """Say why a result is stale; empty where it is current."""
@@ -359,6 +382,10 @@ _CHANGED = {
     "report": "it shows other fits, trust checks or settings than there are now",
     "package": "built from other fits or settings than there are now",
 }
+
+
+def _captured(step: Step) -> CaptureKind:
+    return "friction" if step.what == "friction" else "cut"
 
 
 def _plain(item: str) -> str:

@@ -34,14 +34,6 @@ def fit(path: Path) -> Facts:
     }
 
 
-def law_fit(path: Path) -> Facts:
-    """Facts of a fit of friction or of a cut, with the speeds of which little data were used."""
-    from scissorcal.calibration.store import load_fit
-
-    little = load_fit(path).diagnostics.get("little_used", ())
-    return {**fit(path), "little_used": list(little)}
-
-
 def trust_check(path: Path) -> Facts:
     """Facts of a trust check; its inputs are the fit that it checked."""
     from scissorcal.calibration.store import load

@@ -9,7 +9,7 @@ from typing import Any
 
 from scissorcal.identity import file_digest
 
-FORMAT = "scissorcal-index/1"
+FORMAT = "scissorcal-index/2"
 
 Facts = dict[str, Any]
 
@@ -28,20 +28,23 @@ class FileIndex:
         self._entries = self._read()
         self._changed = False
 
-    def facts(self, path: Path, what: str, read: Callable[[Path], Facts]) -> Facts:
+    def facts(self, path: Path, what: str, read: Callable[[Path], Facts], given: str = "") -> Facts:
         """Give the facts named ``what`` of one file, by ``read`` where they are not known yet.
 
-        Facts are plain values, as JSON holds them. What ``read`` raises passes through.
+        Facts are plain values, as JSON holds them. ``given`` identifies what else they follow
+        from: of several, the newest are kept. What ``read`` raises passes through.
         """
         key = str(path.relative_to(self.root)) if path.is_relative_to(self.root) else str(path)
         stamp = _stamp(path)
         entry = self._entries.get(key)
         if entry is None or entry["stamp"] != stamp:
             entry = self._entries[key] = {"stamp": stamp, "facts": {}}
-        if what not in entry["facts"]:
-            entry["facts"][what] = json.loads(json.dumps(read(path)))
+        known = entry["facts"].get(what)
+        if known is None or known["given"] != given:
+            known = {"given": given, "facts": json.loads(json.dumps(read(path)))}
+            entry["facts"][what] = known
             self._changed = True
-        found: Facts = entry["facts"][what]
+        found: Facts = known["facts"]
         return found
 
     def digest(self, path: Path) -> str:

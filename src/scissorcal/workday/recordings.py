@@ -92,11 +92,13 @@ def refuse_mixed_joints(rows: tuple[RecordingRow, ...]) -> None:
         )
 
 
-def completeness_counts(
+def counts_of(
     row: RecordingRow, recipe: Recipe, kind: CaptureKind, index: FileIndex
 ) -> Mapping[str, Any]:
-    """Count what one recording holds of the recipe's plan; see `device.counting`."""
-    settings = digest(recipe.model_dump(include={"capture", "scene", "rig", "material", "fit"}))
+    """Count what one recording holds of the recipe's plan; nothing where that has no plan for it.
+
+    See `device.counting`.
+    """
 
     def count(path: Path) -> dict[str, Any]:
         from scissorcal.device.counting import count_recorded
@@ -104,10 +106,38 @@ def completeness_counts(
 
         try:
             return count_recorded(read_recording(path), recipe, kind)
-        except InputError as error:
-            return {"refused": str(error)}
+        except InputError:
+            return {}
 
-    return index.facts(row.path, f"completeness {kind} {settings[:16]}", count)
+    return index.facts(row.path, f"recorded {kind}", count, given=_planning(recipe))
+
+
+def counts_used(
+    row: RecordingRow, recipe: Recipe, kind: CaptureKind, fit: Path, index: FileIndex
+) -> Mapping[str, Any]:
+    """Count what the fit in the file ``fit`` uses of one recording, as :func:`counts_of` does.
+
+    Nothing where the fit does not say what it uses.
+    """
+
+    def count(path: Path) -> dict[str, Any]:
+        from scissorcal.calibration.store import load_fit
+        from scissorcal.device.counting import count_used
+
+        recording = _read(path, path.stat().st_mtime_ns, path.stat().st_size)
+        found = load_fit(fit)
+        for source, spans in zip(found.sources, found.used, strict=False):
+            if source.endswith(recording.content_hash):
+                return count_used(recording, recipe, kind, spans)
+        return {}
+
+    given = f"{_planning(recipe)} {index.digest(fit)[:16]}"
+    return index.facts(row.path, f"used {kind}", count, given=given)
+
+
+def _planning(recipe: Recipe) -> str:
+    """Identity of what a capture is planned from."""
+    return digest(recipe.model_dump(include={"capture", "scene", "rig", "material", "fit"}))[:16]
 
 
 def exclude_recording(workspace: Workspace, name: str, why: str) -> Path:

@@ -50,3 +50,18 @@ def test_the_speed_that_is_hardly_used_is_named(recording):
     sentence = usage_of_windows((invalid,), every, sensors.usable).sentence
     assert f"at {slow:.3g} per s: 0 s of" in sentence
     assert "invalid sensor value" in sentence
+
+
+def test_spans_are_the_samples_that_are_used(recording):
+    samples = recording.samples.copy()
+    samples["flags"][5000:5200] = 64
+    one = dataclasses.replace(recording, samples=samples)
+    sensors = inspect_sensors((one,))
+    every = weigh((one,), 75.0, sensors.usable)
+    usage = usage_of_windows((one,), every, sensors.usable)
+    (spans,) = usage.spans
+    assert np.all(spans[:, 0] < spans[:, 1])
+    assert np.all(spans[1:, 0] > spans[:-1, 1])
+    assert not np.any((spans[:, 0] < 5200) & (spans[:, 1] > 5000))
+    in_spans = float(np.sum(spans[:, 1] - spans[:, 0])) * 1e-3
+    assert in_spans == pytest.approx(sum(row.used_s for row in usage.rows))

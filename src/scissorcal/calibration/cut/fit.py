@@ -250,6 +250,7 @@ def _assembled(
     chosen, design = inferred.law.fitted, inferred.law.design
     recordings, point = data.recordings, chosen.optimum.point
     between = compare_cuts(design, point, recordings, rng)
+    usage = usage_of_segments(recordings, scouted.segments)
     return assemble(
         what="cut",
         effort=effort,
@@ -266,6 +267,7 @@ def _assembled(
         nuisance=NUISANCE,
         rng=rng,
         critic=data.recipe.fit.cut.critic,
+        usage=usage,
         extra_verdicts=(
             *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
             *((between.verdict(),) if between else ()),
@@ -274,7 +276,7 @@ def _assembled(
             *data.sensors.notes,
             *line_notes(scouted, design, inferred.budget),
             *notes,
-            usage_sentence(recordings, usage_of_segments(recordings, scouted.segments)),
+            usage_sentence(recordings, usage),
             *between_notes(between, NUISANCE),
         ),
         extra_diagnostics={

@@ -100,6 +100,7 @@ def fit_friction(
     problem = chosen.candidate.problem(law.series)
     posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
+    usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
         what="friction",
         effort=effort,
@@ -116,6 +117,7 @@ def fit_friction(
         nuisance=NUISANCE,
         rng=rng,
         critic=settings.critic,
+        usage=usage,
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
@@ -127,7 +129,7 @@ def fit_friction(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
             *draft_note(effort, every_law, laws),
-            usage_of_windows(recordings, every, sensors.usable).sentence,
+            usage.sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics=_diagnostics(law, chosen, between),

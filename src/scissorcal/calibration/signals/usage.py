@@ -12,6 +12,7 @@ from scissorcal.recording.recording import Recording
 
 Mask = NDArray[np.bool_]
 Masks = tuple[Mask, ...]
+Spans = NDArray[np.int64]
 
 GAP, EDGE, INVALID = "gap", "edge of a piece", "invalid sensor value"
 SLOW, OTHER = "rest or too slow", "no window"
@@ -42,9 +43,14 @@ class UsageRow:
 
 @dataclass(frozen=True)
 class Usage:
-    """What a fit uses of its recordings, stroke by stroke."""
+    """What a fit uses of its recordings, stroke by stroke.
+
+    ``spans`` has an array (k, 2) for each recording: first and one past the last sample of each
+    part of it that is used.
+    """
 
     rows: tuple[UsageRow, ...]
+    spans: tuple[Spans, ...] = ()
 
     @property
     def by_speed(self) -> tuple[UsageRow, ...]:
@@ -126,7 +132,7 @@ def count_usage(
                 )
             )
         offset += len(recording.strokes)
-    return Usage(tuple(rows))
+    return Usage(tuple(rows), tuple(_spans(mask) for mask in used))
 
 
 def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: Masks) -> Usage:
@@ -168,6 +174,11 @@ def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: 
     return count_usage(
         recordings, tuple(used), {name: tuple(masks) for name, masks in reasons.items()}
     )
+
+
+def _spans(mask: Mask) -> Spans:
+    change = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    return change.reshape(-1, 2).astype(np.int64)
 
 
 def _together(rows: list[UsageRow], speed: float) -> UsageRow:

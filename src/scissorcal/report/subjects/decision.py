@@ -91,13 +91,16 @@ def overall_stance(headlines: Sequence[Headline], rig: Sequence[str]) -> Stance:
 def cells_of(
     fits: Sequence[tuple[FitResult, Sequence[StrokeSamples]]], evidence: Evidence
 ) -> tuple[Cell, ...]:
-    """Count strokes by kind and speed, and photographs by fit.
+    """What was counted by cells of motion, where it was; else strokes; and photographs by fit.
 
-    Planned are those that a recording lists, recorded those with samples (where these are at
-    hand), used those with samples in the fit's series.
+    Of strokes, planned are those that a recording lists, recorded those with samples (where these
+    are at hand), used those with samples in the fit's series.
     """
-    cells: list[Cell] = []
+    cells = list(evidence.completeness)
+    counted = {cell.capture for cell in cells}
     for fit, strokes in fits:
+        if fit.what in counted:
+            continue
         used = {one.name.stroke for one in strokes if len(one.places)}
         planned: dict[str, list[int]] = {}
         recorded: set[int] = set()
@@ -138,7 +141,7 @@ def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
     """Totals per capture with the incomplete cells, for the decision page; and every cell."""
     rows = []
     for capture, unit in dict.fromkeys((cell.capture, cell.unit) for cell in cells):
-        own = [cell for cell in cells if cell.capture == capture]
+        own = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
         rows.append(Row(f"{capture} {unit}", _counts(own), link="data"))
     odd = [cell for cell in cells if cell.incomplete]
     sentence = "Everything that was recorded is used." if cells else "Nothing is known of the data."
@@ -147,7 +150,7 @@ def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
         more = f"; {len(odd) - MOST_CELLS} more" if len(odd) > MOST_CELLS else ""
         sentence = f"Incomplete: {named}{more}."
     every = tuple(
-        Row(f"{c.capture}: {c.name}", _counts([c]), note=c.remark, marked=c.incomplete)
+        Row(f"{c.capture}, {c.name}: {c.unit}", _counts([c]), note=c.remark, marked=c.incomplete)
         for c in cells
     )
     full = Panel("data-cells", "data", "Data planned, recorded and used", sentence, every)
@@ -164,8 +167,9 @@ def _counts(cells: Sequence[Cell]) -> tuple[Value, ...]:
 
 def _lack(cell: Cell) -> str:
     if cell.planned is not None and cell.recorded is not None and cell.recorded < cell.planned:
-        return f"{cell.recorded} of {cell.planned} recorded"
-    return f"{cell.used} of {cell.planned if cell.recorded is None else cell.recorded} used"
+        return f"{cell.recorded} of {cell.planned} {cell.unit} recorded"
+    of = cell.planned if cell.recorded is None else cell.recorded
+    return f"{cell.used} of {of} {cell.unit} used"
 
 
 def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult]) -> Panel:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.report import FactSheet, Geometry
+    from scissorcal.report import Cell, FactSheet, Geometry
 
 RIG: "tuple[CaptureKind, ...]" = ("friction", "cut")
 
@@ -64,6 +64,7 @@ def write_workspace_report(
             checks=checks,
             geometry=geometry,
             inputs_hash=engine.identity("report"),
+            completeness=[cell for what in RIG if what in fits for cell in _cells(engine, what)],
         )
         engine.refresh()
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
@@ -92,6 +93,15 @@ def _rig_fits(engine: Engine) -> "dict[str, FitResult]":
 
 def _recordings(engine: Engine, what: "CaptureKind") -> tuple[Any, ...]:
     return used_recordings(engine.workspace, engine.recipe, what, engine.index)
+
+
+def _cells(engine: Engine, what: "CaptureKind") -> "list[Cell]":
+    from scissorcal.report import Cell
+
+    return [
+        Cell(what, row.name, row.planned, row.recorded, row.used, row.unit, row.motion)
+        for row in engine.completeness(what).summary
+    ]
 
 
 def _trust_checks(engine: Engine, fits: "dict[str, FitResult]") -> "dict[str, VerifyResult]":
