@@ -220,7 +220,7 @@ def test_a_failed_fit_is_refused_with_its_checks_and_commands(tmp_path: Path) ->
         f"{tmp_path}/p.zip was not written: its fits failed 2 checks. fit.friction, held-out: "
         "Held-out error 40 %. fit.cut, k-hat: Its intervals cannot be trusted. Correct that and "
         "run 'scissorcal fit friction' and 'scissorcal fit cut' again, or build it all the same "
-        "with 'scissorcal package build --allow-failed': the package then says so on every use."
+        "with 'scissorcal package build --allow-failed': the package then reports it on every use."
     )
     assert not list(tmp_path.iterdir())
 

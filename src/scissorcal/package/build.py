@@ -92,14 +92,14 @@ def build_package(
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
     failed a check or the tables are further from the model than the scene allows. With
     ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
-    the package says so (docs/decisions/109-packages-from-failed-fits.md).
+    the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
     cut, friction = _wanted(recipe, friction, cut)
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
     record = _provenance(recipe, cut, friction, inputs_hash)
     draws = pick_draws(cut, friction, rng)
-    model = central_model(_centre(cut), _centre(friction) if friction else None)
+    model = central_model(FitDraws.centre(cut), FitDraws.centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)
     ranges = scene_ranges(recipe)
     bound = _bound(model, compiled, ranges, recipe, tolerance)
@@ -278,11 +278,6 @@ def _warnings(verdicts: tuple[Verdict, ...]) -> tuple[str, ...]:
     return tuple(f"{verdict.scope}, {verdict.check}: {verdict.why}" for verdict in failed(verdicts))
 
 
-def _centre(fit: FitResult) -> FitDraws:
-    names = tuple(parameter.name for parameter in fit.parameters)
-    return FitDraws(fit.structure, names, fit.map_point[None, :])
-
-
 def pick_draws(
     cut: FitResult, friction: FitResult | None, rng: np.random.Generator
 ) -> dict[str, NDArray[Any]]:
@@ -343,7 +338,7 @@ def _refuse_failed_fits(
     raise VerdictError(
         f"{path} was not written: its fits failed {count} check{'s' if count > 1 else ''}. "
         f"{sentences} Correct that and run {again} again, or build it all the same with "
-        "'scissorcal package build --allow-failed': the package then says so on every use."
+        "'scissorcal package build --allow-failed': the package then reports it on every use."
     )
 
 

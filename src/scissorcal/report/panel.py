@@ -1,4 +1,4 @@
-"""A panel: one subject as a person is told of it, on the page, in the terminal and as JSON."""
+"""A panel: one subject as it is shown to a person, on the page, in the terminal and as JSON."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Row:
-    """Named values of one thing. ``name`` tells rows of a panel apart.
+    """Named values of one thing. ``name`` identifies a row within its panel.
 
     ``anchor`` is the row's own address on the page, ``link`` that of what it is about; ``note`` a
     sentence below it. ``marked`` rows stand out.

@@ -120,7 +120,7 @@ def _candidates(fit: CameraFit) -> Panel:
             )
         )
     caption = (
-        "Simplest first, compared on held-out photographs; behind the best in their log density. "
+        "Simplest first, compared on hold-out photographs; behind the best in their log density. "
         "The simplest that is not distinguishable from the best is used."
     )
     title = "Candidate distortion models"
