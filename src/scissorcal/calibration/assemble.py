@@ -60,11 +60,6 @@ def assemble(
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
     what the joint bore, where that was measured. ``usage`` says which samples the fit uses.
     """
-    layout = chosen.candidate.layout
-    fitted = layout.fitted(posterior.draws)
-    wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
-    others = [i for i, name in enumerate(layout.names) if name in nuisance]
-    natural = layout.columns(posterior.draws)
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
     predictions = _predictions(chosen, posterior, measured, thin)
@@ -75,6 +70,7 @@ def assemble(
     critique = Critique((), "The critic was not asked.")
     if critic and effort != "draft":
         critique = _criticise(what, chosen, bins, measured, load, joint, rng)
+    tables = _parameters(chosen, posterior, nuisance, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(
         what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
@@ -84,9 +80,6 @@ def assemble(
         effort=effort,
         rung=chosen.candidate.name,
         structure=structure,
-        parameters=tuple(fitted[i] for i in wanted),
-        draws=natural[:, wanted],
-        map_point=layout.columns(chosen.optimum.point)[wanted],
         series=series,
         held_out=held_out,
         rungs=rows,
@@ -108,11 +101,30 @@ def assemble(
             tuple(recording.source for recording in recordings),
             refit=what == "cut" and effort != "draft",
         ),
-        prior_draws=_prior_draws(chosen, rng)[:, wanted],
-        nuisance=tuple(fitted[i] for i in others),
-        nuisance_draws=natural[:, others],
         predictive=predictive_of(compared, chosen, predictions, thin, effort, rng.spawn(1)[0]),
+        **tables,
     )
+
+
+def _parameters(
+    chosen: FittedCandidate,
+    posterior: Posterior,
+    nuisance: tuple[str, ...],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """The fields of a result that have a column for each parameter, in natural units."""
+    layout = chosen.candidate.layout
+    fitted, natural = layout.fitted(posterior.draws), layout.columns(posterior.draws)
+    wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
+    others = [i for i, name in enumerate(layout.names) if name in nuisance]
+    return {
+        "parameters": tuple(fitted[i] for i in wanted),
+        "draws": natural[:, wanted],
+        "map_point": layout.columns(chosen.optimum.point)[wanted],
+        "prior_draws": _prior_draws(chosen, rng)[:, wanted],
+        "nuisance": tuple(fitted[i] for i in others),
+        "nuisance_draws": natural[:, others],
+    }
 
 
 def _diagnostics(

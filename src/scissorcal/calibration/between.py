@@ -18,7 +18,7 @@ from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups
 from scissorcal.model.transforms import LOG
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -152,19 +152,16 @@ class BetweenRecordings:
             f"{worst.recording}; fitted to all by {worst.pooled_rms / size:.1%}, to that one by "
             f"itself by {worst.own_rms / size:.1%}."
         )
-        status: Status = "pass"
-        if worst.relative_rms >= HELD_OUT_LIMIT:
-            changed = worst.pooled_rms > MISFIT * worst.own_rms
-            status = "fail" if changed else "not_evaluated"
-            thing = "rig" if self.what == "friction" else "rig or the material"
+        scope, off = f"fit.{self.what}", worst.relative_rms
+        if off > HELD_OUT_LIMIT and worst.pooled_rms <= MISFIT * worst.own_rms:
             why += (
-                f" The {thing} changed between recordings: find out what did, or fit them apart."
-                if changed
-                else " One law fits them all, but the others do not determine it there: record "
-                "each load and speed twice to know how recordings differ."
+                " One law fits them all, but the others do not determine it there: record each "
+                "load and speed twice to know how recordings differ."
             )
-        scope = f"fit.{self.what}"
-        return Verdict(scope, "recordings", status, worst.relative_rms, HELD_OUT_LIMIT, why)
+            return not_evaluated(scope, "recordings", why, HELD_OUT_LIMIT, off)
+        thing = "rig" if self.what == "friction" else "rig or the material"
+        bad = f"{why} The {thing} changed between recordings: find out what did, or fit them apart."
+        return judge(scope, "recordings", off, HELD_OUT_LIMIT, why, bad)
 
 
 def compare_recordings(

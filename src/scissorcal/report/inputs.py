@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -120,9 +119,16 @@ class Cell:
 
     @property
     def incomplete(self) -> bool:
-        """Whether less was recorded than planned, or less used than recorded."""
-        counts = [n for n in (self.planned, self.recorded, self.used) if n is not None]
-        return any(b < a for a, b in pairwise(counts))
+        """Whether less was recorded than planned."""
+        if self.planned is None or self.recorded is None:
+            return False
+        return self.recorded < self.planned
+
+    @property
+    def unused(self) -> bool:
+        """Whether less is used than was recorded (than planned, where that is not known)."""
+        there = self.planned if self.recorded is None else self.recorded
+        return there is not None and self.used is not None and self.used < there
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 Array = NDArray[np.float64]
 
@@ -128,12 +128,13 @@ def find_unknowns(
 
 
 def _verdict(one: Unknown, limit: float) -> Verdict:
-    status: Status = "pass" if one.share <= limit else "not_evaluated"
     size = f"Error up to {one.share:.1%} of the scene's mean torque ({one.torque_Nm:.2g} N m)"
     if one.torque_Nm == 0.0:
         size = "No torque error"
     why = f"{size}: {one.spread} {one.removed_by}".rstrip()
-    return Verdict("fit.cut", one.name, status, one.share, limit, why)
+    if one.share > limit:
+        return not_evaluated("fit.cut", one.name, why, limit, one.share)
+    return judge("fit.cut", one.name, one.share, limit, why)
 
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:

@@ -143,14 +143,24 @@ def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
     for capture, unit in dict.fromkeys((cell.capture, cell.unit) for cell in cells):
         own = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
         rows.append(Row(f"{capture} {unit}", _counts(own), link="data"))
-    odd = [cell for cell in cells if cell.incomplete]
-    sentence = "Everything that was recorded is used." if cells else "Nothing is known of the data."
-    if odd:
-        named = "; ".join(f"{c.capture}, {c.name}: {_lack(c)}" for c in odd[:MOST_CELLS])
+    said = []
+    for head, odd in (
+        ("Incomplete", [cell for cell in cells if cell.incomplete]),
+        ("Not used", [cell for cell in cells if cell.unused]),
+    ):
+        named = "; ".join(f"{c.capture}, {c.name}: {_lack(head, c)}" for c in odd[:MOST_CELLS])
         more = f"; {len(odd) - MOST_CELLS} more" if len(odd) > MOST_CELLS else ""
-        sentence = f"Incomplete: {named}{more}."
+        said += [f"{head}: {named}{more}."] if odd else []
+    sentence = " ".join(said) or "All that was planned is recorded and used."
+    if not cells:
+        sentence = "Nothing is known of the data."
     every = tuple(
-        Row(f"{c.capture}, {c.name}: {c.unit}", _counts([c]), note=c.remark, marked=c.incomplete)
+        Row(
+            f"{c.capture}, {c.name}: {c.unit}",
+            _counts([c]),
+            note=c.remark,
+            marked=c.incomplete or c.unused,
+        )
         for c in cells
     )
     full = Panel("data-cells", "data", "Data planned, recorded and used", sentence, every)
@@ -165,8 +175,8 @@ def _counts(cells: Sequence[Cell]) -> tuple[Value, ...]:
     return tuple(values)
 
 
-def _lack(cell: Cell) -> str:
-    if cell.planned is not None and cell.recorded is not None and cell.recorded < cell.planned:
+def _lack(head: str, cell: Cell) -> str:
+    if head == "Incomplete":
         return f"{cell.recorded} of {cell.planned} {cell.unit} recorded"
     of = cell.planned if cell.recorded is None else cell.recorded
     return f"{cell.used} of {of} {cell.unit} used"
