@@ -14,13 +14,14 @@ import pytest
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "identity", "<root>"}
+LEAVES = {"errors", "verdicts", "identity", "files", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "verdicts": set(),
     "identity": set(),
+    "files": set(),
     "kernel": set(),
     "model": set(),
     "inference": set(),

@@ -8,7 +8,7 @@ import pytest
 import scissorcal
 from scissorcal.verdicts import MEANINGS, TORQUE, Verdict
 
-BUILDERS = ("Verdict", "judge", "not_evaluated", "_verdict")
+BUILDERS = ("Verdict", "judge", "not_evaluated")
 PACKAGE = Path(scissorcal.__file__).parent
 DOCS = PACKAGE.parents[1] / "docs"
 
@@ -22,10 +22,9 @@ def checks_in_source() -> set[str]:
                 continue
             if node.func.id not in BUILDERS:
                 continue
-            first = 0 if node.func.id == "_verdict" else 1
             words = [
                 argument.value
-                for argument in node.args[first:2]
+                for argument in node.args[1:2]
                 if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
             ]
             if words:
@@ -43,7 +42,7 @@ def test_every_check_in_the_source_has_a_direction_and_a_meaning():
 @pytest.mark.parametrize(
     ("scope", "check", "limit"),
     [
-        ("fit.cut", "held-out", "at most"),
+        ("fit.cut", "hold-out", "at most"),
         ("fit.friction", "whiteness", "at least"),
         ("verify.cut", "halves", "at least"),
         ("fit.plate", "halves", "at most"),
@@ -59,12 +58,12 @@ def test_a_verdict_states_the_direction_of_its_limit(scope, check, limit):
 
 
 def test_verdicts_on_torque_are_told_from_the_others():
-    assert Verdict("fit.cut", "held-out", "pass", 0.1, 0.2, "").bounds_torque
+    assert Verdict("fit.cut", "hold-out", "pass", 0.1, 0.2, "").bounds_torque
     assert not Verdict("fit.cut", "k-hat", "pass", 0.1, 0.7, "").bounds_torque
 
 
 def test_a_verdict_without_a_number_states_no_limit():
-    assert Verdict("fit.cut", "held-out", "not_evaluated", None, 0.2, "").limited == ""
+    assert Verdict("fit.cut", "hold-out", "not_evaluated", None, 0.2, "").limited == ""
     assert Verdict("elsewhere", "new", "pass", 1.0, 2.0, "").limited == "1"
 
 

@@ -1,4 +1,4 @@
-"""Identity of content: one digest of facts, one of a file's bytes."""
+"""Identity of content: the SHA-256 of facts, of bytes, of a file."""
 
 import hashlib
 import json
@@ -13,7 +13,12 @@ def digest(facts: Any) -> str:
     True
     """
     text = json.dumps(facts, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return bytes_digest(text.encode())
+
+
+def bytes_digest(data: bytes) -> str:
+    """SHA-256 over bytes, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
 
 
 def file_digest(path: Path) -> str:

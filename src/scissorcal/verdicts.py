@@ -32,7 +32,7 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     ),
     "fit r-squared": ("at least", TORQUE + "share of its variance that the law explains"),
     "fit strokes": ("at least", f"{_DATA}: ratio of the fastest to the slowest stroke"),
-    "fit held-out": (
+    "fit hold-out": (
         "at most",
         TORQUE + "median rms error on unseen strokes, share of the rms of all strokes",
     ),
@@ -105,7 +105,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),
     "device lost frames": ("at most", f"{_LOOP}: frames lost, %"),
     "device latency timer": ("at most", f"{_LOOP}: ms that the adapter holds data back"),
-    "device drift": ("at most", "rates and accelerations: error of the device's clock, ppm"),
+    "device drift": (
+        "at most",
+        "rates and accelerations: error of the device's clock beyond two standard errors, ppm",
+    ),
     "host resolution": ("at most", f"{_LOOP}: steps of this computer's clock, ns"),
     "host wake-up lateness": ("at most", f"{_LOOP}: 99 % of the delays, ms"),
     "host real-time rights": ("at least", f"{_LOOP}: priority that is granted"),

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.diagnosis import Measurements, Percentiles, judge
+from scissorcal.device.diagnosis import Measurements, diagnose
 from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
 from scissorcal.device.link import open_link
+from scissorcal.device.motion import Percentiles
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.verdicts import failed
 
@@ -33,7 +34,7 @@ SOUND = Measurements(
 
 
 def test_a_healthy_rig_passes_every_check() -> None:
-    assert {verdict.status for verdict in judge(SOUND, "/dev/ttyUSB0")} == {"pass"}
+    assert {verdict.status for verdict in diagnose(SOUND, "/dev/ttyUSB0")} == {"pass"}
 
 
 @pytest.mark.parametrize(
@@ -54,7 +55,7 @@ def test_each_problem_fails_its_check_and_names_the_remedy(
     wrong: dict[str, object], check: str, remedy: str
 ) -> None:
     measured = Measurements(**{**vars(SOUND), **wrong})
-    (verdict,) = failed(judge(measured, "/dev/ttyUSB0"))
+    (verdict,) = failed(diagnose(measured, "/dev/ttyUSB0"))
     assert verdict.check == check
     assert remedy in verdict.why
 
@@ -68,7 +69,7 @@ def test_what_was_not_measured_is_not_judged() -> None:
             "realtime_priority": 0,
         }
     )
-    open_checks = [v.check for v in judge(measured, "p") if v.status == "not_evaluated"]
+    open_checks = [v.check for v in diagnose(measured, "p") if v.status == "not_evaluated"]
     assert open_checks == ["latency timer", "drift", "real-time rights"]
 
 

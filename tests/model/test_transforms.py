@@ -1,15 +1,16 @@
-"""Transforms: inverse of each other, the Jacobian of themselves, and priors that hold 90 %."""
+"""Transforms: inverse of each other, and priors that hold 90 %."""
 
 import pickle
+from operator import attrgetter
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.model.transforms import IDENTITY, LOG, LOGIT, TRANSFORMS
+from scissorcal.model.transforms import IDENTITY, LOG, LOGIT
 
-EVERY = pytest.mark.parametrize("transform", TRANSFORMS.values(), ids=list(TRANSFORMS))
+EVERY = pytest.mark.parametrize("transform", [IDENTITY, LOG, LOGIT], ids=attrgetter("name"))
 
 
 @EVERY
@@ -17,15 +18,6 @@ EVERY = pytest.mark.parametrize("transform", TRANSFORMS.values(), ids=list(TRANS
 def test_forward_and_inverse_undo_each_other(transform, u):
     x = transform.natural(np.asarray(u))
     assert float(transform.unconstrained(x)) == pytest.approx(u, abs=1e-6)
-
-
-@EVERY
-@given(u=st.floats(-8, 8))
-def test_the_log_jacobian_is_that_of_the_forward_transform(transform, u):
-    step = 1e-5
-    rise = transform.natural(np.asarray(u + step)) - transform.natural(np.asarray(u - step))
-    expected = np.log(rise / (2 * step))
-    assert float(transform.log_jacobian(np.asarray(u))) == pytest.approx(float(expected), abs=1e-5)
 
 
 def test_two_numbers_of_a_recipe_hold_ninety_percent():

@@ -212,22 +212,22 @@ def failed_cut(chosen: Recipe) -> FitResult:
 
 def test_a_failed_fit_is_refused_with_its_checks_and_commands(tmp_path: Path) -> None:
     chosen = recipe()
-    worse = Verdict("fit.friction", "held-out", "fail", 0.4, 0.2, "Held-out error 40 %.")
+    worse = Verdict("fit.friction", "hold-out", "fail", 0.4, 0.2, "Hold-out error 40 %.")
     friction = replace(friction_fit(), verdicts=(worse,))
     with pytest.raises(VerdictError) as refusal:
         build_package(chosen, friction, failed_cut(chosen), tmp_path / "p.zip", rng())
     assert str(refusal.value) == (
-        f"{tmp_path}/p.zip was not written: its fits failed 2 checks. fit.friction, held-out: "
-        "Held-out error 40 %. fit.cut, k-hat: Its intervals cannot be trusted. Correct that and "
+        f"{tmp_path}/p.zip was not written: its fits failed 2 checks. fit.friction, hold-out: "
+        "Hold-out error 40 %. fit.cut, k-hat: Its intervals cannot be trusted. Correct that and "
         "run 'scissorcal fit friction' and 'scissorcal fit cut' again, or build it all the same "
-        "with 'scissorcal package build --allow-failed': the package then reports it on every use."
+        "with 'scissorcal package build --allow-failed': the package then warns on every use."
     )
     assert not list(tmp_path.iterdir())
 
 
 def test_friction_that_is_not_rendered_may_have_failed(tmp_path: Path) -> None:
     chosen = recipe(render_friction=False)
-    worse = Verdict("fit.friction", "held-out", "fail", 0.4, 0.2, "Held-out error 40 %.")
+    worse = Verdict("fit.friction", "hold-out", "fail", 0.4, 0.2, "Hold-out error 40 %.")
     friction = replace(friction_fit(), verdicts=(worse,))
     summary = build_package(chosen, friction, cut_fit(chosen), tmp_path / "p.zip", rng())
     assert summary.manifest.failed_checks == ()

@@ -69,7 +69,7 @@ def friction_fit(seed: int = 1) -> FitResult:
         Verdict(
             "fit.friction", "whiteness", "pass", 0.19, 0.01, "Residuals look like white noise."
         ),
-        Verdict("fit.friction", "held-out", "pass", 0.048, 0.07, "New strokes are predicted."),
+        Verdict("fit.friction", "hold-out", "pass", 0.048, 0.07, "New strokes are predicted."),
         Verdict("fit.friction", "trust check", "not_evaluated", None, None, "Each speed ran once."),
     )
     return _fit("friction", "stribeck, symmetric", parameters, pieces, rungs, verdicts, rng)
@@ -109,7 +109,7 @@ def cut_fit(seed: int = 2) -> FitResult:
             0.01,
             "Residuals repeat over 0.02 rad: the ripple's phase is not modelled.",
         ),
-        Verdict("fit.cut", "held-out", "pass", 0.066, 0.07, "New strokes are predicted."),
+        Verdict("fit.cut", "hold-out", "pass", 0.066, 0.07, "New strokes are predicted."),
     )
     return _fit("cut", "power, rippled, work closure", parameters, pieces, rungs, verdicts, rng)
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -101,7 +102,7 @@ def test_a_place_that_cannot_be_written_is_named_and_old_files_stay(tmp_path: Pa
 def test_a_failure_half_way_leaves_the_old_report_whole(tmp_path: Path) -> None:
     old = tmp_path / "report.html"
     old.write_text("the old page")
-    (tmp_path / "report.json.part").mkdir()
+    (tmp_path / f"report.json.{os.getpid()}.part").mkdir()
     with pytest.raises(InputError):
         build_report(paper(), [linear_fit()], [], tmp_path, created=CREATED)
     assert old.read_text() == "the old page"

@@ -259,12 +259,12 @@ def test_a_panel_in_the_terminal_has_its_numbers_units_and_limits() -> None:
         Row("a", (Value("mean", 0.0213, "N m", sd=0.0002), Value("used", 3))),
         Row("b", (Value("mean", 1.5, "rad/s"),)),
     )
-    verdict = Verdict("fit.cut", "held-out", "fail", 0.31, 0.2, "New strokes differ.")
+    verdict = Verdict("fit.cut", "hold-out", "fail", 0.31, 0.2, "New strokes differ.")
     text = panel_text(Panel("p", "cut", "Rows", "Two.", rows, verdicts=(verdict,)))
     assert columns(rows) == (("mean", ""), ("used", ""))
     assert "0.02130 ± 0.00020 N m" in text
     assert "1.50 rad/s" in text
-    assert "FAIL  fit.cut held-out  0.31, at most 0.2  New strokes differ." in text
+    assert "FAIL  fit.cut hold-out  0.31, at most 0.2  New strokes differ." in text
 
 
 def test_sources_whose_recording_is_missing_are_named_all_the_same() -> None:

@@ -143,7 +143,7 @@ def test_without_any_used_recording_the_capture_is_missing(copied: Workspace) ->
     ("check", "command"),
     [
         ("k-hat", "scissorcal fit friction --effort thorough"),
-        ("held-out", "scissorcal capture friction --device PORT"),
+        ("hold-out", "scissorcal capture friction --device PORT"),
     ],
 )
 def test_a_failed_fit_leads_to_its_remedy(copied: Workspace, check: str, command: str) -> None:
@@ -154,10 +154,10 @@ def test_a_failed_fit_leads_to_its_remedy(copied: Workspace, check: str, command
 
 
 def test_a_package_of_a_failed_fit_is_refused_unless_allowed(copied: Workspace) -> None:
-    fail(copied, "held-out")
+    fail(copied, "hold-out")
     fit_workspace(copied, ("cut",))
     with pytest.raises(
-        VerdictError, match=r"held-out.*scissorcal capture friction.*--allow-failed"
+        VerdictError, match=r"hold-out.*scissorcal capture friction.*--allow-failed"
     ):
         build_workspace_package(Engine.of(copied))
     assert not Engine.of(copied).file("package build").exists()

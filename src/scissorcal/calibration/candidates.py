@@ -1,4 +1,4 @@
-"""One rule that compares candidate models: the simplest that held-out data do not reject."""
+"""One rule that compares candidate models: the simplest that hold-out data do not reject."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ RELIABLE_UNITS = 0.8
 
 @dataclass(frozen=True)
 class Account:
-    """Log densities (candidates, units) of held-out units, simplest candidate first.
+    """Log densities (candidates, units) of hold-out units, simplest candidate first.
 
     A unit is what errs independently of the others: a stroke, a photograph. ``reliable``
     (candidates, units) marks the densities to use; None stands for all.
@@ -35,7 +35,7 @@ class Account:
 class CandidateRow:
     """One candidate in a comparison.
 
-    ``score`` is the log density of all held-out units, ``behind`` that of the best candidate less
+    ``score`` is the log density of all hold-out units, ``behind`` that of the best candidate less
     this one's, ``behind_se`` its standard error over units (NaN for a single unit).
     ``equivalent`` candidates are not distinguishable from the best, the ``chosen`` one is used.
     """
@@ -57,8 +57,8 @@ def compare(
 ) -> tuple[CandidateRow, ...]:
     """Choose the simplest candidate that is not distinguishable from the best.
 
-    Candidates stand simplest first. The best has the highest log density of held-out units in the
-    first account. Another one is distinguishable from it where every account says so: the best
+    Candidates stand simplest first. The best has the highest log density of hold-out units in the
+    first account. Another one is distinguishable from it where every account rejects it: the best
     gains `POSITIVE_EVIDENCE` in sum, and more than one standard error of the paired differences
     over units (the one-standard-error rule of Breiman, Friedman, Olshen and Stone 1984, chapter 3,
     on the densities of Vehtari, Gelman and Gabry 2017, doi:10.1007/s11222-016-9696-4). An account
@@ -92,15 +92,15 @@ def compare(
 
 
 def comparison_sentence(rows: Sequence[CandidateRow], units: str) -> str:
-    """Say which candidate is used, and which others the held-out ``units`` do not reject."""
+    """Say which candidate is used, and which others the hold-out ``units`` do not reject."""
     (chosen,) = (row for row in rows if row.chosen)
     if len(rows) == 1:
         return f"{chosen.name} is the only candidate."
     others = [row.name for row in rows if row.equivalent and not row.chosen]
     if not others:
-        return f"{chosen.name} is used: every other candidate predicts held-out {units} worse."
+        return f"{chosen.name} is used: every other candidate predicts hold-out {units} worse."
     return (
-        f"{chosen.name} is used: the simplest of {len(others) + 1} candidates that held-out "
+        f"{chosen.name} is used: the simplest of {len(others) + 1} candidates that hold-out "
         f"{units} do not distinguish from the best. The others are {', '.join(others)}."
     )
 

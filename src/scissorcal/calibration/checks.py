@@ -243,10 +243,10 @@ def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
     median = _median_error(held_out)
     if median is None:
         why = "Only one stroke was recorded, so none can be held out: record several."
-        return not_evaluated(scope, "held-out", why, HELD_OUT_LIMIT)
+        return not_evaluated(scope, "hold-out", why, HELD_OUT_LIMIT)
     worst = max(held_out, key=lambda error: error.relative_rms)
     why = (
-        f"On held-out strokes the error is {median:.1%} (median rms); the worst is stroke "
+        f"On hold-out strokes the error is {median:.1%} (median rms); the worst is stroke "
         f"{worst.stroke} with {worst.relative_rms:.1%}."
     )
-    return judge(scope, "held-out", median, HELD_OUT_LIMIT, why)
+    return judge(scope, "hold-out", median, HELD_OUT_LIMIT, why)

@@ -1,4 +1,4 @@
-"""Compare fitted candidates on held-out strokes, in rows and in words, and say what to measure."""
+"""Compare fitted candidates on hold-out strokes, in rows and in words, and say what to measure."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -36,7 +36,7 @@ FEWEST_BINS = 10
 def choose(fitted: Sequence[FittedCandidate], signal_rms: float = 0.0) -> FittedCandidate:
     """Take the simplest candidate that is not distinguishable from the best.
 
-    ``fitted`` stands simplest first. Held-out strokes are judged twice (see
+    ``fitted`` stands simplest first. Hold-out strokes are judged twice (see
     :func:`~.candidates.compare`): by fits without them, and by the posterior without them (PSIS-LOO
     over whole strokes, as far as its k-hats are good). Candidates whose error is larger by less
     than `NEGLIGIBLE` of ``signal_rms`` are equivalent too. That needs a ``signal_rms``, and suits

@@ -33,7 +33,7 @@ WITHIN_ROUNDING = 1e-10
 KNOWN_TO_LAW = 1e-3
 """Share of a term's variance that the law cannot imitate, below which the law has it already."""
 LEAST_GAIN = 0.005
-"""Share of the held-out error below which a gain is of no use to anybody."""
+"""Share of the hold-out error below which a gain is of no use to anybody."""
 
 
 @dataclass(frozen=True)

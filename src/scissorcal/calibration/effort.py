@@ -1,4 +1,4 @@
-"""Which candidates of a ladder an effort fits: draft one, the others all of them."""
+"""Which candidate models an effort fits: draft one, the others all of them."""
 
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
@@ -7,7 +7,7 @@ from scissorcal.calibration.result import Effort
 
 
 class Named(Protocol):
-    """A candidate of a ladder, which says its law's name in words."""
+    """A candidate model, which has its law's name in words."""
 
     @property
     def name(self) -> str:
@@ -20,34 +20,36 @@ Candidate = TypeVar("Candidate", bound=Named)
 
 def candidates_for(
     effort: Effort,
-    ladder: Sequence[Candidate],
+    candidates: Sequence[Candidate],
     last_chosen: str | None = None,
     default: str | None = None,
 ) -> tuple[Candidate, ...]:
-    """The candidates that are fitted at an effort, in the ladder's order.
+    """The candidates that are fitted at an effort, simplest first.
 
     Draft fits one: the only one that the recipe leaves, else the one that the last fit of the
     workspace chose (``last_chosen``, its :attr:`FitResult.rung`), else ``default``, else the last
-    of the ladder, which is the richest. Standard and thorough compare all of them. A name that the
-    ladder does not have is passed over: the recipe may have changed since. ValueError where the
-    ladder is empty.
+    of all, which is the richest. Standard and thorough compare all of them. A name that no
+    candidate has is passed over: the recipe may have changed since. ValueError where there is no
+    candidate.
     """
-    if not ladder:
-        raise ValueError("A ladder without candidates cannot be fitted; the recipe allows no law.")
-    if effort != "draft" or len(ladder) == 1:
-        return tuple(ladder)
+    if not candidates:
+        raise ValueError("The recipe allows no law, so there is no candidate model to fit.")
+    if effort != "draft" or len(candidates) == 1:
+        return tuple(candidates)
     for wanted in (last_chosen, default):
-        for candidate in ladder:
+        for candidate in candidates:
             if candidate.name == wanted:
                 return (candidate,)
-    return (ladder[-1],)
+    return (candidates[-1],)
 
 
-def draft_note(effort: Effort, ladder: Sequence[Named], fitted: Sequence[Named]) -> tuple[str, ...]:
-    """The note for a result whose ladder was cut down to one candidate; empty where it was not."""
-    if effort != "draft" or len(fitted) == len(ladder):
+def draft_note(
+    effort: Effort, candidates: Sequence[Named], fitted: Sequence[Named]
+) -> tuple[str, ...]:
+    """The note for a result of which one candidate alone was fitted; empty elsewhere."""
+    if effort != "draft" or len(fitted) == len(candidates):
         return ()
     return (
-        f"Draft effort fitted one law of {len(ladder)}, {fitted[0].name}, and compared it with "
+        f"Draft effort fitted one law of {len(candidates)}, {fitted[0].name}, and compared it with "
         "none; use standard effort to have the law chosen by the data.",
     )

@@ -41,7 +41,7 @@ class LeftOut:
 
     @property
     def reliable(self) -> NDArray[np.bool_]:
-        """Strokes (strokes,) whose density can be believed."""
+        """Strokes (strokes,) whose density is reliable."""
         return np.asarray(np.isfinite(self.scores) & (self.k_hats < RELIABLE))
 
 

@@ -249,7 +249,7 @@ class FitResult(Result):
     order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the candidates
     that were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
     ``held_out_score``, ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and
-    ``equivalent`` (not distinguishable from the best); ``selection`` says so in words.
+    ``equivalent`` (not distinguishable from the best); ``selection`` is the same in words.
     ``critic`` holds the terms that the critic proposes, ``replay`` the comparison with
     record-and-replay. ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and
     ``nuisance_draws`` (draws, nuisance) are parameters that are inferred and not reported, row by

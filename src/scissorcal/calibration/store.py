@@ -7,9 +7,7 @@ after the netCDF data, so that damage is found before anything is read. Equal re
 bytes. A result without arrays may be kept as plain JSON, in a file that ends in ``.json``.
 """
 
-import hashlib
 import json
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -36,6 +34,8 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.result import FitResult, Result, Stored
 from scissorcal.errors import InputError
+from scissorcal.files import replacing
+from scissorcal.identity import bytes_digest
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -79,12 +79,8 @@ def save(result: Result, path: Path) -> None:
         data = _netcdf(result, tree, writer.variables)
         content = data + _seal(data)
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
+    with replacing(path) as part:
+        part.write_bytes(content)
 
 
 def load(path: Path, kind: type[R]) -> R:
@@ -147,7 +143,7 @@ def _opened(path: Path, kind: type[Result]) -> "Iterator[h5py.File]":
 
 
 def _seal(data: bytes) -> bytes:
-    return _SEAL + hashlib.sha256(data).hexdigest().encode() + b"\n"
+    return _SEAL + bytes_digest(data).encode() + b"\n"
 
 
 def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> bytes:

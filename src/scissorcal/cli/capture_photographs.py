@@ -84,35 +84,38 @@ def camera(
     )
 
 
+BladeSource = Annotated[
+    Literal["sim"] | None,
+    typer.Option("--camera", help="sim: three rendered photographs of the recipe's virtual blade."),
+]
+Both = Annotated[
+    bool, typer.Option("--both", help="Open scissors: both blades in each photograph.")
+]
+NoMat = Annotated[bool, typer.Option("--no-mat", help="With --both: no mat; shapes have no scale.")]
+Scale = Annotated[float | None, typer.Option(help="With --no-mat: millimetres per pixel.")]
+LengthMm = Annotated[
+    float | None, typer.Option(help="With --no-mat: the blade's length, pivot to tip.")
+]
+EdgeSide = Annotated[
+    Literal["down", "up"],
+    typer.Option("--edge", help="Which side of the mat the edge faces."),
+]
+Pivot = Annotated[
+    tuple[float, float] | None,
+    typer.Option(help="Pivot in pixels, where no hole marks it."),
+]
+
+
 @command
 def blade(
     images: Images = None,
-    source: Annotated[
-        Literal["sim"] | None,
-        typer.Option(
-            "--camera", help="sim: three rendered photographs of the recipe's virtual blade."
-        ),
-    ] = None,
-    both: Annotated[
-        bool, typer.Option("--both", help="Open scissors: both blades in each photograph.")
-    ] = False,
-    no_mat: Annotated[
-        bool, typer.Option("--no-mat", help="With --both: no mat; shapes have no scale.")
-    ] = False,
-    scale: Annotated[
-        float | None, typer.Option(help="With --no-mat: millimetres per pixel.")
-    ] = None,
-    length_mm: Annotated[
-        float | None, typer.Option(help="With --no-mat: the blade's length, pivot to tip.")
-    ] = None,
-    edge_side: Annotated[
-        Literal["down", "up"],
-        typer.Option("--edge", help="Which side of the mat the edge faces."),
-    ] = "down",
-    pivot: Annotated[
-        tuple[float, float] | None,
-        typer.Option(help="Pivot in pixels, where no hole marks it."),
-    ] = None,
+    source: BladeSource = None,
+    both: Both = False,
+    no_mat: NoMat = False,
+    scale: Scale = None,
+    length_mm: LengthMm = None,
+    edge_side: EdgeSide = "down",
+    pivot: Pivot = None,
     more: MoreImages = None,
     seed: Seed = 0,
     folder: Folder = None,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -11,6 +11,9 @@ from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command
 from scissorcal.errors import InputError
 
+if TYPE_CHECKING:
+    from scissorcal.recording import Recording
+
 _CAMERA_FILES = (".yaml", ".yml", ".xml")
 
 
@@ -18,41 +21,43 @@ def _per_channel(short: str, long: str, help_text: str) -> Any:
     return typer.Option(short, long, metavar="CHANNEL=...", help=help_text)
 
 
+File = Annotated[Path, typer.Argument(dir_okay=False, help="The log, or a camera's file.")]
+Columns = Annotated[
+    list[str] | None, _per_channel("-c", "--column", "Which column holds a channel.")
+]
+Units = Annotated[list[str] | None, _per_channel("-u", "--unit", "The unit of a channel's column.")]
+Scales = Annotated[
+    list[str] | None, _per_channel("-s", "--scale", "The factor of a channel's column.")
+]
+RateHz = Annotated[
+    float | None,
+    typer.Option("--rate-hz", help="Samples per second, if there is no time column."),
+]
+JointKind = Annotated[
+    Literal["rotary", "linear"] | None, typer.Option(help="The recipe's if not given.")
+]
+Kind = Annotated[Literal["friction", "cut"], typer.Option(help="What was recorded.")]
+HandleRadiusMm = Annotated[float | None, typer.Option(help="The recipe's if not given.")]
+MinTravel = Annotated[float | None, typer.Option(help="Least travel of a stroke (rad, or m).")]
+AllowGaps = Annotated[bool, typer.Option("--allow-gaps", help="Keep gaps in time, with a note.")]
+Delimiter = Annotated[str | None, typer.Option(help="What separates the columns of a CSV file.")]
+Output = Annotated[Path | None, typer.Option(help="Write here, without a workspace.")]
+
+
 @command
 def import_(
-    file: Annotated[Path, typer.Argument(dir_okay=False, help="The log, or a camera's file.")],
-    columns: Annotated[
-        list[str] | None, _per_channel("-c", "--column", "Which column holds a channel.")
-    ] = None,
-    units: Annotated[
-        list[str] | None, _per_channel("-u", "--unit", "The unit of a channel's column.")
-    ] = None,
-    scales: Annotated[
-        list[str] | None, _per_channel("-s", "--scale", "The factor of a channel's column.")
-    ] = None,
-    rate_Hz: Annotated[
-        float | None,
-        typer.Option("--rate-hz", help="Samples per second, if there is no time column."),
-    ] = None,
-    joint: Annotated[
-        Literal["rotary", "linear"] | None, typer.Option(help="The recipe's if not given.")
-    ] = None,
-    kind: Annotated[
-        Literal["friction", "cut"], typer.Option(help="What was recorded.")
-    ] = "friction",
-    handle_radius_mm: Annotated[
-        float | None, typer.Option(help="The recipe's if not given.")
-    ] = None,
-    min_travel: Annotated[
-        float | None, typer.Option(help="Least travel of a stroke (rad, or m).")
-    ] = None,
-    allow_gaps: Annotated[
-        bool, typer.Option("--allow-gaps", help="Keep gaps in time, with a note.")
-    ] = False,
-    delimiter: Annotated[
-        str | None, typer.Option(help="What separates the columns of a CSV file.")
-    ] = None,
-    output: Annotated[Path | None, typer.Option(help="Write here, without a workspace.")] = None,
+    file: File,
+    columns: Columns = None,
+    units: Units = None,
+    scales: Scales = None,
+    rate_Hz: RateHz = None,
+    joint: JointKind = None,
+    kind: Kind = "friction",
+    handle_radius_mm: HandleRadiusMm = None,
+    min_travel: MinTravel = None,
+    allow_gaps: AllowGaps = False,
+    delimiter: Delimiter = None,
+    output: Output = None,
     folder: Folder = None,
 ) -> Answer:
     """Import a log from FILE: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
@@ -102,23 +107,29 @@ def import_(
     assert target is not None
     path = write_recording(recording, target)
     shown = workspace.relative(path) if workspace else str(path)
+    return _answer(recording, path, shown, rig.joint if rig else recording.joint.kind)
+
+
+def _answer(recording: "Recording", path: Path, shown: str, planned: str) -> Answer:
+    """What was imported; a note where the recipe plans for another joint than was recorded."""
+    joint = recording.joint
     notes = list(recording.notes)
-    if rig and rig.joint != recording.joint.kind:
+    if planned != joint.kind:
         notes.append(
-            f'The recipe has a {rig.joint} joint: set joint = "{recording.joint.kind}" in its '
-            f"[rig] to plan for a {recording.joint.kind} one."
+            f'The recipe has a {planned} joint: set joint = "{joint.kind}" in its '
+            f"[rig] to plan for a {joint.kind} one."
         )
     lines = [
         f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
-        f"{len(recording.strokes)} strokes, {recording.joint.kind} joint",
+        f"{len(recording.strokes)} strokes, {joint.kind} joint",
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
         "recording": path,
-        "kind": kind,
-        "joint": recording.joint.kind,
-        "position_unit": recording.joint.position_unit,
-        "effort_unit": recording.joint.effort_unit,
+        "kind": recording.kind,
+        "joint": joint.kind,
+        "position_unit": joint.position_unit,
+        "effort_unit": joint.effort_unit,
         "samples": len(recording.samples),
         "duration_s": recording.duration_s,
         "strokes": recording.strokes,

@@ -4,7 +4,6 @@ import math
 import sys
 import time
 from collections import deque
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import typer
@@ -43,12 +42,7 @@ class LiveView:
         self._start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stop()
 
     def show(self, done: float, sentence: str, recorder: "Recorder | None" = None) -> None:

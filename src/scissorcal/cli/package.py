@@ -40,7 +40,7 @@ def build(
         bool,
         typer.Option(
             "--allow-failed",
-            help="Build from a fit that failed a check; the package reports it on every use.",
+            help="Build from a fit that failed a check; the package warns on every use.",
         ),
     ] = False,
     seed: Seed = 0,

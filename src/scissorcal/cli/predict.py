@@ -42,7 +42,7 @@ def predict(
     as export writes it; efforts in it are compared and not used, but for the driven end's torque.
 
     The band is calibrated on strokes (or whole recordings, where there are two or more) that were
-    left out of the fit, and says so. Friction at rest is not predicted.
+    left out of the fit, and the answer states which. Friction at rest is not predicted.
 
     \b
     Example:

@@ -13,9 +13,6 @@ Progress = Callable[[float, str], None]
 
 _LINE_EVERY_S = 5.0
 _NEW_SENTENCE_AFTER_S = 2.0
-_LINES_APART_S = 1.0
-
-
 _LEAST_DONE = 0.03
 """Share of the work below which nothing is said of the time left."""
 

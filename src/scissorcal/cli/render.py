@@ -36,7 +36,7 @@ def render(
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
 
-    The loop runs in C, in a process of its own, within the recipe's limits. With --device sim a
+    The loop runs in C, in a separate process, within the recipe's limits. With --device sim a
     virtual hand makes the strokes.
 
     \b

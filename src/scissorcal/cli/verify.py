@@ -20,56 +20,51 @@ if TYPE_CHECKING:
     )
 
 _CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
+_ALL_CHECKS = ",".join(_CHECKS)
 
 
-def _checks(value: str) -> "tuple[Check, ...]":
-    named = [word.strip() for word in value.split(",") if word.strip()]
-    unknown = [word for word in named if word not in _CHECKS]
-    if unknown or not named:
-        raise InputError(
-            f"--checks: {', '.join(unknown) or 'nothing'} is not a check; choose from "
-            f"{', '.join(_CHECKS)}."
-        )
-    return tuple(check for check in _CHECKS if check in named)
+What = Annotated[Literal["friction", "cut", "all"], typer.Argument(help="The fit to check.")]
+Fits = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        help="Fits to simulated data; 200 detect intervals too narrow by a factor of 1.5 in "
+        "99 of 100 cases.",
+    ),
+]
+Checks = Annotated[str, typer.Option(help="Which checks to make, separated by commas.")]
+Prior = Annotated[
+    Literal["local", "recipe"],
+    typer.Option(
+        help="What simulated truths are drawn from: around the posterior, or from the "
+        "recipe's prior."
+    ),
+]
+Spread = Annotated[
+    float, typer.Option(min=1.0, help="Width of the local prior, in posterior widths.")
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, help="Processes to fit in; one for each core if not given."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786.",
+    ),
+]
 
 
 @command
 def verify(
-    what: Annotated[
-        Literal["friction", "cut", "all"], typer.Argument(help="The fit to check.")
-    ] = "all",
-    fits: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            help="Fits to simulated data; 200 detect intervals too narrow by a factor of 1.5 in "
-            "99 of 100 cases.",
-        ),
-    ] = 200,
-    checks: Annotated[
-        str, typer.Option(help="Which checks to make, separated by commas.")
-    ] = ",".join(_CHECKS),
-    prior: Annotated[
-        Literal["local", "recipe"],
-        typer.Option(
-            help="What simulated truths are drawn from: around the posterior, or from the "
-            "recipe's prior."
-        ),
-    ] = "local",
-    spread: Annotated[
-        float, typer.Option(min=1.0, help="Width of the local prior, in posterior widths.")
-    ] = 3.0,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Processes to fit in; one for each core if not given."),
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786.",
-        ),
-    ] = None,
+    what: What = "all",
+    fits: Fits = 200,
+    checks: Checks = _ALL_CHECKS,
+    prior: Prior = "local",
+    spread: Spread = 3.0,
+    workers: Workers = None,
+    cluster: Cluster = None,
     seed: Seed = 0,
     folder: Folder = None,
 ) -> Answer:
@@ -121,6 +116,17 @@ def verify(
         verdicts=[verdict for outcome in outcomes for verdict in outcome.result.verdicts],
         files=[outcome.path for outcome in outcomes],
     )
+
+
+def _checks(value: str) -> "tuple[Check, ...]":
+    named = [word.strip() for word in value.split(",") if word.strip()]
+    unknown = [word for word in named if word not in _CHECKS]
+    if unknown or not named:
+        raise InputError(
+            f"--checks: {', '.join(unknown) or 'nothing'} is not a check; choose from "
+            f"{', '.join(_CHECKS)}."
+        )
+    return tuple(check for check in _CHECKS if check in named)
 
 
 def _text(result: "VerifyResult") -> str:

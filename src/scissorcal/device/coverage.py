@@ -1,6 +1,5 @@
 """Coverage of a capture: which speeds were recorded at which angles, per direction, live."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -22,16 +21,6 @@ Direction = Literal["closing", "opening"]
 ANGLE_CELLS = 8
 NEEDED_S = 0.02
 RATE_WINDOW_S = 0.02
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One cell of the grid: a direction, a nominal speed, a range of openings, and its seconds."""
-
-    direction: Direction
-    speed: float
-    opening: Range
-    seconds: float
 
 
 class CoverageGrid:
@@ -94,19 +83,6 @@ class CoverageGrid:
     def share(self) -> float:
         """Share of the cells that are filled, from 0 to 1."""
         return float(self.filled.mean())
-
-    def thin(self) -> tuple[Cell, ...]:
-        """Return the cells that are not filled, the emptiest first."""
-        cells = [
-            Cell(
-                self.directions[d],
-                self.speeds[s],
-                self.cells[a],
-                float(self.seconds[d, s, a]),
-            )
-            for d, s, a in zip(*np.nonzero(~self.filled), strict=True)
-        ]
-        return tuple(sorted(cells, key=lambda cell: cell.seconds))
 
     def sentence(self) -> str:
         """One line: how many cells are filled, and which speeds are not.

@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.diagnosis import Measurements, Percentiles, adapter_timer_path, judge
+from scissorcal.device.diagnosis import Measurements, adapter_timer_path, diagnose
 from scissorcal.device.link import PortLink
+from scissorcal.device.motion import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
+from scissorcal.recording.summarising import missing_frames
 from scissorcal.verdicts import Verdict
 
 Array = NDArray[np.float64]
@@ -52,22 +54,22 @@ def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = No
     measured = Measurements(
         simulated=bool(link.identity.capabilities & Capability.SIMULATOR),
         tick_ms=link.identity.tick_us * 1e-3,
-        round_trip=Percentiles.of(answered),
+        round_trip=Percentiles.of(1e3 * answered),
         round_trips=len(trips),
         unanswered=int(len(trips) - len(answered)),
-        interval=Percentiles.of(np.diff(arrival)),
+        interval=Percentiles.of(1e3 * np.diff(arrival)),
         frames=len(arrival),
-        lost=_lost(sequence),
+        lost=int(missing_frames(sequence).sum()),
         garbled=garbled,
         drift_ppm=drift,
         drift_se_ppm=error,
         adapter_timer_ms=adapter_timer_ms(link.name),
-        lateness=Percentiles.of(_lateness()),
+        lateness=Percentiles.of(1e3 * _lateness()),
         timer_resolution_ns=1e9 * time.clock_getres(time.CLOCK_MONOTONIC),
         realtime_priority=_realtime_priority(),
     )
     tell(1.0, "done")
-    return Examination(measured, judge(measured, link.name))
+    return Examination(measured, diagnose(measured, link.name))
 
 
 def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
@@ -126,11 +128,6 @@ def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, 
     sequence = np.array([state.sequence for state in states], dtype=np.int64)
     cut_by_flush = 1
     return np.array(arrivals), unwrapped, sequence, max(garbled - cut_by_flush, 0)
-
-
-def _lost(sequence: Integers) -> int:
-    jumps = np.diff(sequence) % U32
-    return int(np.sum(jumps[jumps > 0] - 1))
 
 
 def _lateness() -> Array:

@@ -6,13 +6,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from scissorcal.device.link import Link
 from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples
 from scissorcal.device.paths import Reference
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     SAMPLE_DTYPE,
     ConfigKey,
-    Identity,
     Mode,
     ModelTables,
     Servo,
@@ -25,19 +25,11 @@ SILENCE_S = 1.0
 
 
 @runtime_checkable
-class Exchanging(Protocol):
+class Exchanging(Link, Protocol):
     """A link in virtual time: each exchange is one tick."""
 
     @property
-    def identity(self) -> Identity: ...
-
-    @property
-    def garbled(self) -> int: ...
-
-    @property
     def virtual_time(self) -> float: ...
-
-    def configure(self, key: int, value: float) -> float: ...
 
     def exchange(self, command_frame: bytes | None) -> list[bytes]: ...
 

@@ -4,10 +4,12 @@ A motion idles (motors off), tracks a reference, renders, or damps. In each mode
 in blocks, as they arrive.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +26,27 @@ from scissorcal.kernel import (
 )
 
 Samples = NDArray[np.void]
+QuantileMethod = Literal["linear", "inverted_cdf"]
 
 BLOCK_S = 0.05
 
 
 @dataclass(frozen=True)
-class Latency:
-    """Times in microseconds, from a frame's arrival to the command's departure; NaN if unknown."""
+class Percentiles:
+    """Middle and tail of a set of times, in the unit that its holder states; NaN if unknown."""
 
     p50: float
     p99: float
     p999: float
     worst: float
+
+    @classmethod
+    def of(cls, times: NDArray[np.float64], method: QuantileMethod = "linear") -> "Percentiles":
+        """Of times (n,); ``method`` as `numpy.quantile` has it."""
+        if len(times) == 0:
+            return cls(math.nan, math.nan, math.nan, math.nan)
+        quantiles = np.quantile(times, [0.5, 0.99, 0.999, 1.0], method=method)
+        return cls(*(float(value) for value in quantiles))
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,8 @@ class MotionReport:
 
     ``counters`` count frames and limits; ``garbled`` frames were discarded, ``stalls`` are
     pauses of more than five ticks between frames by the host's clock, ``overrun`` samples were
-    overwritten before they were read. ``latency`` is None in virtual time.
+    overwritten before they were read. ``latency`` (arrival of a frame to departure of its
+    command) and ``interval`` (between frames) are in microseconds, None in virtual time.
     """
 
     counters: ServoCounters
@@ -54,8 +66,8 @@ class MotionReport:
     stalls: int
     unsent: int
     overrun: int
-    latency: Latency | None
-    interval: Latency | None
+    latency: Percentiles | None
+    interval: Percentiles | None
 
 
 class Motion(AbstractContextManager["Motion"], ABC):
@@ -103,7 +115,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         if the reference leaves the device's limits.
         """
         path = approach(*self.position, reference, self.tick_s)
-        whole = path + reference
+        whole = Reference.joined([path, reference])
         check_reference(reference, self.identity)
         self._approach_ticks = len(path)
         self.set_reference(whole)

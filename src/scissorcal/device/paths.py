@@ -1,5 +1,6 @@
 """Smooth paths on the device's ticks: glides, rests, multisines, and their joining. Pure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,12 +31,14 @@ class Reference:
         still = np.zeros(1)
         return Reference(self.opening[:1], still, self.advance[:1], np.full(1, -1, dtype=np.int32))
 
-    def __add__(self, other: "Reference") -> "Reference":
-        return Reference(
-            np.concatenate([self.opening, other.opening]),
-            np.concatenate([self.opening_rate, other.opening_rate]),
-            np.concatenate([self.advance, other.advance]),
-            np.concatenate([self.stroke, other.stroke]),
+    @classmethod
+    def joined(cls, parts: Sequence["Reference"]) -> "Reference":
+        """Join parts that follow each other."""
+        return cls(
+            np.concatenate([part.opening for part in parts]),
+            np.concatenate([part.opening_rate for part in parts]),
+            np.concatenate([part.advance for part in parts]),
+            np.concatenate([part.stroke for part in parts]),
         )
 
 
@@ -83,12 +86,7 @@ class PathBuilder:
         """Return everything so far as one reference."""
         if not self._parts:
             self.rest(self._tick_s)
-        return Reference(
-            np.concatenate([part.opening for part in self._parts]),
-            np.concatenate([part.opening_rate for part in self._parts]),
-            np.concatenate([part.advance for part in self._parts]),
-            np.concatenate([part.stroke for part in self._parts]),
-        )
+        return Reference.joined(self._parts)
 
     def _append(self, opening: Array, rate: Array, advance: Array, stroke: int) -> None:
         labels = np.full(len(opening), stroke, dtype=np.int32)

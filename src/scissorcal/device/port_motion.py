@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import Latency, Motion, MotionReport, Samples
+from scissorcal.device.motion import Motion, MotionReport, Percentiles, Samples
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.errors import DeviceError
@@ -118,8 +118,8 @@ class PortMotion(Motion):
             stalls=line.stalls,
             unsent=line.unsent,
             overrun=line.lost_samples,
-            latency=_latency(block.latency),
-            interval=_latency(block.interval),
+            latency=_percentiles(block.latency),
+            interval=_percentiles(block.interval),
         )
 
     def close(self) -> None:
@@ -163,8 +163,8 @@ class PortMotion(Motion):
             time.sleep(0.002)
 
 
-def _latency(histogram: Histogram) -> Latency:
-    return Latency(
+def _percentiles(histogram: Histogram) -> Percentiles:
+    return Percentiles(
         histogram.quantile(0.5),
         histogram.quantile(0.99),
         histogram.quantile(0.999),

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scissorcal.device.coverage import CoverageGrid
 from scissorcal.kernel import StateFlag
 from scissorcal.recording import RecordingWriter
+from scissorcal.recording.summarising import missing_frames
 
 NOTES_OF_A_KIND = 3
-U32 = 2**32
 
 
 @dataclass
@@ -83,9 +83,9 @@ class Recorder:
     def _note_gaps(self, samples: NDArray[np.void]) -> None:
         sequence = samples["sequence"].astype(np.int64)
         first = sequence[0] if self.last is None else int(self.last["sequence"][0])
-        steps = np.diff(sequence, prepend=first) % U32
-        for index in np.flatnonzero((steps > 1) & (steps < U32 // 2)):
-            missing = int(steps[index]) - 1
+        lost = missing_frames(np.concatenate([[first], sequence]))
+        for index in np.flatnonzero(lost):
+            missing = int(lost[index])
             self.tally.gaps += 1
             self.tally.lost += missing
             at = f"frame {sequence[index]} ({self._sample_time(samples[index]):.3f} s)"

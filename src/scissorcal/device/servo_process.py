@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Self
 
 from scissorcal.device.link import PortLink
 from scissorcal.errors import DeviceError
@@ -21,7 +20,7 @@ BEAT_S = 0.02
 
 
 class ServoProcess:
-    """Runs the loop on a link's port in another process; a context manager.
+    """Runs the loop on a link's port in another process.
 
     The process owns the port from :meth:`start` to :meth:`close`. It runs in its own session, so
     Ctrl-C does not reach it. It stops when this process dies (the end of a pipe) or hangs (the
@@ -135,14 +134,3 @@ class ServoProcess:
                 )
             self._block.beat()
             time.sleep(0.002)
-
-    def __enter__(self) -> Self:
-        try:
-            self.start()
-        except BaseException:
-            self.close()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -74,7 +74,7 @@ class _Surface:
 
 
 def _bfgs(surface: _Surface, value: float) -> tuple[Array, float, Array, Array]:
-    """Climb with one gradient a step: place, height, slope, and the inverse curvature learnt."""
+    """Ascend with one gradient a step: place, height, slope, and the inverse curvature learnt."""
     size = len(surface.centre)
     z, inverse = np.zeros(size), np.eye(size)
     slope = surface.slope(z)

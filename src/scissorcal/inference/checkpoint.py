@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.files import replacing
 
 Array = NDArray[np.float64]
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
@@ -42,8 +43,7 @@ def save_walks(path: Path, walks: list[Walk]) -> None:
     Makes its folder where there is none yet.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".part")
-    with draft.open("wb") as file:
+    with replacing(path) as part, part.open("wb") as file:
         np.savez(
             file,
             chain=np.stack([walk.chain for walk in walks]),
@@ -55,7 +55,6 @@ def save_walks(path: Path, walks: list[Walk]) -> None:
             positions=np.array([walk.random_state[2:4] for walk in walks]),
             gauss=np.array([walk.random_state[4] for walk in walks]),
         )
-    draft.replace(path)
 
 
 def load_walks(

@@ -26,7 +26,7 @@ class Counter:
     def over(self, problem: Problem, stop: Stop | None = None) -> Problem:
         """The same problem, counted.
 
-        Where ``stop`` is given, an evaluation raises TimeUsedUpError once it says so.
+        Where ``stop`` is given, an evaluation raises TimeUsedUpError once it returns true.
         """
 
         def one_more(count: int = 1) -> None:

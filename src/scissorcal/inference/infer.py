@@ -64,7 +64,7 @@ def infer(
     ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
     ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`). ``stop`` is
     asked before every evaluation of search and sampling whether the time allowed is used up; what
-    is there by then is returned, with a status that says so, and draws of the normal approximation
+    is there by then is returned, with the status for it, and draws of the normal approximation
     where there are no better ones. The curvature is measured whatever the time.
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
@@ -146,7 +146,7 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
 
 @dataclass(frozen=True)
 class _Found:
-    """What one rung of effort ended with."""
+    """What one effort ended with."""
 
     draws: Array
     reached: Effort

@@ -104,7 +104,7 @@ def shape_at(problem: Problem, point: Array, fall: float = 0.3) -> Shape:
 
 
 def polish(problem: Problem, optimum: Optimum) -> tuple[Optimum, Shape]:
-    """Newton steps from where the search settled to the optimum, kept only where they climb.
+    """Newton steps from where the search settled to the optimum; those that rise are kept.
 
     The last ones use fine differences, so that smooth problems reach their optimum to rounding
     while rough ones keep what the search found. Where a Hessian costs p^2 evaluations (a smooth

@@ -104,7 +104,7 @@ def _excess(slopes: Array, pull: Array, blocks: Labels, noise: ArNoise) -> tuple
 
     Directions are those in which the sums' outer product stands out most from what is expected of
     it. A direction counts where its chi-square is beyond chance, with as many degrees of freedom as
-    blocks share its information, less one for the fit. Slopes are taken in units of their own size:
+    blocks share its information, less one for the fit. Slopes are taken in units of their size:
     in mixed units rounding would decide. A parameter that hardly moves the mean has no say.
     """
     from scipy.special import chdtrc

@@ -32,7 +32,7 @@ HOPELESS = 20.0
 """A start this much log-posterior below the best one after its first rounds is given up."""
 
 ROUGH = 0.05
-"""Climb promised by differences a standard deviation long from which a likelihood counts as rough,
+"""Rise promised by differences a standard deviation long from which a likelihood counts as rough,
 where short differences promise none; skewness of a smooth one stays below."""
 
 RESTARTS = 3
@@ -89,7 +89,7 @@ def find_optimum(
 
     Where residuals are normal, each start is followed by least squares and Fisher scoring
     (:func:`~scissorcal.inference.squares.descend`), where the posterior is smooth by BFGS
-    (:func:`~scissorcal.inference.ascent.ascend`). What then still promises to climb, and every
+    (:func:`~scissorcal.inference.ascent.ascend`). What then still promises a rise, and every
     start of other problems, is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06)
     in coordinates that the scores' outer product makes round, until a round gains nothing: strongly
     correlated parameters then cost no more than independent ones. A start whose first rounds end
@@ -224,7 +224,7 @@ def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Cli
 
 
 def _promised_from_afar(lost: Array) -> float:
-    """Climb that a Newton step promises by what is lost a standard deviation beside, (axes, 2)."""
+    """Rise that a Newton step promises by what is lost a standard deviation beside, (axes, 2)."""
     known = lost[np.all(np.isfinite(lost), axis=1)]
     slope = 0.5 * (known[:, 0] - known[:, 1])
     curvature = np.maximum(known.sum(axis=1), 1.0)
@@ -343,7 +343,7 @@ def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
 def _status(
     problem: Problem, best: _Climb, lost: Array, stop: Stop | None
 ) -> tuple[SearchStatus, tuple[str, ...]]:
-    """How the best climb ended, and the names of the parameters that it concerns.
+    """How the best ascent ended, and the names of the parameters that it concerns.
 
     ``lost`` (axes, 2) is what the log-posterior loses beside the end.
     """

@@ -23,7 +23,7 @@ class Problem:
     and the logarithms of the latter, both (n,). The information then comes from first derivatives,
     which a likelihood that is rough on a small scale still has. ``tails`` are the degrees of
     freedom of a Student-t in the place of the normal; infinity is the normal. ``populations`` (n,)
-    tells terms apart whose noise has a memory of its own, ``blocks`` (n,) names the stretches
+    tells terms apart whose noise has its own memory, ``blocks`` (n,) names the stretches
     (strokes) whose scores are compared as wholes; where missing, all terms are one population and
     the series are the blocks.
 

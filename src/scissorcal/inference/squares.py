@@ -224,7 +224,7 @@ class _Search:
                 return
 
     def score(self) -> float:
-        """Fisher scoring on everything together, damped where a step does not climb."""
+        """Fisher scoring on everything together, damped where a step lowers the log-posterior."""
         damping = 0.0
         for _ in range(SCORING_STEPS):
             z, _, by_mean, by_size = self.slopes()

@@ -17,8 +17,8 @@ class SearchStatus(Enum):
 
     SETTLED = "The search settled."
     ROUNDS_USED_UP = (
-        "The search was still climbing when its rounds were used up: record more varied "
-        "motion, or choose a simpler rung."
+        "The search was still rising when its rounds were used up: record more varied "
+        "motion, or choose a simpler candidate model."
     )
     AT_BOUNDS = (
         "The search ended at a bound, so no value was found there: check units and signs of the "
@@ -26,7 +26,7 @@ class SearchStatus(Enum):
     )
     AT_START = (
         "A parameter stands where its start or its prior put it because the data do not respond to "
-        "it: record what excites it, or choose a rung without it."
+        "it: record what excites it, or choose a candidate model without it."
     )
     PLATEAU = (
         "The log-posterior hardly falls beside the point where the search ended, so far other "
@@ -35,7 +35,7 @@ class SearchStatus(Enum):
     )
     TIME_USED_UP = (
         "The time allowed was used up before the search settled, so the optimum is not known: "
-        "allow more time, or choose a simpler rung."
+        "allow more time, or choose a simpler candidate model."
     )
     NOT_FINITE = (
         "The log-posterior is not a finite number right beside the optimum, so the optimum may lie "
@@ -57,12 +57,12 @@ class SamplingStatus(Enum):
     )
     FLAT = (
         "The data leave a direction to the prior, so the draws along it are the prior's: record "
-        "what excites it, or choose a rung without it."
+        "what excites it, or choose a candidate model without it."
     )
     WEIGHED = "The importance weights are well behaved, so the draws are the posterior's."
     HEAVY_WEIGHTS = (
         "A few draws carry most of the importance weight, so the intervals cannot be trusted: "
-        "use thorough effort, record more varied data, or choose a simpler rung."
+        "use thorough effort, record more varied data, or choose a simpler candidate model."
     )
     CONVERGED = (
         "The ensembles agree and are long against their autocorrelation, so the draws are the "
@@ -75,7 +75,7 @@ class SamplingStatus(Enum):
     BUDGET_USED_UP = (
         "The budget of evaluations or of time was used up before the draws could be relied on, so "
         "the intervals cannot be trusted: allow more, record more varied data, or choose a simpler "
-        "rung. Ensembles go on from the checkpoint, where one was kept."
+        "candidate model. Ensembles go on from the checkpoint, where one was kept."
     )
     STUCK = (
         "A parameter never moved in the ensembles, so nothing is known of its spread: check that "

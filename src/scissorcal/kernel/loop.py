@@ -24,6 +24,8 @@ from scissorcal.kernel.servo import (
     ServoView,
     StopReason,
     reference_arrays,
+    refuse_change,
+    refuse_mode,
 )
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
 
@@ -168,10 +170,7 @@ class LoopBlock(ServoView):
 
     def engage(self, mode: Mode) -> None:
         """Request a mode; it engages with the next frame (RENDER from zero force)."""
-        if mode is Mode.RENDER and not self.pointer.has_model:
-            raise ValueError("RENDER needs the tables of a model, and this block has none.")
-        if mode is Mode.TRACK and self.pointer.reference_size == 0:
-            raise ValueError("TRACK needs a reference: call set_reference first.")
+        refuse_mode(mode, bool(self.pointer.has_model), self.pointer.reference_size)
         lib.sc_block_order(self.pointer, int(mode))
 
     def set_reference(
@@ -179,8 +178,7 @@ class LoopBlock(ServoView):
     ) -> None:
         """Set what TRACK follows, as :meth:`Servo.set_reference`; not while TRACK is engaged."""
         block = self.pointer
-        if Mode.TRACK in (block.orders.mode, block.servo.mode):
-            raise ValueError("The reference cannot change while TRACK follows it.")
+        refuse_change(block.orders.mode, block.servo.mode)
         arrays = reference_arrays(opening, opening_rate, advance, stroke)
         n, capacity = len(arrays[0]), int(block.reference_capacity)
         if n > capacity:

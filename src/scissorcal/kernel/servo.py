@@ -246,7 +246,6 @@ class Servo(ServoView):
         self._config = ffi.new("sc_servo_config *")
         config.fill(self._config)
         self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
-        self._has_model = tables is not None
         self._orders = ffi.new("sc_orders *")
         self._reference = ffi.new("sc_reference *")
         self._reference_arrays: tuple[NDArray[Any], ...] = ()
@@ -257,10 +256,7 @@ class Servo(ServoView):
 
     def engage(self, mode: Mode) -> None:
         """Request a mode; it engages with the next frame (RENDER from zero force)."""
-        if mode is Mode.RENDER and not self._has_model:
-            raise ValueError("RENDER needs the tables of a model, and this servo has none.")
-        if mode is Mode.TRACK and self._reference.size == 0:
-            raise ValueError("TRACK needs a reference: call set_reference first.")
+        refuse_mode(mode, self._model != ffi.NULL, self._reference.size)
         self._orders.mode = int(mode)
         self._orders.order = (self._orders.order + 1) & U32
 
@@ -272,8 +268,7 @@ class Servo(ServoView):
         The index moves with the device's sequence number, so lost frames do not shift it. At the
         end the last place is held. Not while TRACK is engaged.
         """
-        if self.mode is Mode.TRACK:
-            raise ValueError("The reference cannot change while TRACK follows it.")
+        refuse_change(self.mode)
         arrays = reference_arrays(opening, opening_rate, advance, stroke)
         self._reference_arrays = arrays
         self._reference.opening = ffi.from_buffer("float[]", arrays[0])
@@ -352,6 +347,20 @@ class Servo(ServoView):
         """The last frame's sample, shape (1,), SAMPLE_DTYPE; a copy."""
         data = bytes(ffi.buffer(ffi.addressof(self._servo, "sample")))
         return np.frombuffer(data, dtype=SAMPLE_DTYPE)
+
+
+def refuse_mode(mode: Mode, has_model: bool, reference_size: int) -> None:
+    """Raise ValueError for a mode that lacks what it needs: a model, or a reference."""
+    if mode is Mode.RENDER and not has_model:
+        raise ValueError("RENDER needs the tables of a model, and there are none.")
+    if mode is Mode.TRACK and reference_size == 0:
+        raise ValueError("TRACK needs a reference: call set_reference first.")
+
+
+def refuse_change(*modes: int) -> None:
+    """Raise ValueError for a change of the reference where TRACK is engaged or asked for."""
+    if Mode.TRACK in modes:
+        raise ValueError("The reference cannot change while TRACK follows it.")
 
 
 def reference_arrays(

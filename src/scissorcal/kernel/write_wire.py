@@ -7,13 +7,14 @@ Generated are the C structs with their packing (``c/sc_messages.h`` and ``.c``),
 messages (``messages.py``), and the tables of the messages in ``docs/protocol.md``.
 """
 
-import hashlib
 import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+from scissorcal.identity import digest
 
 ROOT = Path(__file__).parents[3]
 KERNEL = "src/scissorcal/kernel"
@@ -44,8 +45,7 @@ def files(wire: Mapping[str, Any], page: str) -> dict[str, str]:
 
 def schema_hash(wire: Mapping[str, Any]) -> int:
     """First 8 bytes, little-endian, of SHA-256 over the canonical form of wire.json."""
-    canonical = json.dumps(wire, sort_keys=True, separators=(",", ":")).encode()
-    return int.from_bytes(hashlib.sha256(canonical).digest()[:8], "little")
+    return int.from_bytes(bytes.fromhex(digest(wire))[:8], "little")
 
 
 def _own(message: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -38,20 +38,6 @@ class Cutting:
     rate_damping: float | Array = 0.0
 
 
-def cut_torque(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
-    """Average torque with the crack tip at ``contact``, after the crack has settled.
-
-    Where the blades press harder than the material bears, the crack runs outwards first, so that
-    the result is the torque that is felt there on average. Torque in N m, positive as it
-    resists closing; ``opening`` (rad) and ``contact`` (m) broadcast.
-    """
-    theta = np.asarray(opening, dtype=np.float64)
-    x = np.asarray(contact, dtype=np.float64)
-    if cutting.fracture_energy is not None:
-        x = np.maximum(x, settled_contact(cutting, theta))
-    return torque_at(cutting, theta, x)
-
-
 def cut_torque_along(
     cutting: Cutting, opening: Array, advance: Array, crack: float
 ) -> tuple[Array, Array]:
@@ -72,7 +58,7 @@ def cut_torque_along(
 def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     """Contact x_c at which the crack just stands: m g(delta) tan(psi) = mean fracture energy.
 
-    With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`ripple_moments`.
+    With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`mean_share`.
     Solved along the edge by Newton steps on y(s) = y_top - delta_c(psi(s)), one step for a
     straight edge. Where the edges are parallel or open towards the tip (tan(psi) <= 0) no force
     along the cut arises, the crack cannot advance, and the result is -inf.
@@ -139,43 +125,12 @@ def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array
     return np.asarray(force * np.maximum(1.0 + cutting.rate_damping * deepening, 0.0))
 
 
-@dataclass(frozen=True)
-class RippleMoments:
-    """What fracture in steps does to the force, relative to its peak g_c at each place.
-
-    ``mean_share`` is the mean force over a cycle as a share of g_c, ``sd_share`` its standard
-    deviation, ``stroke_m`` the indentation that one cycle takes, in metres.
-    """
-
-    mean_share: Array
-    sd_share: Array
-    stroke_m: Array
-
-
-def ripple_moments(cutting: Cutting, peak_force: ArrayLike) -> RippleMoments:
-    """Mean, spread and length of a fracture cycle whose force peaks at ``peak_force`` (N).
+def mean_share(cutting: Cutting, peak: ArrayLike) -> Array:
+    """Mean force over a fracture cycle as a share of its peak (N).
 
     Between two runs of the crack the indentation grows steadily from where g = kappa g_c to where
-    g = g_c. The mean is that of g under a uniform indentation between both, exactly; the spread is
-    that of a straight saw-tooth, (1 - kappa) / sqrt(12), which the curvature of g changes by
-    less than 1 % for kappa above 0.5 and exponents from 1 to 4 (by 2 % for a square root).
-    """
-    peak = np.asarray(peak_force, dtype=np.float64)
-    response = cutting.response
-    low = response.indentation_at(cutting.kappa * peak)
-    high = response.indentation_at(peak)
-    length = high - low
-    smooth = length <= 1e-12 * high
-    mean = (response.energy_at(high) - response.energy_at(low)) / np.where(smooth, 1.0, length)
-    share = np.where(smooth, 1.0, mean / peak)
-    spread = np.broadcast_to((1.0 - np.asarray(cutting.kappa)) / np.sqrt(12.0), share.shape)
-    return RippleMoments(share, spread, np.where(smooth, 0.0, length))
-
-
-def mean_share(cutting: Cutting, peak: ArrayLike) -> Array:
-    """Mean force over a fracture cycle as a share of its peak (N), see :func:`ripple_moments`.
-
-    A power law has the same share at every peak, (1 - kappa^((n+1)/n)) / ((n+1) (1 - kappa^(1/n))).
+    g = g_c; the mean is that of g under a uniform indentation between both, exactly. A power law
+    has the same share at every peak, (1 - kappa^((n+1)/n)) / ((n+1) (1 - kappa^(1/n))).
     """
     kappa = np.asarray(cutting.kappa)
     if np.all(kappa >= 1.0):

@@ -19,7 +19,7 @@ NEWTON_STEPS = 30
 class Edge:
     """One blade's edge e(s), offset from its centreline against station s from the pivot.
 
-    Every family is offset + s tan(taper) and what its rung adds:
+    An edge is offset + s tan(taper) and what its family adds:
 
     * ``line``: nothing.
     * ``arc``: curvature s^2 / 2, a parabola in the place of a circular arc of that curvature:

@@ -42,12 +42,6 @@ class Transform:
 
         return np.asarray(x)
 
-    def log_jacobian(self, u: Array) -> Array:
-        """Logarithm of dx/du at ``u``, same shape: what a density of x takes from one of u."""
-        import numpy as np
-
-        return np.zeros_like(u)
-
     def normal_prior(self, centre: float, width: float) -> tuple[float, float]:
         """Mean and standard deviation in u of the prior that two numbers of a recipe state."""
         return centre, width
@@ -67,11 +61,6 @@ class _Log(Transform):
 
         return np.asarray(np.log(x))
 
-    def log_jacobian(self, u: Array) -> Array:
-        import numpy as np
-
-        return np.asarray(u)
-
     def normal_prior(self, centre: float, width: float) -> tuple[float, float]:
         return math.log(centre), math.log(width) / Z_95
 
@@ -90,11 +79,6 @@ class _Logit(Transform):
 
         return np.asarray(np.log(x) - np.log1p(-np.asarray(x)))
 
-    def log_jacobian(self, u: Array) -> Array:
-        import numpy as np
-
-        return np.asarray(-np.logaddexp(0.0, u) - np.logaddexp(0.0, -np.asarray(u)))
-
     def normal_prior(self, centre: float, width: float) -> tuple[float, float]:
         return math.log(centre / (1.0 - centre)), math.log(width) / Z_95
 
@@ -102,4 +86,3 @@ class _Logit(Transform):
 IDENTITY = Transform()
 LOG = _Log("log")
 LOGIT = _Logit("logit")
-TRANSFORMS = {one.name: one for one in (IDENTITY, LOG, LOGIT)}

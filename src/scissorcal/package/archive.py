@@ -4,7 +4,6 @@ Nothing in a package is executed, unpickled or unpacked to disk. What its manife
 or names with another content, is refused before use.
 """
 
-import hashlib
 import io
 import json
 import math
@@ -20,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.files import replacing
+from scissorcal.identity import bytes_digest
 from scissorcal.package.manifest import (
     FORMAT,
     LARGEST_MEMBER,
@@ -57,13 +58,11 @@ def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
 
     Raises InputError where the file cannot be written; what was there before is kept.
     """
-    part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(archive_bytes(manifest, arrays))
-        part.replace(path)
+        with replacing(path) as part:
+            part.write_bytes(archive_bytes(manifest, arrays))
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise InputError(
             f"{path} cannot be written ({error.strerror}): choose another place, or make room."
         ) from error
@@ -122,7 +121,7 @@ def member_of(file: str, array: NDArray[Any]) -> Member:
         dtype="<f4" if dtype == "<f4" else "<f8",
         shape=(array.shape[0], array.shape[1]),
         bytes=len(data),
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=bytes_digest(data),
     )
 
 
@@ -242,7 +241,7 @@ def _read_member(
             f"{REMEDY}"
         )
     data = _read_bounded(where, archive, info, member.bytes)
-    if len(data) != member.bytes or hashlib.sha256(data).hexdigest() != member.sha256:
+    if len(data) != member.bytes or bytes_digest(data) != member.sha256:
         raise InputError(f"{where} was changed: it does not have the hash that is stated. {REMEDY}")
     try:
         array = _parse_array(data, member)

@@ -1,6 +1,5 @@
 """Build a package from a recipe and its fits."""
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ import scissorcal
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
@@ -220,7 +220,7 @@ def _provenance(
     return Provenance(
         scissorcal_version=scissorcal.__version__,
         recipe=text.decode("utf-8"),
-        recipe_sha256=hashlib.sha256(text).hexdigest(),
+        recipe_sha256=bytes_digest(text),
         inputs_hash=inputs_hash,
         cut=CutRecord(
             **_record(cut), structure=CutStructure(**_known(cut.structure, CutStructure))
@@ -338,7 +338,7 @@ def _refuse_failed_fits(
     raise VerdictError(
         f"{path} was not written: its fits failed {count} check{'s' if count > 1 else ''}. "
         f"{sentences} Correct that and run {again} again, or build it all the same with "
-        "'scissorcal package build --allow-failed': the package then reports it on every use."
+        "'scissorcal package build --allow-failed': the package then warns on every use."
     )
 
 

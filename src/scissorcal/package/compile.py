@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
-from scissorcal.model import damped, edge_height, ripple_moments, settled_contact
+from scissorcal.model import damped, edge_height, mean_share, settled_contact
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_tables
 from scissorcal.package.grid import Points, spread_points
@@ -253,7 +253,7 @@ def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
         )
         slope = np.where(cuts, np.maximum(view.slope, LEAST_SLOPE), LEAST_SLOPE)
         peak = energy / (cutting.moving_blades * slope)
-        return np.asarray(energy * ripple_moments(cutting, peak).mean_share)
+        return np.broadcast_to(energy * mean_share(cutting, peak), peak.shape)
 
     def derivative(opening: Array) -> Array:
         return (law(opening + STEP_rad) - law(opening - STEP_rad)) / (2.0 * STEP_rad)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
+from scissorcal.identity import bytes_digest
 from scissorcal.package.review import Digest, Review
 from scissorcal.recipe.schema import FrictionRung, FrictionTerm
 
@@ -350,7 +350,7 @@ def expected_files(manifest: Manifest) -> set[str]:
 def content_hash(facts: dict[str, Any]) -> str:
     """Hash of a manifest given as plain JSON, whatever its ``content_hash`` and ``review``."""
     kept = {key: value for key, value in facts.items() if key not in ("content_hash", "review")}
-    return hashlib.sha256(canonical(kept)).hexdigest()
+    return bytes_digest(canonical(kept))
 
 
 def canonical(facts: Any) -> bytes:

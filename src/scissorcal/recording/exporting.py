@@ -2,15 +2,15 @@
 
 import csv
 import json
-import math
 from pathlib import Path
 
 from scissorcal.errors import InputError, file_error
+from scissorcal.files import replacing
 from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
+from scissorcal.recording.schema import describe
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -35,12 +35,10 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
         raise InputError(f"{path} exists. Choose another name, or allow overwriting.")
     if not path.parent.is_dir():
         raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
-    draft = path.with_name(path.name + layout.PART_SUFFIX)
     try:
-        _WRITERS[path.suffix.lower()](recording, draft)
-        draft.replace(path)
+        with replacing(path) as part:
+            _WRITERS[path.suffix.lower()](recording, part)
     except OSError as error:
-        draft.unlink(missing_ok=True)
         raise file_error(error, path, "The recording is unchanged.") or error from None
     return path
 
@@ -55,26 +53,21 @@ def _write_csv(recording: Recording, path: Path) -> None:
 
 def _write_parquet(recording: Recording, path: Path) -> None:
     pa, pq = require_pyarrow()
+    metadata = describe(
+        recording.kind,
+        recording.joint,
+        recording.handle_radius_m,
+        recording.strokes,
+        recording.recipe_toml,
+        recording.device,
+    )
     table = pa.table(layout.columns(recording)).replace_schema_metadata(
         {
-            METADATA_NAME: _description(recording).model_dump_json(),
+            METADATA_NAME: metadata.model_dump_json(),
             "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
         }
     )
     pq.write_table(table, path, compression="zstd")
-
-
-def _description(recording: Recording) -> RecordingMetadata:
-    radius = recording.handle_radius_m
-    return RecordingMetadata(
-        kind=recording.kind,
-        joint=recording.joint.kind,
-        handle_radius_m=radius if math.isfinite(radius) else None,
-        strokes=stroke_records(recording.strokes),
-        recipe_toml=recording.recipe_toml,
-        device=dict(recording.device),
-        versions=versions(),
-    )
 
 
 _WRITERS = {".parquet": _write_parquet, ".csv": _write_csv}

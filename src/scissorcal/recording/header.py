@@ -15,6 +15,7 @@ from typing import IO, Any, Literal
 Kind = Literal["friction", "cut", "render"]
 StrokeKind = Literal["closing", "opening", "excitation", "press"]
 
+FORMAT: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"
 METADATA_NAME = "scissorcal.recording"
 NOTE_NAME = "scissorcal.note"
 MAGIC = b"\x89MCAP0\r\n"
@@ -45,10 +46,6 @@ class Joint:
     @property
     def effort_unit(self) -> str:
         return "N m" if self.kind == "rotary" else "N"
-
-    @property
-    def inertia_unit(self) -> str:
-        return "kg m^2" if self.kind == "rotary" else "kg"
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
 
 
 def _is_sound(entries: Mapping[str, str]) -> bool:
-    right = entries.get("format") == "scissorcal-recording/1"
+    right = entries.get("format") == FORMAT
     return right and entries.get("crc32") == checksum(entries)
 
 

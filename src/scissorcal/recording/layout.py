@@ -6,7 +6,7 @@ no padding). The schema is a plain message definition, so viewers of CDR plot a 
 a plug-in and without ROS.
 """
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from scissorcal.recording.header import Joint
 if TYPE_CHECKING:
     from scissorcal.recording.recording import Recording
 
-FORMAT: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"
 PROFILE = "scissorcal"
 TOPIC = "/scissorcal/sample"
 SCHEMA_NAME = "scissorcal/msg/Sample"

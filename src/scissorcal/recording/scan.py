@@ -1,6 +1,5 @@
 """Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
-import hashlib
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
@@ -89,7 +89,7 @@ def scan_file(path: Path) -> Scan:
             )
     return Scan(
         path,
-        hashlib.sha256(data).hexdigest(),
+        bytes_digest(data),
         walk.metadata,
         walk.events,
         walk.damage,

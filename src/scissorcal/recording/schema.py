@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind, checksum
+from scissorcal.recording.header import FORMAT, Joint, Kind, Stroke, StrokeKind, checksum
 
 
 class StrokeRecord(BaseModel):
@@ -27,7 +27,7 @@ class RecordingMetadata(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"
+    format: Literal["scissorcal-recording/1"] = FORMAT
     kind: Kind
     joint: Literal["rotary", "linear"] = "rotary"
     handle_radius_m: float | None = Field(default=None, description="null where not known")
@@ -55,6 +55,28 @@ class RecordingMetadata(BaseModel):
             Stroke(s.index, s.kind, math.nan if s.speed is None else s.speed, s.sheet)
             for s in self.strokes
         )
+
+
+def describe(
+    kind: Kind,
+    joint: Joint,
+    handle_radius_m: float,
+    strokes: tuple[Stroke, ...],
+    recipe_toml: str,
+    device: Mapping[str, Any],
+    min_travel: float | None = None,
+) -> RecordingMetadata:
+    """Describe a recording, as its file and a table of it hold it (NaN becomes null)."""
+    return RecordingMetadata(
+        kind=kind,
+        joint=joint.kind,
+        handle_radius_m=handle_radius_m if math.isfinite(handle_radius_m) else None,
+        strokes=stroke_records(strokes),
+        min_travel=min_travel,
+        recipe_toml=recipe_toml,
+        device=dict(device),
+        versions=versions(),
+    )
 
 
 def recording_schema() -> dict[str, Any]:
@@ -101,9 +123,9 @@ def from_entries(entries: Mapping[str, str]) -> RecordingMetadata:
     stated = body.get("format", "")
     if entries.get("crc32") != checksum(body):
         raise ValueError("its description does not match its checksum; restore it from a backup")
-    if stated != RecordingMetadata.model_fields["format"].default:
+    if stated != FORMAT:
         raise ValueError(
-            f"its format is {stated!r}, and this version reads 'scissorcal-recording/1'; use the "
+            f"its format is {stated!r}, and this version reads {FORMAT!r}; use the "
             "version of scissorcal that wrote it"
         )
     text_fields = {

@@ -1,6 +1,7 @@
 """A recording in numbers: duration, rate, gaps, strokes and ranges."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,9 +84,7 @@ def find_gaps(samples: NDArray[np.void]) -> Gaps:
     """Find jumps of the sequence number (which wraps at 2**32) in samples, shape (N,)."""
     if len(samples) < 2:
         return Gaps(0, 0, 0, 0.0)
-    lost = (np.diff(samples["sequence"]) - np.uint32(1)).astype(np.int64)
-    # A step back by less than half the range is a repeated or reordered frame, not 4e9 lost ones.
-    lost[lost >= 2**31] = 0
+    lost = missing_frames(samples["sequence"])
     worst = int(np.argmax(lost))
     time = samples["device_time_us"]
     longest = int(lost[worst])
@@ -95,6 +94,19 @@ def find_gaps(samples: NDArray[np.void]) -> Gaps:
         longest=longest,
         longest_at_s=float(time[worst] - time[0]) * 1e-6 if longest else 0.0,
     )
+
+
+def missing_frames(sequence: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+    """Frames missing between each two of ``sequence`` (n,), which wraps at 2**32; shape (n - 1,).
+
+    A step back by less than half the range is a repeated or reordered frame, not 4e9 lost ones.
+
+    >>> missing_frames(np.array([2**32 - 2, 2**32 - 1, 0, 3, 3])).tolist()
+    [0, 0, 2, 0]
+    """
+    numbers = sequence.astype(np.int64)
+    lost = (numbers[1:] - numbers[:-1] - 1) % 2**32
+    return np.where(lost < 2**31, lost, 0)
 
 
 def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:

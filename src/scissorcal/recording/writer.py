@@ -15,7 +15,7 @@ from scissorcal.recording import layout
 from scissorcal.recording.partfile import create_locked, explained, seal
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.samplefile import SampleFile
-from scissorcal.recording.schema import RecordingMetadata, stroke_records, versions
+from scissorcal.recording.schema import describe
 
 
 class RecordingWriter:
@@ -53,16 +53,8 @@ class RecordingWriter:
             raise ValueError("give strokes or min_travel, not both")
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + layout.PART_SUFFIX)
-        metadata = RecordingMetadata(
-            kind=kind,
-            joint=(joint or Joint()).kind,
-            handle_radius_m=handle_radius_m if math.isfinite(handle_radius_m) else None,
-            strokes=stroke_records(strokes),
-            min_travel=min_travel,
-            recipe_toml=recipe_toml,
-            device=dict(device or {}),
-            versions=versions(),
-        )
+        joint, device = joint or Joint(), device or {}
+        metadata = describe(kind, joint, handle_radius_m, strokes, recipe_toml, device, min_travel)
         self._stream = create_locked(self.path, self.part)
         self._failed = False
         with self._writing():

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scissorcal.device.motion import Latency, MotionReport
+from scissorcal.device.motion import MotionReport, Percentiles
 from scissorcal.kernel import EnergyLedger
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
@@ -48,8 +48,8 @@ class RenderResult:
     seconds: float
     frames: int
     strokes: int
-    latency: Latency | None
-    interval: Latency | None
+    latency: Percentiles | None
+    interval: Percentiles | None
     misses: int
     garbled: int
     stalls: int
@@ -66,7 +66,7 @@ class RenderResult:
     warnings: tuple[str, ...]
 
 
-def latency_of(latency_ns: ArrayLike) -> Latency | None:
+def latency_of(latency_ns: ArrayLike) -> Percentiles | None:
     """Percentiles in microseconds of the times from a frame's arrival to the command's departure.
 
     ``latency_ns`` is a recording's column: 0 where no command was sent, which does not count.
@@ -74,19 +74,17 @@ def latency_of(latency_ns: ArrayLike) -> Latency | None:
     exceed. None where no command has a latency, as in virtual time.
 
     >>> latency_of([0, 20_000, 30_000, 40_000, 1_000_000])
-    Latency(p50=30.0, p99=1000.0, p999=1000.0, worst=1000.0)
+    Percentiles(p50=30.0, p99=1000.0, p999=1000.0, worst=1000.0)
     """
     sent = np.asarray(latency_ns, dtype=np.int64)
     sent = sent[sent > 0]
     if sent.size == 0:
         return None
-    shares = (0.5, 0.99, 0.999, 1.0)
-    quantiles = np.quantile(sent, shares, method="inverted_cdf") / 1000
-    return Latency(*(float(value) for value in quantiles))
+    return Percentiles.of(sent / 1000, "inverted_cdf")
 
 
 def render_verdicts(
-    report: MotionReport, latency: Latency | None, tick_us: int
+    report: MotionReport, latency: Percentiles | None, tick_us: int
 ) -> tuple[Verdict, ...]:
     """Judge a rendering: on time, complete, without faults, supervised, passive."""
     return (
@@ -98,7 +96,7 @@ def render_verdicts(
     )
 
 
-def _deadline(latency: Latency | None, tick_us: int) -> Verdict:
+def _deadline(latency: Percentiles | None, tick_us: int) -> Verdict:
     if latency is None:
         why = "Virtual time has no latency."
         return not_evaluated(SCOPE, "deadline", why, float(tick_us))

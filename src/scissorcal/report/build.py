@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +12,8 @@ from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
+from scissorcal.files import replacing
+from scissorcal.identity import bytes_digest
 from scissorcal.package.review import Review
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
@@ -135,9 +136,8 @@ def sign_page(html: Path, review: Review) -> None:
 
     try:
         page = with_signature(html.read_text(encoding="utf-8"), review)
-        part = html.with_name(html.name + ".part")
-        part.write_text(page, encoding="utf-8")
-        part.replace(html)
+        with replacing(html) as part:
+            part.write_text(page, encoding="utf-8")
     except (OSError, ValueError) as error:
         raise InputError(
             f"{html} cannot take the signature: {error}. Run 'scissorcal report --anew', then sign."
@@ -151,8 +151,7 @@ def _signed(review: Review | None, twin: str, folder: Path) -> Review | None:
             review = Review.model_validate_json((folder / "signature.json").read_bytes())
         except (OSError, ValueError):
             return None  # not signed, or damaged, which `plan` says
-    digest = hashlib.sha256(twin.encode("utf-8")).hexdigest()
-    return review if review.report_sha256 == digest else None
+    return review if review.report_sha256 == bytes_digest(twin.encode()) else None
 
 
 def _with_earlier_time(document: ReportDocument, path: Path) -> tuple[ReportDocument, str]:
@@ -177,14 +176,13 @@ def _parted(twin: str) -> tuple[str, str, str]:
 
 
 def _write_both(files: ReportFiles, page: str, twin: str) -> None:
-    """Write beside the old files first, so that a failure leaves those whole."""
+    """Write both before either takes its place, so that a failure leaves the old ones whole."""
     folder = files.html.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path, text in ((files.html, page), (files.json, twin)):
-            path.with_name(path.name + ".part").write_text(text, encoding="utf-8")
-        for path in (files.html, files.json):
-            path.with_name(path.name + ".part").replace(path)
+        with replacing(files.json) as twin_part, replacing(files.html) as page_part:
+            page_part.write_text(page, encoding="utf-8")
+            twin_part.write_text(twin, encoding="utf-8")
     except OSError as error:
         raise InputError(
             f"The report cannot be written to {folder}: {error.strerror or error}. Free that "

@@ -41,7 +41,7 @@ ADVICE: dict[str, str] = {
         "The residuals are autocorrelated: look at the worst strokes, then record longer or more "
         "varied motion, or try a richer candidate in the recipe's `[fit]` table."
     ),
-    "held-out": (
+    "hold-out": (
         "New strokes are not predicted well: record more strokes at the speeds of the worst ones, "
         "or try a richer candidate."
     ),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from scissorcal.identity import bytes_digest
 from scissorcal.report.numbers import short, unit_text
 from scissorcal.report.panel import Chart, Panel, Picture, Row, columns
 from scissorcal.report.pictures import (
@@ -118,7 +118,7 @@ def _report(document: ReportDocument, review: Review | None) -> str:
 
 def _page(title: str, body: str) -> str:
     script = _asset("script.js")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    digest = base64.b64encode(bytes.fromhex(bytes_digest(script.encode()))).decode()
     policy = (
         "default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
         f"script-src 'sha256-{digest}'"

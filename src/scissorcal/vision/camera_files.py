@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from scissorcal.errors import InputError, file_error
+from scissorcal.files import replacing
 from scissorcal.vision.geometry.camera import Camera
 
 Style = Literal["opencv", "ros"]
@@ -67,10 +68,9 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
     if path.suffix.lower() not in endings:
         raise InputError(f"{path} must end in one of {', '.join(endings)} for {style}.")
     text = _opencv_text(camera, path.suffix.lower()) if style == "opencv" else _ros(camera, name)
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(text, "utf-8")
-        part.replace(path)
+        with replacing(path) as part:
+            part.write_text(text, "utf-8")
     except OSError as error:
         raise file_error(error, path) or error from None
     return path

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.files import replacing
 from scissorcal.vision.photo import Photo, Picture
 from scissorcal.vision.targets.detect import Detection
 
@@ -66,9 +67,8 @@ def write_picture(picture: Picture, path: Path) -> Path:
     import cv2
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
-    part.replace(path)
+    with replacing(path) as part:
+        part.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
     return path
 
 

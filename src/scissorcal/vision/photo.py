@@ -1,6 +1,5 @@
 """Read a photograph: upright, eight bits, limited in size."""
 
-import hashlib
 import struct
 import warnings
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.identity import file_digest
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -80,7 +80,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
         warnings.simplefilter("ignore")
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         try:
-            digest = _sha256(path)
+            digest = file_digest(path)
             with Image.open(path) as opened:
                 return _photo(path, opened, digest, max_pixels, colour)
         except FileNotFoundError:
@@ -216,11 +216,6 @@ def _reduction(width: int, height: int, max_pixels: int) -> int:
         if width * height <= max_pixels * factor**2:
             return factor
     return 8
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _not_a_picture(path: Path) -> str:

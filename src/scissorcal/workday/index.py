@@ -2,11 +2,11 @@
 
 import contextlib
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scissorcal.files import replacing
 from scissorcal.identity import file_digest
 
 FORMAT = "scissorcal-index/2"
@@ -57,12 +57,11 @@ class FileIndex:
             return
         there = {key: entry for key, entry in self._entries.items() if (self.root / key).exists()}
         text = json.dumps({"format": FORMAT, "files": there})
-        part = self.path.with_name(f"{self.path.name}.{os.getpid()}.part")
         # Without the index every command still works, only slower.
         with contextlib.suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
-            part.write_text(text, encoding="utf-8")
-            part.replace(self.path)
+            with replacing(self.path) as part:
+                part.write_text(text, encoding="utf-8")
             self._changed = False
 
     def _read(self) -> dict[str, Any]:

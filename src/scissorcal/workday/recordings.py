@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.files import replacing
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, capture_facts
 from scissorcal.recipe.schema import Recipe
@@ -249,10 +250,8 @@ def _named(workspace: Workspace, name: str) -> Path:
 
 
 def _note(workspace: Workspace, noted: Mapping[str, Mapping[str, str]]) -> None:
-    path = workspace.exclusions_path
-    part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(noted, indent=1) + "\n", encoding="utf-8")
-    part.replace(path)
+    with replacing(workspace.exclusions_path) as part:
+        part.write_text(json.dumps(noted, indent=1) + "\n", encoding="utf-8")
 
 
 @lru_cache(maxsize=64)

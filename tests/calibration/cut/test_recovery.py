@@ -115,7 +115,7 @@ def test_a_press_without_a_knee_is_a_power_law(pressed_friction):
 
 
 def test_two_slopes_are_separated_from_a_power_law_and_an_exponential(pressed_friction, tmp_path):
-    """On held-out strokes the spline's error is the noise, the others' is not."""
+    """On hold-out strokes the spline's error is the noise, the others' is not."""
     rng = np.random.default_rng(41)
     pressed = press_recording(KNEED, rng)
     wanted = pressing(response="auto+spline")

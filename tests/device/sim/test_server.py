@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from scissorcal.device.link import open_link
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import ConfigKey, State
@@ -78,7 +77,7 @@ def test_it_stays_alive_while_a_reader_does_not_read() -> None:
 
 
 def test_a_port_unplugged_in_use_is_a_device_error() -> None:
-    with SimProcess("office-paper", faults=Faults(unplug_s=0.2)) as sim:
+    with SimProcess("office-paper", faults=["unplug=0.2"]) as sim:
         with open_link(sim.port) as link:
             link.configure(ConfigKey.STREAM, 1.0)
             with pytest.raises(DeviceError, match="is gone"):

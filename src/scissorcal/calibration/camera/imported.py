@@ -1,11 +1,11 @@
 """A camera that was calibrated elsewhere, as a fit without uncertainty."""
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
 
 from scissorcal.calibration.camera.result import CameraFit
+from scissorcal.identity import file_digest
 from scissorcal.verdicts import not_evaluated
 from scissorcal.vision.camera_files import CameraFile
 
@@ -29,7 +29,7 @@ def imported_camera(read: CameraFile, file: Path) -> CameraFit:
         pixel_map=None,
         cross=None,
         verdicts=(not_evaluated("fit.camera", "uncertainty", why),),
-        inputs_hash=hashlib.sha256(file.read_bytes()).hexdigest(),
+        inputs_hash=file_digest(file),
         sources=(file.name,),
         notes=(f"Imported from {file.name} ({read.style}).",),
     )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.bundle import SeenBoard, seen
 from scissorcal.calibration.camera.result import CameraFit, PixelMap, ViewError
 from scissorcal.calibration.camera.uncertainty import parameters_of
+from scissorcal.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -105,7 +106,6 @@ def _frame(fit: CameraFit, count: int) -> tuple["Figure", Any]:
 
 def _saved(figure: "Figure", path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, format="png", dpi=110)
-    part.replace(path)
+    with replacing(path) as part:
+        figure.savefig(part, format="png", dpi=110)
     return path

@@ -14,7 +14,7 @@ from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import path_motion
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError
-from scissorcal.model import Cutting, cut_torque_along, edge_height, ripple_moments
+from scissorcal.model import Cutting, cut_torque_along, edge_height, mean_share
 from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -153,7 +153,7 @@ class _Balance:
         weight = moved / moved.sum()
         slope = float(np.sum(weight * self.slope[at[1:]]))
         peak = energy / (self.drawn.moving_blades * max(slope, 1e-9))
-        return np.ravel(energy * ripple_moments(self.drawn, peak).mean_share)
+        return np.ravel(energy * mean_share(self.drawn, peak))
 
 
 def _path_of(recordings: tuple[Recording, ...], friction: FitResult, cutting: Cutting) -> _Path:

@@ -82,7 +82,7 @@ class CutLaw:
 
 
 def allowed_laws(recipe: Recipe) -> list[CutLaw]:
-    """The laws that a recipe lets the ladder have, cheapest first."""
+    """The candidate laws that a recipe allows, simplest first."""
     settings = recipe.fit.cut
     families = {
         "auto": ("power", "exponential"),

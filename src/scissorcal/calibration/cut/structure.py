@@ -55,7 +55,7 @@ def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge
 
 
 def edge_layout(belief: EdgeBelief) -> Layout:
-    """Parameters of an edge that is believed, with the belief as their prior."""
+    """Parameters of an edge that was measured, with that estimate as their prior."""
     units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
     sds = np.sqrt(np.diag(belief.covariance))
     return Layout(
@@ -75,7 +75,7 @@ def edge_layout(belief: EdgeBelief) -> Layout:
 
 
 def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
-    """A recipe's geometry, with the edge that is believed, as the structure of a cut's fit."""
+    """A recipe's geometry, with the edge as it was measured, as the structure of a cut's fit."""
     return {
         "closure": recipe.scene.closure,
         "reference_indentation_m": recipe.fit.cut.reference_indentation_mm * 1e-3,

@@ -15,9 +15,9 @@ MEANING = "fracture energy over thickness: energy per area of cut"
 def with_toughness(fit: FitResult, recipe: Recipe, rng: np.random.Generator) -> FitResult:
     """Give a cut's fit its toughness, if the recipe says how well the thickness is known.
 
-    Torque knows the product J_c h alone, so each draw of it is divided by a thickness of its own:
-    log-normal, independent, with the recipe's mean and standard deviation. Its share of 1 goes
-    into the toughness as it is. The fit is returned as it came where nothing is cut or
+    Torque determines the product J_c h alone, so each draw of it is divided by its own draw of the
+    thickness: log-normal, independent, with the recipe's mean and standard deviation. Its share of
+    1 goes into the toughness as it is. The fit is returned as it came where nothing is cut or
     ``material.thickness_sd_mm`` is not given.
     """
     material, prior = recipe.material, recipe.fit.cut.toughness_J_per_m2

@@ -46,7 +46,7 @@ AGREEMENT = 0.5
 
 @dataclass(frozen=True)
 class Cogging:
-    """The strongest line of the periodogram that is believed, or the strongest of all if none is.
+    """The strongest line of the periodogram above its threshold; of all lines where none is.
 
     ``power`` is in units of the noise around it, whose mean is 1; ``threshold`` is what the largest
     of all frequencies exceeds by chance with a probability of ``FALSE_ALARM``.
@@ -144,7 +144,7 @@ def _agree(*parts: tuple[complex, float]) -> bool:
 
 
 def _unexplained(moments: StrokeMoments) -> Array:
-    """Residual (n,) of the columns that need no scale, each with a factor of its own."""
+    """Residual (n,) of the columns that need no scale, each with its own factor."""
     products = moments.products(FIXED, FIXED).sum(axis=0)
     slope = moments.products(FIXED, MEASURED).sum(axis=0)[:, 0]
     size = np.sqrt(np.diag(products))

@@ -77,7 +77,7 @@ def fit_friction(
     """Identify friction, inertia and offset from recordings of empty motion.
 
     drive = inertia * acceleration + F(opening, rate) + offset + noise. The simplest candidate law
-    is taken whose error on held-out strokes is not distinguishable from the best, unless
+    is taken whose error on hold-out strokes is not distinguishable from the best, unless
     ``settings`` name one. Units follow the recordings' joint. Two or more recordings are also
     fitted each by itself, and draws widened by what they differ in.
 

@@ -145,7 +145,7 @@ class ReducedLaw:
     def by_stroke(self, draws: Array) -> Array:
         """Log-likelihood of each stroke at each draw (k, p): (k, strokes).
 
-        By residuals: draws lie in cells of their own, and a cell's products cost as much as the
+        By residuals: draws lie in different cells, and a cell's products cost as much as the
         residuals of several draws.
         """
         squares = np.empty((len(draws), len(self.moments.labels)))

@@ -1,4 +1,4 @@
-"""Predictions of a friction fit for new motion, with a band calibrated on held-out data."""
+"""Predictions of a friction fit for new motion, with a band calibrated on hold-out data."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -27,7 +27,7 @@ Unit = Literal["stroke", "recording"]
 class Band:
     """Half-width of a band about a prediction, and what it promises.
 
-    A sample, taken at random from a new ``unit`` that is drawn as the ``count`` held-out ones were,
+    A sample, taken at random from a new ``unit`` that is drawn as the ``count`` hold-out ones were,
     lies within ``moving`` of its prediction with probability ``level``; ``resting`` is the same
     where the direction of motion is not certain, None where nothing is predicted there. Half-widths
     are in the effort's unit. ``conformal`` says whether the promise rests on exchangeable units
@@ -45,9 +45,9 @@ class Band:
     def sentence(self) -> str:
         """What the band promises, in one sentence."""
         ground = (
-            f"its width is from the errors on {self.count} held-out {self.unit}s"
+            f"its width is from the errors on {self.count} hold-out {self.unit}s"
             if self.conformal
-            else f"its width is from the errors on {self.count} held-out {self.unit}s, widened by "
+            else f"its width is from the errors on {self.count} hold-out {self.unit}s, widened by "
             "Student's t because these are few"
         )
         return (
@@ -116,7 +116,7 @@ def load_band(
     """Calibrate the band of the load at a transmission's far end, as :func:`effort_band` does.
 
     ``recordings`` are the fit's own. Windows at rest belong to the stroke before them, and have a
-    half-width of their own.
+    separate half-width.
     """
     windows = two_ended(fit, recordings, cutoff_Hz)
     folds, solver = _Folds.of(design, fit), LoadSolver(fit, windows)
@@ -226,7 +226,7 @@ class _Folds:
         labels = np.unique(index)
         if len(labels) < 2:
             raise InputError(
-                "A band needs held-out strokes, and there is only one stroke: record several "
+                "A band needs hold-out strokes, and there is only one stroke: record several "
                 "strokes, or two recordings, and fit again."
             )
         values = {name: float(value) for name, value in _values(fit).items()}

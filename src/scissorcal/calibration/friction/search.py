@@ -190,7 +190,7 @@ def _grid(problem: CandidateProblem, place: int, spacing: float) -> list[int]:
 
 
 def _free_squares(law: ReducedLaw, start: Array, cell: Cell) -> float:
-    """Squares left by the columns that the law has, each with a factor of its own."""
+    """Squares left by the columns that the law has, each with its own factor."""
     products = law.summed(cell)
     used = np.flatnonzero(np.any(law.slopes(start, cell) != 0.0, axis=1))
     size = np.sqrt(np.diag(products)[used])

@@ -11,7 +11,7 @@ from scissorcal.vision.geometry.pose import Pose
 class PlateView:
     """One photograph: corners seen and used, rms errors in pixels under the common pose and under
     its own, side of a square or marker in pixels, distance, angle between line of sight and the
-    plate's normal, ambiguity of its own pose, and how far that lies from the common one."""
+    plate's normal, ambiguity of that pose, and how far that lies from the common one."""
 
     name: str
     corners: int

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,19 +35,6 @@ class Faults:
     delay_ms: float = 0.0
     unplug_s: float | None = None
     stuck_encoder_s: float | None = None
-
-    def as_options(self) -> tuple[str, ...]:
-        """The faults as :func:`parse_faults` reads them.
-
-        >>> Faults(drop_share=0.01).as_options()
-        ('drop=0.01',)
-        """
-        defaults = {field.name: field.default for field in fields(self)}
-        return tuple(
-            f"{kind}={getattr(self, name)!r}"
-            for kind, name in _KINDS.items()
-            if getattr(self, name) != defaults[name]
-        )
 
 
 def parse_faults(options: Iterable[str]) -> Faults:

@@ -9,7 +9,6 @@ from pathlib import Path
 from select import select
 from typing import IO
 
-from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError, InputError
 
 START_TIMEOUT_S = 30.0
@@ -27,13 +26,13 @@ class SimProcess:
     True
     """
 
-    def __init__(
-        self, specimen: str | Path, seed: int = 0, faults: Faults | Sequence[str] = ()
-    ) -> None:
-        """Raises InputError for a bad specimen or fault, DeviceError if nothing starts."""
-        options = faults.as_options() if isinstance(faults, Faults) else tuple(faults)
+    def __init__(self, specimen: str | Path, seed: int = 0, faults: Sequence[str] = ()) -> None:
+        """Start it with ``faults`` such as "drop=0.01".
+
+        Raises InputError for a bad specimen or fault, DeviceError if nothing starts.
+        """
         command = [sys.executable, "-m", "scissorcal.device.sim.server", str(specimen)]
-        command += [f"--seed={seed}", *(f"--fault={option}" for option in options)]
+        command += [f"--seed={seed}", *(f"--fault={option}" for option in faults)]
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close()
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors

@@ -170,7 +170,7 @@ class _Port:
 class _ParentPipe:
     """Waits for time to pass, and sees when the process at the other end of stdin is gone.
 
-    Only a pipe or socket says so: a terminal, /dev/null or no stdin at all is left alone.
+    Only a pipe or socket shows this: a terminal, /dev/null or no stdin at all is left alone.
     """
 
     def __init__(self) -> None:

@@ -1,19 +1,15 @@
 """The truth of a specimen, for judging fits and renders: never for making them.
 
-Parameters under the names that fits use, the average torque in closed form up to a quadrature,
-and the torque along a slow motion without any noise.
+Parameters under the names that fits use, and the average torque in closed form up to a quadrature.
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.device.sim.blade import BladeOnSheet
-from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.friction import DryFriction
-from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -102,30 +98,7 @@ def average_torque(
             torque = settled if x < starts else min(torque, settled)
         return torque - joint.sliding(theta, omega) if friction else torque
 
-    return _over_arrays(one, opening, rate, contact)
-
-
-def run_quasistatic(
-    specimen: Specimen,
-    opening: ArrayLike,
-    rate: ArrayLike,
-    advance: ArrayLike,
-    friction: bool = True,
-) -> Array:
-    """Torque in N m along a motion on a fresh sheet of mean toughness, ripple included.
-
-    ``opening`` (rad), ``rate`` (rad/s, for friction alone) and ``advance`` (m) have shape (N,),
-    in order of time; the sheet's near edge stands at 0. No inertia, no noise, no rate damping.
-    """
-    blade = BladeOnSheet(specimen)
-    joint = DryFriction.of_joint(specimen.mechanism.friction)
-    cut = Cut(blade, Sheet(specimen.material, None))
-
-    def one(theta: float, omega: float, x_n: float) -> float:
-        torque = cut.move_to(theta, x_n).torque
-        return torque - joint.sliding(theta, omega) if friction else torque
-
-    return _over_arrays(one, opening, rate, advance)
+    return np.asarray(np.vectorize(one, otypes=[np.float64])(opening, rate, contact))
 
 
 def settled_torque(
@@ -218,15 +191,3 @@ def varied(specimen: Specimen, rng: np.random.Generator, spread: float = 0.15) -
         changes["kappa"] = min(0.95, max(0.4, scaled(material.kappa)))
     update = {"mechanism": mechanism, "material": material.model_copy(update=changes)}
     return Specimen.model_validate(specimen.model_copy(update=update).model_dump())
-
-
-def _over_arrays(
-    law: Callable[[float, float, float], float], a: ArrayLike, b: ArrayLike, c: ArrayLike
-) -> Array:
-    first, second, third = np.broadcast_arrays(
-        np.asarray(a, dtype=np.float64),
-        np.asarray(b, dtype=np.float64),
-        np.asarray(c, dtype=np.float64),
-    )
-    rows = zip(first.ravel().tolist(), second.ravel().tolist(), third.ravel().tolist(), strict=True)
-    return np.array([law(*row) for row in rows], dtype=np.float64).reshape(first.shape)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,6 +11,7 @@ import numpy as np
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
@@ -135,12 +135,12 @@ def trace(
 
 def posterior_sha256(fit: FitResult) -> str:
     """SHA-256 of a fit's draws: their bytes as little-endian float64, draw by draw."""
-    return hashlib.sha256(np.ascontiguousarray(fit.draws, dtype="<f8").tobytes()).hexdigest()
+    return bytes_digest(np.ascontiguousarray(fit.draws, dtype="<f8").tobytes())
 
 
 def trust_check_sha256(check: VerifyResult) -> str:
     """SHA-256 of a trust check's content, as JSON with sorted keys."""
-    return hashlib.sha256(json.dumps(asdict(check), sort_keys=True).encode()).hexdigest()
+    return bytes_digest(json.dumps(asdict(check), sort_keys=True).encode())
 
 
 def provenance_panel(provenance: Provenance, recordings: Sequence[RecordingSummary]) -> Panel:

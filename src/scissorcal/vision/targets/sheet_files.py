@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import file_error
+from scissorcal.files import replacing
 from scissorcal.vision.targets.sheet import Sheet
 
 if TYPE_CHECKING:
@@ -25,9 +26,8 @@ def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in contents.items():
-            part = path.with_name(path.name + ".part")
-            part.write_bytes(content)
-            part.replace(path)
+            with replacing(path) as part:
+                part.write_bytes(content)
     except OSError as error:
         raise file_error(error, folder) or error from None
     pdf, png = contents

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.files import replacing
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import available
 
@@ -69,9 +70,8 @@ def standing_review(engine: Engine) -> "Review | None":
 
 
 def _write(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error

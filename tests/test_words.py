@@ -1,0 +1,71 @@
+"""Sentences in the source use the words of the glossary: errors, verdicts, help, docstrings."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import scissorcal
+from tests.test_docs import ROOT, words_not_used
+
+PACKAGE = Path(scissorcal.__file__).parent
+NAME = re.compile(r"`+[^`]*`+|\w+ = ")
+ROOMS = ("cli", "device", "inference", "kernel", "model", "recording")
+"""Rooms whose sentences are held to the list; the modules beside the rooms are, too."""
+
+HELD = sorted(
+    [*PACKAGE.glob("*.py"), *(path for room in ROOMS for path in (PACKAGE / room).rglob("*.py"))]
+)
+
+
+def sentences_of(source: str) -> list[tuple[int, str]]:
+    """Line and text of every string that has a space and is no key of a dict.
+
+    Left out are names of code and of settings (in backticks, or before an equals sign), and what
+    an f-string inserts.
+    """
+    tree = ast.parse(source)
+    texts: list[tuple[int, str]] = []
+    inner: set[ast.AST] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            inner |= set(node.values)
+            parts = [part.value for part in node.values if isinstance(part, ast.Constant)]
+            texts.append((node.lineno, "{}".join(str(part) for part in parts)))
+        elif isinstance(node, ast.Dict):
+            inner |= {key for key in node.keys if key is not None}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in inner:
+            texts.append((node.lineno, node.value))
+    return [(line, NAME.sub(" ", text)) for line, text in texts if " " in text.strip()]
+
+
+def words_found(path: Path) -> list[str]:
+    """The words that are not used, with the places of the sentences that use them."""
+    found = []
+    for line, text in sentences_of(path.read_text(encoding="utf-8")):
+        flat = " ".join(text.split())
+        found += [
+            f"{path.relative_to(PACKAGE)}:{line}: {word}"
+            for word in words_not_used()
+            if re.search(rf"\b{re.escape(word)}\b", flat, re.IGNORECASE)
+        ]
+    return found
+
+
+def test_sentences_are_told_from_keys():
+    source = '''def f(rung):
+    """A candidate, with ``rung`` in backticks."""
+    raise ValueError(f"The rung {rung} " f"is not there: set rung = 1")
+    return {"rung": 1, "fit rung": 2}
+'''
+    assert [text for _, text in sentences_of(source) if "rung" in text] == [
+        "The rung {} is not there: set  1"
+    ]
+
+
+@pytest.mark.parametrize("path", HELD, ids=[str(path.relative_to(PACKAGE)) for path in HELD])
+def test_sentences_use_the_words_of_the_glossary(path):
+    if not (ROOT / "docs" / "glossary.md").is_file():
+        pytest.skip("the documentation is not installed")
+    assert not words_found(path)
