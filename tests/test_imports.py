@@ -1,6 +1,7 @@
 """Data flows one way: which room may import which, and what `scissorcal --help` may load."""
 
 import ast
+import json
 import resource
 import subprocess
 import sys
@@ -148,6 +149,49 @@ def test_help_loads_nothing_heavy() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "capture" in done.stdout
+
+
+LOADS = {
+    "plan": (
+        "import os\n"
+        "from pathlib import Path\n"
+        "from scissorcal.workday.workspace import create_workspace\n"
+        "create_workspace(Path('day'), 'paper-80gsm')\n"
+        "os.chdir('day')\n"
+        "from scissorcal.cli.root import run\n"
+        "try:\n    run(['plan', '--json'])\n"
+        "except SystemExit as end:\n    assert end.code == 0, end.code\n",
+        {"numpy", "h5py", "mcap", "scissorcal.device", "scissorcal.calibration"},
+        310,
+    ),
+    "package": (
+        "import scissorcal.package.build, scissorcal.workday.runs.package\n",
+        {"scipy", "cv2", "h5py", "mcap", "scissorcal.inference", "scissorcal.vision.blade"},
+        420,
+    ),
+    "report": (
+        "import scissorcal.report, scissorcal.workday.runs.report\n"
+        "from scissorcal.vision.geometry.pose import Pose, difference\n"
+        "here = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))\n"
+        "assert not difference(here, here).any() and not here.rotation_vector.any()\n",
+        {"scipy", "cv2", "h5py", "mcap", "scissorcal.calibration.verify.check"},
+        520,
+    ),
+}
+"""A program, modules that it does without, and how many it may load in all."""
+
+
+@pytest.mark.parametrize("what", LOADS)
+def test_a_command_loads_what_it_uses(what: str, tmp_path: Path) -> None:
+    program, unused, most = LOADS[what]
+    names = tmp_path / "names.json"
+    program += "import json, sys\nopen(sys.argv[1], 'w').write(json.dumps(list(sys.modules)))\n"
+    command = [sys.executable, "-c", program, str(names)]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    loaded = json.loads(names.read_text(encoding="utf-8"))
+    assert sorted(unused & set(loaded)) == []
+    print(len(loaded))
+    assert len(loaded) <= most
 
 
 def test_no_module_imports_at_its_top_what_only_an_extra_installs() -> None:

@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, fit_friction, friction_experiment
-from scissorcal.calibration.verify import (
-    VerifyResult,
-    assess,
-    friction_simulator,
-    make_study,
-    run,
-    tasks_of,
-)
+from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration.verify.simulator import friction_simulator
+from scissorcal.calibration.verify.study import run
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps

@@ -18,8 +18,7 @@ from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.result import FitResult, Result
 from scissorcal.calibration.store import EARLIER
-from scissorcal.calibration.verify import VerifyResult
-from scissorcal.calibration.verify.result import FORMAT
+from scissorcal.calibration.verify.result import FORMAT, VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
 from tests.calibration.results import difference, results

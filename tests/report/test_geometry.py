@@ -232,7 +232,7 @@ def test_many_pictures_are_dropped_and_named(tmp_path: Path) -> None:
 
 def test_the_first_of_each_fit_come_before_the_second_of_any(tmp_path: Path) -> None:
     files = {
-        kind: [PictureFile(noise(tmp_path / kind / f"{n}.png", (64, 48))) for n in range(3)]
+        kind: [PictureFile(noise(tmp_path / kind / f"{n}.png", (64, 48)), 1000) for n in range(3)]
         for kind in ("camera", "blade")
     }
     whole = place_pictures(files, 10**9)

@@ -92,8 +92,9 @@ def check(
     if path is None:
         workspace = open_workspace(folder)
         path = workspace.package_path(workspace.recipe())
-    manifest = open_package(path, warn=False).manifest
-    return Answer(_facts(manifest), f"{path}: {_contents(manifest)}", check_package(path))
+    package = open_package(path, warn=False)
+    manifest = package.manifest
+    return Answer(_facts(manifest), f"{path}: {_contents(manifest)}", check_package(package))
 
 
 def _contents(manifest: "Manifest") -> str:

@@ -1,5 +1,6 @@
 """The ``scissorcal`` command itself: its commands in the order of the day, and how it ends."""
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -76,6 +77,10 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """
     for variable in THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")
+    # no plugin is used, and looking for some reads the metadata of every installed distribution
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # imports make many objects that stay, through which the collector would go again and again
+    gc.set_threshold(100_000)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         main = typer.main.get_command(scissorcal_command).main

@@ -11,7 +11,13 @@ from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.verify import Calibration, Check, Halves, Sensitivity, VerifyResult
+    from scissorcal.calibration.verify.result import (
+        Calibration,
+        Check,
+        Halves,
+        Sensitivity,
+        VerifyResult,
+    )
 
 _CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
 _ALL_CHECKS = ",".join(_CHECKS)

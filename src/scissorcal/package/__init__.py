@@ -5,12 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.package.archive import read_manifest
-    from scissorcal.package.build import (
-        PackageSummary,
-        build_package,
-        package_inputs_hash,
-        put_review,
-    )
+    from scissorcal.package.build import PackageSummary, build_package, put_review
     from scissorcal.package.check import REVIEW_CHECK, check_package
     from scissorcal.package.manifest import Manifest, manifest_schema_text
     from scissorcal.package.model_package import (
@@ -34,7 +29,6 @@ __all__ = [
     "check_package",
     "manifest_schema_text",
     "open_package",
-    "package_inputs_hash",
     "put_review",
     "read_manifest",
     "stamp",
@@ -42,7 +36,7 @@ __all__ = [
 
 _HOMES = {
     "archive": ("read_manifest",),
-    "build": ("PackageSummary", "build_package", "package_inputs_hash", "put_review"),
+    "build": ("PackageSummary", "build_package", "put_review"),
     "check": ("REVIEW_CHECK", "check_package"),
     "manifest": ("Manifest", "manifest_schema_text"),
     "model_package": (

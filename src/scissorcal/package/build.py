@@ -18,7 +18,7 @@ from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
-from scissorcal.package.check import FITS_CHECK, package_verdicts
+from scissorcal.package.check import FITS_CHECK, check_package
 from scissorcal.package.compile import (
     TOLERANCE,
     Compiled,
@@ -28,7 +28,6 @@ from scissorcal.package.compile import (
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
-    FORMAT,
     Bound,
     CutRecord,
     CutStructure,
@@ -52,6 +51,8 @@ from scissorcal.verdicts import Verdict, failed
 MOST_DRAWS = 200
 GRID_POINTS = 40_000
 UNHASHED = "0" * 64
+NO_IDENTITY = "0" * 64
+"""Identity of a package that is built outside a workspace: no workspace takes it as current."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def build_package(
     tolerance: float = TOLERANCE,
     review: Review | None = None,
     plate: PlateFit | None = None,
-    inputs_hash: str = "",
+    inputs_hash: str = NO_IDENTITY,
     allow_failed: bool = False,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
@@ -84,21 +85,21 @@ def build_package(
     fits, recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its
     value. ``review`` is the signature under the fits' report; it changes nothing else in the
     package. ``plate`` is where the plate stands, stored as a pose with its covariance.
+    ``inputs_hash`` is the identity that a workspace gives to recipe, fits and algorithm
+    (`workday.engine`); where it has another one now, the package is stale.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
     failed a check or the tables are further from the model than the scene allows. With
     ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
-    the package says so (docs/decisions/109-packages-from-failed-fits.md).
+    the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
     cut, friction = _wanted(recipe, friction, cut)
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
-    record = _provenance(recipe, cut, friction, plate)
-    if inputs_hash:
-        record = record.model_copy(update={"inputs_hash": inputs_hash})
+    record = _provenance(recipe, cut, friction, inputs_hash)
     draws = pick_draws(cut, friction, rng)
-    model = central_model(_centre(cut), _centre(friction) if friction else None)
+    model = central_model(FitDraws.centre(cut), FitDraws.centre(friction) if friction else None)
     compiled = compile_model(model, recipe, tolerance=tolerance)
     ranges = scene_ranges(recipe)
     bound = _bound(model, compiled, ranges, recipe, tolerance)
@@ -121,7 +122,7 @@ def build_package(
         )
     )
     package = ModelPackage(manifest, arrays, str(path))
-    verdicts = package_verdicts(package)
+    verdicts = check_package(package)
     _refuse_failed(path, verdicts)
     write_archive(path, manifest, arrays)
     return PackageSummary(
@@ -140,32 +141,6 @@ def put_review(package: ModelPackage, review: Review | None, path: Path) -> Mode
     manifest = package.manifest.model_copy(update={"review": review})
     write_archive(path, manifest, package.arrays)
     return ModelPackage(manifest, package.arrays, str(path))
-
-
-def package_inputs_hash(
-    recipe: Recipe,
-    friction: FitResult | None,
-    cut: FitResult | None,
-    plate: PlateFit | None = None,
-) -> str:
-    """Hash of all that a package depends on; if its manifest has the same, it is up to date."""
-    if not recipe.scene.render_friction:
-        friction = None
-    facts = {
-        "format": FORMAT,
-        "version": scissorcal.__version__,
-        "recipe": json.loads(recipe.model_dump_json()),
-        "fits": [_fingerprint(fit) if fit else None for fit in (cut, friction)],
-    }
-    if plate:
-        facts["plate"] = plate.inputs_hash
-    return bytes_digest(canonical(facts))
-
-
-def _fingerprint(fit: FitResult) -> str:
-    """Distinguishes fits of the same inputs with different seeds."""
-    numbers = np.concatenate([fit.map_point, fit.draws.ravel()])
-    return fit.inputs_hash + bytes_digest(np.ascontiguousarray(numbers).tobytes())
 
 
 def _wanted(
@@ -239,14 +214,14 @@ def _plate_record(plate: PlateFit) -> PlateRecord:
 
 
 def _provenance(
-    recipe: Recipe, cut: FitResult, friction: FitResult | None, plate: PlateFit | None
+    recipe: Recipe, cut: FitResult, friction: FitResult | None, inputs_hash: str
 ) -> Provenance:
     text = canonical(json.loads(recipe.model_dump_json()))
     return Provenance(
         scissorcal_version=scissorcal.__version__,
         recipe=text.decode("utf-8"),
         recipe_sha256=bytes_digest(text),
-        inputs_hash=package_inputs_hash(recipe, friction, cut, plate),
+        inputs_hash=inputs_hash,
         cut=CutRecord(
             **_record(cut), structure=CutStructure(**_known(cut.structure, CutStructure))
         ),
@@ -301,11 +276,6 @@ def _record(fit: FitResult) -> dict[str, Any]:
 
 def _warnings(verdicts: tuple[Verdict, ...]) -> tuple[str, ...]:
     return tuple(f"{verdict.scope}, {verdict.check}: {verdict.why}" for verdict in failed(verdicts))
-
-
-def _centre(fit: FitResult) -> FitDraws:
-    names = tuple(parameter.name for parameter in fit.parameters)
-    return FitDraws(fit.structure, names, fit.map_point[None, :])
 
 
 def pick_draws(
@@ -368,7 +338,7 @@ def _refuse_failed_fits(
     raise VerdictError(
         f"{path} was not written: its fits failed {count} check{'s' if count > 1 else ''}. "
         f"{sentences} Correct that and run {again} again, or build it all the same with "
-        "'scissorcal package build --allow-failed': the package then says so on every use."
+        "'scissorcal package build --allow-failed': the package then warns on every use."
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scissorcal.package.bound import deviation
 from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "package"
 REVIEW_CHECK = "review"
@@ -20,16 +20,13 @@ IN_BAND = 0.9
 EXTREME_STEPS = 4_000
 
 
-def check_package(path: Path | str) -> tuple[Verdict, ...]:
-    """Open a package and judge it: error bound, extremes, centre, fits, review.
+def check_package(package: ModelPackage | Path | str) -> tuple[Verdict, ...]:
+    """Judge a package, open or in a file: error bound, extremes, centre, fits, review.
 
     Raises MissingError or InputError where the file cannot even be opened as a package.
     """
-    return package_verdicts(open_package(path, warn=False))
-
-
-def package_verdicts(package: ModelPackage) -> tuple[Verdict, ...]:
-    """Judge a package in memory; each verdict gives the check and the reason."""
+    if not isinstance(package, ModelPackage):
+        package = open_package(package, warn=False)
     return (
         *_bound(package),
         _extremes(package),
@@ -49,27 +46,19 @@ def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
         GRID_POINTS,
         stated.from_rate_rad_per_s,
     )
-    holds = found.largest <= stated.stated_Nm
     opening, rate, contact = found.where
     why = (
         f"At {found.points} independent test points the kernel is within {found.largest:.2g} N m "
         f"of the model (limit {stated.stated_Nm:.2g} N m; worst at opening "
         f"{np.degrees(opening):.1f} deg, rate {rate:.2g} rad/s, contact {contact * 1e3:.1f} mm)."
     )
-    kept = Verdict(
-        SCOPE, "bound", "pass" if holds else "fail", found.largest, stated.stated_Nm, why
-    )
-    small = stated.share <= stated.allowed_share
+    kept = judge(SCOPE, "bound", found.largest, stated.stated_Nm, why)
     why = (
         f"The stated bound is {stated.share:.3%} of the scene's largest torque "
         f"({stated.scene_torque_Nm:.3g} N m); the tables may use {stated.allowed_share:.2%}."
     )
-    if not small:
-        why += " Narrow the scene's ranges in the recipe, or raise its tolerance."
-    share = Verdict(
-        SCOPE, "bound share", "pass" if small else "fail", stated.share, stated.allowed_share, why
-    )
-    return kept, share
+    remedy = f"{why} Narrow the scene's ranges in the recipe, or raise its tolerance."
+    return kept, judge(SCOPE, "bound share", stated.share, stated.allowed_share, why, remedy)
 
 
 def _extremes(package: ModelPackage) -> Verdict:
@@ -82,9 +71,8 @@ def _extremes(package: ModelPackage) -> Verdict:
     inputs[rng.integers(0, 3, 60), rng.integers(0, EXTREME_STEPS, 60)] = np.inf
     out = kernel.step_many(*inputs)
     bad = int(np.sum(~np.isfinite(out["torque"]) | ~np.isfinite(out["force"])))
-    status: Status = "pass" if bad == 0 else "fail"
     why = f"{bad} of {EXTREME_STEPS} steps with extreme inputs gave an output that is not finite."
-    return Verdict(SCOPE, "extremes", status, float(bad), 0.0, why)
+    return judge(SCOPE, "extremes", bad, 0.0, why)
 
 
 def _centre(package: ModelPackage) -> Verdict:
@@ -99,33 +87,27 @@ def _centre(package: ModelPackage) -> Verdict:
     low, high = package.band(*where, probability=0.98)
     slack = manifest.bound.stated_Nm
     inside = float(np.mean((torque >= low - slack) & (torque <= high + slack)))
-    status: Status = "pass" if inside >= IN_BAND else "fail"
     why = (
         f"The rendered torque lies within the posterior's 98 % band at {inside:.0%} of the scene's "
         f"points ({package.draws} draws)."
     )
-    if status == "fail":
-        why += (
-            " The fit's best point is not typical of its posterior: run 'scissorcal fit --effort "
-            "thorough'."
-        )
-    return Verdict(SCOPE, "centre", status, inside, IN_BAND, why)
+    remedy = (
+        f"{why} The fit's best point is not typical of its posterior: run 'scissorcal fit --effort "
+        "thorough'."
+    )
+    return judge(SCOPE, "centre", inside, IN_BAND, why, remedy)
 
 
 def _fits(package: ModelPackage) -> Verdict:
-    count = len(package.manifest.failed_checks)
-    if not count:
-        why = "Every fit in the package passed its checks."
-        return Verdict(SCOPE, FITS_CHECK, "pass", 0.0, 0.0, why)
-    return Verdict(SCOPE, FITS_CHECK, "fail", float(count), 0.0, " ".join(package.fit_warnings))
+    passed, failed = "Every fit in the package passed its checks.", " ".join(package.fit_warnings)
+    return judge(SCOPE, FITS_CHECK, len(package.manifest.failed_checks), 0.0, passed, failed)
 
 
 def _review(package: ModelPackage) -> Verdict:
     review = package.manifest.review
     against = " ".join(package.review_warnings)
     if review is None:
-        return Verdict(SCOPE, REVIEW_CHECK, "not_evaluated", None, None, against)
-    if against:
-        return Verdict(SCOPE, REVIEW_CHECK, "fail", 0.0, 1.0, against)
+        return not_evaluated(SCOPE, REVIEW_CHECK, against)
+    accepted = 0.0 if against else 1.0
     why = f"The report of its fits was {review.words}."
-    return Verdict(SCOPE, REVIEW_CHECK, "pass", 1.0, 1.0, why)
+    return judge(SCOPE, REVIEW_CHECK, accepted, 1.0, why, against)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.result import FitResult
 from scissorcal.model import (
     Cutting,
     FrictionLaw,
@@ -69,6 +70,16 @@ class FitDraws:
     structure: Mapping[str, Any]
     names: tuple[str, ...]
     draws: Array
+
+    @classmethod
+    def of(cls, fit: FitResult, draws: Array) -> "FitDraws":
+        """The law of a fit at the given draws of its parameters."""
+        return cls(fit.structure, tuple(parameter.name for parameter in fit.parameters), draws)
+
+    @classmethod
+    def centre(cls, fit: FitResult) -> "FitDraws":
+        """The law of a fit at its MAP point."""
+        return cls.of(fit, fit.map_point[None, :])
 
     def columns(self) -> dict[str, Array]:
         """Parameters by name, each of shape (draws, 1)."""

@@ -66,7 +66,7 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     """Sentences on what of a law the tables leave out, and what that costs in torque.
 
     ``scene_torque`` (N m) is the largest that the scene renders. Cogging is the rig's own and is
-    left out without a word: the friction fit's notes tell of it.
+    left out without a sentence: the friction fit's notes report it.
     """
     said = []
     loaded = [term for term in law.terms if term.needs_load and term.role is not Role.PLAIN]
@@ -101,7 +101,7 @@ def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[s
 
     Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
     material. ``scene_torque`` (N m) is the largest that the scene renders; a share that is
-    certainly below ``allowed``, what the tables may be off by, is not told.
+    certainly below ``allowed``, what the tables may be off by, is not reported.
     """
     share = next((p for p in cut.nuisance if p.name == "load_share"), None)
     if share is None:

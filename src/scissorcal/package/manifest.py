@@ -228,7 +228,8 @@ class Provenance(Section):
     """Where a package comes from.
 
     ``recipe`` is the recipe as canonical JSON, every default written out, ``recipe_sha256`` its
-    hash. ``inputs_hash`` covers the recipe, the fits and the version: equal hashes, equal package.
+    hash. ``inputs_hash`` is the workspace's identity of recipe, fits and algorithm: equal hashes,
+    equal package. It is all zeros for a package that was built outside a workspace.
     """
 
     scissorcal_version: Annotated[str, Field(max_length=40)]

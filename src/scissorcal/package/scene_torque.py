@@ -170,8 +170,8 @@ class _Probe:
         if not all(has_numbers(fit, own) for fit, own in zip(fits, keys, strict=False)):
             raise MissingError("The fits hold no usable numbers: fit again, then report again.")
         picked = pick_draws(cut, friction, np.random.default_rng(0))
-        drawn = [_draws(fit, picked[f"draws/{fit.what}.npy"]) for fit in fits]
-        best = [_draws(fit, fit.map_point[None, :]) for fit in fits]
+        drawn = [FitDraws.of(fit, picked[f"draws/{fit.what}.npy"]) for fit in fits]
+        best = [FitDraws.centre(fit) for fit in fits]
         self.cut, self._friction = cut, friction
         self._drawn = exact_model(drawn[0], drawn[1] if friction else None)
         self._central: ExactModel = central_model(best[0], best[1] if friction else None)
@@ -213,10 +213,6 @@ class _Probe:
             empty &= _alike(rate, self._friction.series.opening_rate)
             found &= empty.any(axis=1)
         return np.asarray(found)
-
-
-def _draws(fit: FitResult, draws: Array) -> FitDraws:
-    return FitDraws(fit.structure, tuple(p.name for p in fit.parameters), draws)
 
 
 def _slices(recipe: Recipe, probe: _Probe) -> list[Slice]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from scissorcal.device.motion import MotionReport, Percentiles
 from scissorcal.kernel import EnergyLedger
-from scissorcal.verdicts import Status, Verdict
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "render"
 MOST_MISSED = 0.01
@@ -99,59 +99,54 @@ def render_verdicts(
 def _deadline(latency: Percentiles | None, tick_us: int) -> Verdict:
     if latency is None:
         why = "Virtual time has no latency."
-        return Verdict(SCOPE, "deadline", "not_evaluated", None, float(tick_us), why)
-    status: Status = "pass" if latency.p99 < tick_us else "fail"
+        return not_evaluated(SCOPE, "deadline", why, float(tick_us))
     why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
-    if status == "fail":
-        why += " Run 'scissorcal device doctor' to find what is slow."
-    return Verdict(SCOPE, "deadline", status, latency.p99, float(tick_us), why)
+    remedy = f"{why} Run 'scissorcal device doctor' to find what is slow."
+    return judge(SCOPE, "deadline", latency.p99, tick_us, why, remedy)
 
 
 def _complete(report: MotionReport) -> Verdict:
     counters = report.counters
     share = counters.misses / max(1, counters.frames + counters.misses)
-    status: Status = "pass" if share <= MOST_MISSED else "fail"
     why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
-    if status == "fail":
-        why += " Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
-    return Verdict(SCOPE, "misses", status, share, MOST_MISSED, why)
+    remedy = (
+        f"{why} Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
+    )
+    return judge(SCOPE, "misses", share, MOST_MISSED, why, remedy)
 
 
 def _faultless(report: MotionReport, tick_us: int) -> Verdict:
     """Whether the device braked by itself too often."""
     counters = report.counters
     allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
-    status: Status = "pass" if counters.faults <= allowed else "fail"
     why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
     if counters.faults:
         why += (
             " After each the force was ramped up from zero. If nothing else caused them, commands "
             "were too late: run 'scissorcal device doctor'."
         )
-    return Verdict(SCOPE, "faults", status, float(counters.faults), allowed, why)
+    return judge(SCOPE, "faults", counters.faults, allowed, why)
 
 
 def _supervised(report: MotionReport) -> Verdict:
     count = report.counters.fallback_frames
-    if count == 0:
-        why = "The supervising process never missed its heartbeat."
-        return Verdict(SCOPE, "supervision", "pass", 0.0, 0.0, why)
-    why = (
+    never = "The supervising process never missed its heartbeat."
+    missed = (
         f"{count} frames had damping only, because the supervising process missed its "
         "heartbeat: close programs that load the processor."
     )
-    return Verdict(SCOPE, "supervision", "fail", float(count), 0.0, why)
+    return judge(SCOPE, "supervision", count, 0.0, never, missed)
 
 
 def _passive(ledger: EnergyLedger) -> Verdict:
     """Whether more energy came out than the model allows, which is felt as buzzing."""
     taken = ledger.fracture_J + ledger.arrest_J + ledger.friction_J
     allowed = max(NEGLIGIBLE_J, MOST_CREATED * taken)
-    status: Status = "pass" if ledger.created_J <= allowed else "fail"
     why = (
         f"Energy error {max(ledger.created_J, 0.0):.2g} J (limit {allowed:.2g} J): the motors "
         f"delivered {ledger.delivered_J:.3g} J, the model absorbed {taken:.3g} J."
     )
-    if status == "fail":
-        why += " Limits, the ramp or a slow loop distort the model: lower its stiffness or speed."
-    return Verdict(SCOPE, "passivity", status, ledger.created_J, allowed, why)
+    remedy = (
+        f"{why} Limits, the ramp or a slow loop distort the model: lower its stiffness or speed."
+    )
+    return judge(SCOPE, "passivity", ledger.created_J, allowed, why, remedy)

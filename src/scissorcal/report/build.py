@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -160,13 +159,20 @@ def _with_earlier_time(document: ReportDocument, path: Path) -> tuple[ReportDocu
     twin = twin_text(document)
     try:
         there = path.read_text(encoding="utf-8")
-        stated = json.loads(there)["created"]
-        now = json.loads(twin)["created"]
-        created = datetime.fromisoformat(stated)
-    except (OSError, ValueError, KeyError, TypeError):
+        before, _, rest = _parted(twin)
+        earlier, stated, same = _parted(there)
+        if (earlier, same) != (before, rest):
+            return document, twin
+        return replace(document, created=datetime.fromisoformat(stated)), there
+    except (OSError, ValueError):
         return document, twin
-    same = twin.replace(f'"created":"{now}"', f'"created":"{stated}"', 1)
-    return (replace(document, created=created), same) if same == there else (document, twin)
+
+
+def _parted(twin: str) -> tuple[str, str, str]:
+    """What stands before, in and after the first "created" of a twin, which is the report's."""
+    before, _, rest = twin.partition('"created":"')
+    stated, _, after = rest.partition('"')
+    return before, stated, after
 
 
 def _write_both(files: ReportFiles, page: str, twin: str) -> None:

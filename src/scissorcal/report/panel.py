@@ -1,4 +1,4 @@
-"""A panel: one subject as a person is told of it, on the page, in the terminal and as JSON."""
+"""A panel: one subject as it is shown to a person, on the page, in the terminal and as JSON."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Row:
-    """Named values of one thing. ``name`` tells rows of a panel apart.
+    """Named values of one thing. ``name`` identifies a row within its panel.
 
     ``anchor`` is the row's own address on the page, ``link`` that of what it is about; ``note`` a
     sentence below it. ``marked`` rows stand out.
@@ -140,14 +140,14 @@ class Chart:
 class Picture:
     """A photograph that was drawn on: its file's name, caption, and in words what it shows.
 
-    On the page it is at most ``widest_px`` wide.
+    On the page it is at most ``widest_px`` wide: as fits draw them, so that lines stay sharp.
     """
 
     file: str
     title: str
     caption: str
     alt: str
-    widest_px: int = 900
+    widest_px: int = 1000
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ class PictureFile:
     """A picture on disk, to be made at most ``widest_px`` wide."""
 
     path: Path
-    widest_px: int = 900
+    widest_px: int
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def place_pictures(
 
 
 def _read(file: PictureFile) -> Image:
-    """The picture as a small JPEG; one that cannot be read says so."""
+    """The picture as a small JPEG; with the reason where it cannot be read."""
     import cv2
     import numpy as np
 

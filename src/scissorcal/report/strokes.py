@@ -20,16 +20,8 @@ KINDS: dict[str, StrokeKind] = {
     "excitation": "excitation",
     "press": "press",
 }
+"""Each kind of stroke has colour and mark of its name (doi:10.1038/nmeth.1618)."""
 BETWEEN = "between strokes"
-
-
-LOOKS: dict[str, Look] = {
-    "closing": "closing",
-    "opening": "opening",
-    "excitation": "excitation",
-    "press": "press",
-}
-"""Colour and mark of each kind of stroke, after Okabe and Ito (doi:10.1038/nmeth.1618)."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ def channels_of(fit: FitResult) -> Channels:
 
 def look_of(kind: str) -> Look:
     """Colour and mark of a kind of stroke."""
-    return LOOKS.get(kind, "orange")
+    return KINDS.get(kind) or "orange"
 
 
 @dataclass(frozen=True)

@@ -184,23 +184,27 @@ class Engine:
         broken = [row for row in rows if row.use == "unreadable"]
         used = [row for row in rows if row.use == "used"]
 
-        def told(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
+        def found_as(
+            state: State, found: str, command: str = step.command, **more: Any
+        ) -> StepState:
             return StepState(step.name, state, found, why, command, **{"notes": notes, **more})
 
         if broken:
             name = broken[0].path.name
             command = f"scissorcal recording exclude {name} --why 'cannot be read'"
-            return told("failed", f"{name} cannot be read", command)
+            return found_as("failed", f"{name} cannot be read", command)
         if not used:
             if not rows:
-                return told("missing", "nothing recorded yet")
+                return found_as("missing", "nothing recorded yet")
             if all(row.use == "excluded" for row in rows):
-                return told("missing", "every recording is excluded")
-            return told("stale", "recorded with another rig, material or scene")
+                return found_as("missing", "every recording is excluded")
+            return found_as("stale", "recorded with another rig, material or scene")
         try:
             refuse_mixed_joints(rows)
         except InputError as error:
-            return told("failed", "rotary and linear joints are mixed", notes=(*notes, str(error)))
+            return found_as(
+                "failed", "rotary and linear joints are mixed", notes=(*notes, str(error))
+            )
         notes = (*notes, *self._notes_of(used))
         content = digest(sorted(str(row.facts["content"]) for row in used))
         files = tuple(self.workspace.relative(row.path) for row in used)
@@ -210,8 +214,8 @@ class Engine:
             sentence = "; ".join(missing)
             notes = (*notes, f"{step.name} lacks: {sentence}.")
             found = f"{found}; lacks {missing[0]}" + (" ..." if len(missing) > 1 else "")
-            return told("incomplete", found, content=content, files=files, notes=notes)
-        return told("done", found, "", content=content, files=files, notes=notes)
+            return found_as("incomplete", found, content=content, files=files, notes=notes)
+        return found_as("done", found, "", content=content, files=files, notes=notes)
 
     def completeness(self, kind: CaptureKind) -> "Completeness":
         """Planned, recorded, and used by the fit where there is a current one."""
@@ -299,40 +303,44 @@ class Engine:
         path = self.file(step.name)
         name = self.workspace.relative(path)
 
-        def told(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
+        def found_as(
+            state: State, found: str, command: str = step.command, **more: Any
+        ) -> StepState:
             return StepState(step.name, state, found, why, command, optional=step.optional, **more)
 
         if not path.is_file():
-            return told("missing", "not there yet")
+            return found_as("missing", "not there yet")
         content = self.index.digest(path)
         try:
             facts = self.facts(step.name)
         except InputError as error:
             force = " --force" if step.kind in ("fit", "package") else ""
             why_not = (str(error),)
-            return told("failed", f"{name} cannot be read", f"{step.command}{force}", notes=why_not)
+            return found_as(
+                "failed", f"{name} cannot be read", f"{step.command}{force}", notes=why_not
+            )
         failed = tuple(facts["failed"])
         kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
-            return told("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
+            return found_as("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         if behind:
-            return told("stale", behind, **kept)
+            return found_as("stale", behind, **kept)
         notes = self._little_used(step)
         if failed:
             command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
-            return told("failed", found, command, notes=notes, **kept)
+            return found_as("failed", found, command, notes=notes, **kept)
         check = self.state(step.verified_by) if step.verified_by else None
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return told("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
+            return found_as("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
         if check and check.state != "done":
-            return told("unverified", facts["label"], check.command, notes=notes, **kept)
-        return told("done", facts["label"], "", notes=notes, **kept)
+            return found_as("unverified", facts["label"], check.command, notes=notes, **kept)
+        return found_as("done", facts["label"], "", notes=notes, **kept)
 
     def _little_used(self, step: Step) -> tuple[str, ...]:
         """Which planned motion a fit hardly uses, as sentences."""
@@ -359,21 +367,21 @@ class Engine:
         """A rendering is done where the newest one is of the package that is there."""
         recordings = self.workspace.recordings("render")
 
-        def told(state: State, found: str, command: str = step.command) -> StepState:
+        def found_as(state: State, found: str, command: str = step.command) -> StepState:
             files = tuple(self.workspace.relative(path) for path in recordings)
             return StepState(step.name, state, found, why, command, files, optional=True)
 
         if not recordings:
-            return told("missing", "not rendered yet")
+            return found_as("missing", "not rendered yet")
         path = self.file("package build")
         try:
             facts = self.index.facts(recordings[-1], "rendering", rendering)
             package = self.facts("package build")["content"] if path.is_file() else ""
         except InputError as error:
-            return told("failed", str(error))
+            return found_as("failed", str(error))
         if facts["package"] != package:
-            return told("stale", "of another package")
-        return told("done", _count(len(recordings), "recording"), "")
+            return found_as("stale", "of another package")
+        return found_as("done", _count(len(recordings), "recording"), "")
 
 
 _CHANGED = {

@@ -95,7 +95,7 @@ def photo_captures(workspace: Workspace, kind: PhotoKind) -> tuple[PhotoCapture,
 
 @dataclass(frozen=True)
 class Seen:
-    """What was found in one photograph, and the sentence that says so."""
+    """What was found in one photograph, and the sentence that reports it."""
 
     words: str
     detection: "Detection | None" = None

@@ -105,7 +105,7 @@ class _Here(Executor):
         future: Future[R] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
-        except Exception as error:  # noqa: BLE001 - handed on to whoever asks for the result
+        except Exception as error:  # noqa: BLE001 - handed on to the caller
             future.set_exception(error)
         return future
 

@@ -19,7 +19,7 @@ class RecordFile:
     """A file of JSON lines that one run at a time appends to.
 
     Its first line holds the hash of what the records were made from. Records of other inputs are
-    put aside under another name, never mixed with these; ``note`` then says so. A line that a
+    put aside under another name, never mixed with these; ``note`` then reports it. A line that a
     killed run left half-written is cut off.
 
     >>> with RecordFile(Path("a.jsonl"), "1234") as file:

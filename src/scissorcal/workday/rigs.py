@@ -16,7 +16,7 @@ SIM = "sim"
 def open_rig(device: str, specimen: str | None, seed: int = 0) -> "Iterator[PortLink]":
     """Open a link to ``device``; "sim" starts a virtual rig with ``specimen`` between its blades.
 
-    The virtual rig runs in a process of its own, behind a real pseudo-terminal, and ends with
+    The virtual rig runs in a separate process, behind a real pseudo-terminal, and ends with
     the block. Raises InputError where there is no specimen to simulate, DeviceError where the rig
     cannot be reached.
     """

@@ -26,7 +26,7 @@ SOURCES: Mapping[str, str] = {
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
     "track.schema.json": "scissorcal.calibration.plate.track:track_schema",
-    "verify.schema.json": "scissorcal.calibration.verify:VerifyResult",
+    "verify.schema.json": "scissorcal.calibration.verify.result:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or
 a function that gives the schema itself, as an object or as text."""

@@ -128,6 +128,20 @@ def _whole(recipe: Recipe) -> object:
     return recipe.model_dump(mode="json")
 
 
+def _trust_check(what: str) -> Step:
+    return Step(
+        f"verify {what}",
+        "verify",
+        f"scissorcal verify {what}",
+        lambda needs: _fit(what)(needs) and "whether the intervals hold",
+        inputs=(f"fit {what}",),
+        file=_in_fits(f"{what}.verify.json"),
+        read=facts.trust_check,
+        holds="scissorcal.calibration.verify.result:VerifyResult",
+        optional=True,
+    )
+
+
 STEPS: tuple[Step, ...] = (
     Step(
         "capture friction",
@@ -228,28 +242,8 @@ STEPS: tuple[Step, ...] = (
         run="scissorcal.workday.runs.cut",
         verified_by="verify cut",
     ),
-    Step(
-        "verify friction",
-        "verify",
-        "scissorcal verify friction",
-        lambda needs: _fit("friction")(needs) and "whether the intervals hold",
-        inputs=("fit friction",),
-        file=_in_fits("friction.verify.json"),
-        read=facts.trust_check,
-        holds="scissorcal.calibration.verify.result:VerifyResult",
-        optional=True,
-    ),
-    Step(
-        "verify cut",
-        "verify",
-        "scissorcal verify cut",
-        lambda needs: _fit("cut")(needs) and "whether the intervals hold",
-        inputs=("fit cut",),
-        file=_in_fits("cut.verify.json"),
-        read=facts.trust_check,
-        holds="scissorcal.calibration.verify.result:VerifyResult",
-        optional=True,
-    ),
+    _trust_check("friction"),
+    _trust_check("cut"),
     Step(
         "report",
         "report",

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.verify import Study, VerifyResult, assess, make_study, run, tasks_of
+from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
-from scissorcal.calibration.verify.study import Task
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration.verify.study import Study, Task, run
 from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer
 

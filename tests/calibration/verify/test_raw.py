@@ -9,14 +9,7 @@ from scissorcal.calibration import FitResult, cut_experiment, fit_cut, fit_frict
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.verify import (
-    assess,
-    cut_simulator,
-    friction_simulator,
-    make_study,
-    run,
-    tasks_of,
-)
+from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.simulation import (
     CutTruth,
     DriveTruth,
@@ -24,6 +17,8 @@ from scissorcal.calibration.verify.simulation import (
     motion_of,
     simulate_cut,
 )
+from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
+from scissorcal.calibration.verify.study import run
 from scissorcal.model import Cutting, Response
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording

@@ -5,7 +5,9 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.verify import assess, friction_simulator, make_study, run, tasks_of
+from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.simulator import friction_simulator
+from scissorcal.calibration.verify.study import run
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.friction.test_fit import emps
 

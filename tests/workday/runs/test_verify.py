@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.store import load, save
-from scissorcal.calibration.verify import VerifyResult
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.engine import Engine

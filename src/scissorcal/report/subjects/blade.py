@@ -27,7 +27,7 @@ from scissorcal.report.panel import (
 )
 
 PART = "blade"
-WIDEST_PX = 1400
+WIDEST_PX = 1600
 """A blade is long and its edge thin, so its pictures are larger than others."""
 MOST_POINTS = 600
 TALLEST = 4.0

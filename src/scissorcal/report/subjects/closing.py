@@ -37,8 +37,8 @@ class Source:
 class FitOrigin:
     """A fit's identity: equal ``inputs_hash`` needs no second fit.
 
-    ``part`` is its part of the report. ``posterior_sha256`` tells it from another fit of the same
-    inputs (:func:`posterior_sha256`).
+    ``part`` is its part of the report. ``posterior_sha256`` (:func:`posterior_sha256`) differs
+    between fits of the same inputs.
     """
 
     fit: str

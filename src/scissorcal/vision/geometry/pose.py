@@ -67,10 +67,8 @@ class Pose:
     @property
     def rotation_vector(self) -> Array:
         """The rotation vector (3,) in rad, of length pi at most."""
-        from scipy.spatial.transform import Rotation
-
-        w, x, y, z = self.quaternion
-        return np.asarray(Rotation.from_quat([x, y, z, w]).as_rotvec(), dtype=np.float64)
+        w, *axis = self.quaternion
+        return _turn(w, np.array(axis))
 
     def apply(self, points: ArrayLike) -> Array:
         """Points (n, 3) of frame b, in frame a."""
@@ -112,9 +110,9 @@ def between(a: Pose, b: Pose, shared: Array) -> Pose:
 
 def difference(a: Pose, b: Pose) -> Array:
     """What takes ``b`` to ``a``: rotation vector (rad) in the outer frame, then translation (m)."""
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_matrix(a.matrix @ b.matrix.T).as_rotvec()
+    (w_a, *axis), (w_b, *other) = a.quaternion, b.quaternion
+    of_a, of_b = np.array(axis), np.array(other)
+    turn = _turn(w_a * w_b + of_a @ of_b, w_b * of_a - w_a * of_b - np.cross(of_a, of_b))
     return np.concatenate([turn, np.subtract(a.translation_m, b.translation_m)])
 
 
@@ -127,6 +125,14 @@ def left_jacobian(vector: Array) -> Array:
     first = (1.0 - np.cos(angle)) / angle**2
     second = (angle - np.sin(angle)) / angle**3
     return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
+
+
+def _turn(w: float, axis: Array) -> Array:
+    """The rotation vector (3,) of a unit quaternion of either sign, of length pi at most."""
+    sine = float(np.linalg.norm(axis))
+    if sine == 0.0:
+        return np.zeros(3)
+    return np.asarray(axis * np.copysign(2.0 * np.arctan2(sine, abs(w)) / sine, w))
 
 
 def _inverse_slope(pose: Pose) -> Array:

@@ -144,7 +144,7 @@ def _fits(
     fits = []
     for index, (name, measured) in enumerate(sides.items()):
 
-        def told(done: float, sentence: str, index: int = index, name: str = name) -> None:
+        def part(done: float, sentence: str, index: int = index, name: str = name) -> None:
             request.progress(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
 
         fits.append(
@@ -155,7 +155,7 @@ def _fits(
                 rng=np.random.default_rng([request.seed, STREAM, index]),
                 name=name,
                 length_m=known,
-                progress=told,
+                progress=part,
             )
         )
     return tuple(fits)

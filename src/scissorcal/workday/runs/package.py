@@ -60,7 +60,7 @@ def build_workspace_package(
                 package = put_review(package, review, path)
             warnings = _void(engine) + package.warnings
             engine.refresh()
-            return Built(path, package.manifest, check_package(path), warnings, cached)
+            return Built(path, package.manifest, check_package(package), warnings, cached)
     summary = build_package(
         engine.recipe,
         fits["friction"],
@@ -93,8 +93,8 @@ def _refuse_failed(engine: Engine) -> None:
             raise VerdictError(
                 f"No package was built: the {item.replace('fit', 'fit of')} failed "
                 f"({', '.join(state.failed) or state.found}). Run '{state.command}'. "
-                "'scissorcal package build --allow-failed' builds one all the same, which says so "
-                "wherever it is used."
+                "'scissorcal package build --allow-failed' builds one all the same, which reports "
+                "it wherever it is used."
             )
 
 

@@ -191,11 +191,11 @@ def _write_plot(found: "Prediction", band: "Band", path: Path, unit: str) -> Non
 
     thin = slice(None, None, max(1, -(-len(found.time_s) // MOST_POINTS)))
     time = found.time_s[thin]
-    told = np.isfinite(found.low)[thin]
-    predicted = np.where(told, found.predicted[thin], np.nan)
+    known = np.isfinite(found.low)[thin]
+    predicted = np.where(known, found.predicted[thin], np.nan)
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.add_subplot()
-    low, high = np.where(told, found.low[thin], np.nan), np.where(told, found.high[thin], np.nan)
+    low, high = np.where(known, found.low[thin], np.nan), np.where(known, found.high[thin], np.nan)
     axes.fill_between(time, low, high, color="#56b4e9", alpha=0.4, lw=0, label=f"{band.level:.0%}")
     if np.any(np.isfinite(found.measured)):
         axes.plot(time, found.measured[thin], color="#333333", lw=0.7, label="measured")

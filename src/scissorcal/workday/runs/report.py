@@ -149,9 +149,10 @@ def _package_sheets(engine: Engine) -> "list[FactSheet]":
     if not path.is_file():
         return []
     try:
-        manifest = open_package(path, warn=False).manifest
+        package = open_package(path, warn=False)
     except InputError as error:
         return [sheet_from_mapping("Package", "package", {}, notes=[str(error)])]
+    manifest = package.manifest
     facts = {
         "file": engine.workspace.relative(path),
         "content hash": manifest.content_hash,
@@ -164,5 +165,5 @@ def _package_sheets(engine: Engine) -> "list[FactSheet]":
             "The package was built from other fits or settings than this report shows: run "
             "`scissorcal package build`."
         )
-    verdicts = [verdict for verdict in check_package(path) if verdict.check != REVIEW_CHECK]
+    verdicts = [verdict for verdict in check_package(package) if verdict.check != REVIEW_CHECK]
     return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts, notes=notes)]

@@ -21,14 +21,9 @@ from scissorcal.workday.workspace import FitKind, Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify import (
-        Check,
-        PriorKind,
-        Simulator,
-        Study,
-        Task,
-        VerifyResult,
-    )
+    from scissorcal.calibration.verify.result import Check, PriorKind, VerifyResult
+    from scissorcal.calibration.verify.simulator import Simulator
+    from scissorcal.calibration.verify.study import Study, Task
     from scissorcal.recording import Recording
 
 Progress = Callable[[float, str], None]
@@ -81,7 +76,7 @@ def verify_workspace(
     cluster cannot be used or another run holds the file.
     """
     from scissorcal.calibration.store import save
-    from scissorcal.calibration.verify import assess, make_study, tasks_of
+    from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 
     chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
@@ -135,7 +130,7 @@ def _experiment(
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
     from scissorcal.calibration.cut import cut_experiment
     from scissorcal.calibration.friction.fit import friction_experiment
-    from scissorcal.calibration.verify import cut_simulator, friction_simulator
+    from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
 
     recipe = engine.recipe
     recordings = used_recordings(engine.workspace, recipe, kind, engine.index)
@@ -202,7 +197,7 @@ def _run(
 
 
 def _do(job: "tuple[bytes, Task]") -> Record:
-    from scissorcal.calibration.verify import run
+    from scissorcal.calibration.verify.study import run
 
     blob, task = job
     return run(_unpacked(blob), task)
