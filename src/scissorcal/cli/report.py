@@ -26,8 +26,8 @@ def report(
 ) -> Answer:
     """Write the report: one HTML file that needs no network, and its JSON twin.
 
-    A signed report is left as it is while its fits, recipe and trust checks are; --anew writes it
-    all the same, which voids the signature if anything in it changed.
+    A signed report is left as it is while its fits, recipe and trust checks are, unless its page is
+    missing. --anew writes it all the same, which voids the signature if report.json changed.
 
     \b
     Example:
@@ -41,15 +41,17 @@ def report(
 
     workspace = open_workspace(folder)
     engine = Engine.of(workspace)
-    review = None if anew else standing_review(engine)
     written = write_workspace_report(engine, anew=anew)
+    review = standing_review(engine)
     shown = written.fits
     names = [workspace.relative(path) for path in (written.html, written.json)]
     text = f"{names[0]} and {names[1]} show {len(shown)} fit{'s' if len(shown) != 1 else ''}"
     files = [written.html, written.json]
     if review:
+        text += f"; {review.words}"
+    if not written.written:
         files = []
-        text += f"; {review.words}, so they were left as they are"
+        text += ", so they were left as they are"
     result = {
         "html": written.html,
         "json": written.json,
@@ -114,8 +116,9 @@ def sign(
 ) -> Answer:
     """Sign the report that lies in the workspace: report/signature.json.
 
-    The signature names the report's SHA-256 and the fits that it shows, so it is void once either
-    changes. The next package carries it, and rendering warns without it.
+    The signature names the SHA-256 of report.json and the fits that it shows, and is void once
+    either changes; report.html is not hashed. The next package carries it, and rendering warns
+    without it.
 
     \b
     Example:
@@ -130,6 +133,4 @@ def sign(
     review = sign_report(Engine.of(workspace), name, decision, note)
     path = workspace.signature_path
     text = f"{workspace.relative(path)}: {review.words}"
-    if decision == "accept":
-        text += "\nnext: scissorcal package build"
     return Answer(review.model_dump(), text, files=[path])

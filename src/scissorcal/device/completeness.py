@@ -7,17 +7,15 @@ loading arrays; `device.counting` makes them.
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from math import degrees
 from typing import Any
 
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import LITTLE, CaptureKind
 from scissorcal.recipe.schema import Recipe
 
 EXCITATION_SHARE = 0.95
 """Share of the planned excitation that must be recorded: its ramps are labelled as pauses."""
-
-LITTLE = 0.5
-"""A speed of which a fit uses a smaller share of the recorded motion is named."""
 
 NAMED = 3
 """Ranges of opening that a sentence lists before it only counts them."""
@@ -53,12 +51,30 @@ class StrokeCount:
 
 @dataclass(frozen=True)
 class SheetCount:
-    """Closing strokes through one sheet, numbered across recordings: planned, recorded, used."""
+    """Closing strokes through one sheet, numbered across recordings: planned, recorded, used.
+
+    Sheets that the plan has and the recordings lack come last; of sheets beyond the plan's number,
+    those with the fewest strokes have none planned.
+    """
 
     sheet: int
     planned: int
     recorded: int
     used: int | None = None
+
+
+@dataclass(frozen=True)
+class ExcitationCount:
+    """Seconds of excitation: planned, recorded, and used by the fit."""
+
+    planned_s: float
+    recorded_s: float
+    used_s: float | None = None
+
+    @property
+    def missing(self) -> bool:
+        """Whether less is recorded than a whole capture labels."""
+        return self.recorded_s < EXCITATION_SHARE * self.planned_s
 
 
 @dataclass(frozen=True)
@@ -78,7 +94,9 @@ class Completeness:
     """Planned, recorded and used, over all recordings of one kind.
 
     ``missing`` has one sentence for each thing that the plan has and the recordings lack,
-    ``little_used`` one for each speed of which the fit uses less than half of the motion.
+    ``little_used`` one for each speed of which the fit uses less than half of the motion. Return
+    strokes of a cut can be missing, and are not among ``strokes``: of how many of their samples a
+    fit could make use is not known here.
     """
 
     cells: tuple[CellCount, ...] = ()
@@ -86,10 +104,11 @@ class Completeness:
     sheets: tuple[SheetCount, ...] = ()
     missing: tuple[str, ...] = ()
     little_used: tuple[str, ...] = ()
+    excitation: ExcitationCount | None = None
 
     @property
     def summary(self) -> tuple[SummaryRow, ...]:
-        """Strokes and ranges of opening by direction and speed, then strokes by sheet."""
+        """Strokes and ranges of opening by direction and speed, strokes by sheet, excitation."""
         strokes = [
             SummaryRow(_motion(row.kind, row.speed_rad_per_s), "strokes", *_counts(row))
             for row in self.strokes
@@ -99,7 +118,8 @@ class Completeness:
             for row in self.sheets
         ]
         ranges = [_ranges(*key, row) for key, row in _by_speed(self.cells).items()]
-        return (*strokes, *ranges, *sheets)
+        excitation = [_excitation(self.excitation)] if self.excitation else []
+        return (*strokes, *ranges, *sheets, *excitation)
 
 
 def completeness(
@@ -111,8 +131,8 @@ def completeness(
     """Put the counts of several recordings together, and name what is missing or hardly used.
 
     ``used`` has, for each of ``counts``, what a fit uses of that recording, empty where that is not
-    known. Recordings by hand have
-    no planned speeds: the strokes through each sheet are counted alone.
+    known. Recordings by hand have no planned speeds: the strokes through each sheet are counted
+    alone. Presses have no sheets, unless by hand.
     """
     taken = [None] * len(counts) if used is None else list(used)
     pairs = [(count, use or None) for count, use in zip(counts, taken, strict=True) if count]
@@ -121,14 +141,25 @@ def completeness(
         return Completeness()
     cells = _cells(driven)
     strokes = _strokes(pairs, driven, recipe)
-    missing = [*_missing_cells(cells), *_missing_strokes(strokes)]
-    if kind == "friction":
-        wanted = recipe.capture.friction.excitation_s
-        found = sum(count["excitation_s"] for count, _ in pairs)
-        if found < EXCITATION_SHARE * wanted:
+    sheets = _sheets(pairs, (driven or pairs)[0][0]["planned_sheets"])
+    missing = [*_missing_cells(cells), *_missing_strokes(strokes), *_missing_sheets(sheets)]
+    excitation = None
+    if kind == "friction" and recipe.capture.friction.excitation_s > 0:
+        excitation = ExcitationCount(
+            recipe.capture.friction.excitation_s,
+            sum(count["excitation_s"] for count, _ in pairs),
+            _sum(use and use["excitation_s"] for _, use in pairs),
+        )
+        if excitation.missing:
+            found, wanted = excitation.recorded_s, excitation.planned_s
             missing.append(f"excitation: {found:.1f} s of {wanted:g} s recorded")
     return Completeness(
-        cells, strokes, _sheets(pairs, recipe), tuple(missing), tuple(_little_used(cells))
+        cells,
+        tuple(row for row in strokes if kind == "friction" or row.kind != "opening"),
+        sheets,
+        tuple(missing),
+        tuple(_little_used(cells)),
+        excitation,
     )
 
 
@@ -176,16 +207,22 @@ def _strokes(pairs: _Pairs, driven: _Pairs, recipe: Recipe) -> tuple[StrokeCount
     )
 
 
-def _sheets(pairs: _Pairs, recipe: Recipe) -> tuple[SheetCount, ...]:
-    rows = [
+def _sheets(pairs: _Pairs, planned: Sequence[int]) -> tuple[SheetCount, ...]:
+    """Put the planned sheets to those with the most strokes; further ones were not planned."""
+    if not planned:
+        return ()
+    found: list[tuple[int, int | None]] = [
         (int(recorded), None if use is None else int(use["sheets"][number]))
         for count, use in pairs
         for number, recorded in enumerate(count["sheets"])
     ]
-    planned = recipe.capture.cut.strokes_per_sheet
+    known = all(use is not None for _, use in pairs)
+    found += [(0, 0 if known else None)] * (len(planned) - len(found))
+    fullest = sorted(range(len(found)), key=lambda place: -found[place][0])
+    wanted = dict(zip_longest(fullest, sorted(planned, reverse=True), fillvalue=0))
     return tuple(
-        SheetCount(number, planned, recorded, used)
-        for number, (recorded, used) in enumerate(rows, 1)
+        SheetCount(place + 1, wanted[place], recorded, used)
+        for place, (recorded, used) in enumerate(found)
     )
 
 
@@ -221,6 +258,18 @@ def _ranges(direction: str, speed: float, row: Sequence[CellCount]) -> SummaryRo
         None if used_s is None else _filled(row),
         f"{recorded_s:.3g} s recorded" + ("" if used_s is None else f", {used_s:.3g} s used"),
     )
+
+
+def _excitation(count: ExcitationCount) -> SummaryRow:
+    """Whole seconds, rounded down where some are missing.
+
+    How much a fit can use of a signal that turns all the time is stated, not judged.
+    """
+    planned = max(1, round(count.planned_s))
+    recorded = min(int(count.recorded_s), planned - 1) if count.missing else planned
+    motion = f"{count.recorded_s:.3g} s recorded"
+    motion += "" if count.used_s is None else f", {count.used_s:.3g} s used"
+    return SummaryRow("excitation", "s of excitation", planned, recorded, None, motion)
 
 
 def _filled(cells: Sequence[CellCount]) -> int:
@@ -268,3 +317,15 @@ def _missing_strokes(strokes: Sequence[StrokeCount]) -> list[str]:
         of_speed = f" at {at} rad/s" if at else ""
         sentences.append(f"{kind} strokes{of_speed}: {recorded} of {planned} recorded{each}")
     return sentences
+
+
+def _missing_sheets(sheets: Sequence[SheetCount]) -> list[str]:
+    short: dict[tuple[int, int], list[int]] = {}
+    for row in sheets:
+        if row.recorded < row.planned:
+            short.setdefault((row.recorded, row.planned), []).append(row.sheet)
+    return [
+        f"sheet{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}: {recorded} of "
+        f"{planned} closing strokes recorded{' each' if len(numbers) > 1 else ''}"
+        for (recorded, planned), numbers in short.items()
+    ]

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.capture import identity_of
-from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
+from scissorcal.device.coverage import NEEDED_S, CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.kernel import Identity
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import LITTLE, CaptureKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 
@@ -29,7 +29,8 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
     by_hand, grid = _grid(recording, recipe, kind)
     label = _labels(recording)
     grid.add(recording.samples[label >= 0])
-    strokes = [] if by_hand else _planned(recipe, identity_of(recording.device), kind)
+    strokes, sheets = _plan(recipe, identity_of(recording.device), kind, by_hand)
+    whole = _whole(recording, label)
     return {
         "by_hand": by_hand,
         "directions": list(grid.directions),
@@ -38,8 +39,9 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
         "needed_s": grid.needed_s,
         "seconds": grid.seconds.tolist(),
         "planned": strokes,
-        "recorded": _recorded(recording, label),
-        "sheets": _sheets(recording, label, np.ones(len(label), dtype=bool)),
+        "planned_sheets": sheets,
+        "recorded": _named(recording, whole),
+        "sheets": _sheets(recording, whole),
         "excitation_s": _excitation(recording, label),
     }
 
@@ -50,7 +52,10 @@ def count_used(
     """Count what a fit uses of one recording, on the cells of :func:`count_recorded`.
 
     ``spans`` (k, 2) are the first and one past the last sample of each part that is used, as
-    ``FitResult.used`` has them.
+    ``FitResult.used`` has them. A stroke counts as used where at least half of its samples are. Of
+    a cut, where the blades are free of the material until they reach it, that is half of the
+    samples from the first that is used, and of these at least the seconds that a cell needs. Which
+    part of a return stroke touches the material is not known here, so a cut's are not counted.
     """
     if not recording.device:
         return {}
@@ -58,14 +63,12 @@ def count_used(
     label = _labels(recording)
     used = _mask(spans, len(label))
     grid.add(recording.samples[label >= 0], used[label >= 0])
+    enough = _used(recording, label, used, kind)
     return {
         "seconds": grid.seconds.tolist(),
-        "strokes": [
-            [stroke.kind, stroke.speed]
-            for stroke in recording.strokes
-            if stroke.kind != "excitation" and np.any(used & (label == stroke.index))
-        ],
-        "sheets": _sheets(recording, label, used),
+        "strokes": _named(recording, enough),
+        "sheets": _sheets(recording, enough),
+        "excitation_s": _excitation(recording, np.where(used, label, -1)),
     }
 
 
@@ -91,34 +94,65 @@ def _mask(spans: NDArray[np.int64], size: int) -> Mask:
     return np.cumsum(edges)[:size] > 0
 
 
-def _planned(recipe: Recipe, identity: Identity, kind: CaptureKind) -> list[list[Any]]:
+def _plan(
+    recipe: Recipe, identity: Identity, kind: CaptureKind, by_hand: bool
+) -> tuple[list[list[Any]], list[int]]:
+    """Kind and speed of each planned stroke, and the closing strokes planned for each sheet.
+
+    A hand has no planned speeds. Presses have no sheets: all are made on one piece.
+    """
+    capture = recipe.capture.cut
+    if by_hand:
+        return [], [capture.strokes_per_sheet] * capture.sheets
     plan = friction_plan if kind == "friction" else cut_plan
-    strokes = plan(recipe, identity).strokes
-    return [[s.kind, s.speed] for s in strokes if s.kind != "excitation"]
+    strokes = [s for s in plan(recipe, identity).strokes if s.kind != "excitation"]
+    closing = [s.sheet for s in strokes if kind == "cut" and s.kind == "closing"]
+    sheets = [closing.count(sheet) for sheet in sorted(set(closing))]
+    return [[s.kind, s.speed] for s in strokes], sheets
 
 
-def _recorded(recording: Recording, label: Labels) -> list[list[Any]]:
-    """Kind and speed of each stroke that was recorded to its end: other samples follow it."""
-    found = []
+def _whole(recording: Recording, label: Labels) -> set[int]:
+    """The strokes that were recorded to their end: other samples follow them."""
+    return set(np.unique(label).tolist()) - {-1, *label[-1:].tolist()}
+
+
+def _used(recording: Recording, label: Labels, used: Mask, kind: CaptureKind) -> set[int]:
+    """The strokes of which a fit uses enough; see :func:`count_used`."""
+    tick = _tick(recording)
+    needed = NEEDED_S / tick if tick > 0 else np.inf
+    found = set()
     for stroke in recording.strokes:
-        here = np.flatnonzero(label == stroke.index)
-        if stroke.kind != "excitation" and len(here) and here[-1] + 1 < len(label):
-            found.append([stroke.kind, stroke.speed])
+        own = used[label == stroke.index]
+        if kind == "cut":
+            own = own[np.argmax(own) :] if own.any() and stroke.kind != "opening" else own[:0]
+        least = needed if kind == "cut" else 1
+        if np.count_nonzero(own) >= max(least, LITTLE * len(own)):
+            found.add(stroke.index)
     return found
 
 
-def _sheets(recording: Recording, label: Labels, counted: Mask) -> list[int]:
-    """Closing strokes with samples that count, for each sheet of the recording in order."""
-    with_samples = set(np.unique(label[counted]).tolist())
+def _named(recording: Recording, chosen: set[int]) -> list[list[Any]]:
+    """Kind and speed of the strokes that are chosen."""
+    return [
+        [s.kind, s.speed] for s in recording.strokes if s.kind != "excitation" and s.index in chosen
+    ]
+
+
+def _sheets(recording: Recording, chosen: set[int]) -> list[int]:
+    """Closing strokes that are chosen, for each sheet of the recording in order."""
     closing = [s for s in recording.strokes if s.kind in ("closing", "press") and s.sheet >= 0]
     return [
-        sum(s.sheet == sheet and s.index in with_samples for s in closing)
+        sum(s.sheet == sheet and s.index in chosen for s in closing)
         for sheet in sorted({s.sheet for s in closing})
     ]
 
 
 def _excitation(recording: Recording, label: Labels) -> float:
-    time = recording.device_time_s
-    tick = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    """Seconds of the samples that are labelled as excitation."""
     wanted = [s.index for s in recording.strokes if s.kind == "excitation"]
-    return tick * float(np.isin(label, wanted).sum())
+    return _tick(recording) * float(np.isin(label, wanted).sum())
+
+
+def _tick(recording: Recording) -> float:
+    time = recording.device_time_s
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

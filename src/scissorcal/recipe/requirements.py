@@ -9,6 +9,10 @@ from scissorcal.recipe.schema import Recipe
 CaptureKind = Literal["friction", "cut"]
 GeometryKind = Literal["camera", "blade", "plate"]
 
+LITTLE = 0.5
+"""Of what is recorded: where a fit uses a smaller share of a stroke, that does not count as used;
+where it does of a speed's motion, the speed is named."""
+
 
 @dataclass(frozen=True)
 class Requirement:

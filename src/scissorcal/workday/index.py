@@ -9,7 +9,7 @@ from typing import Any
 from scissorcal.files import replacing
 from scissorcal.identity import file_digest
 
-FORMAT = "scissorcal-index/2"
+FORMAT = "scissorcal-index/3"
 
 Facts = dict[str, Any]
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import pieces_of
 from scissorcal.calibration.signals.weak_form import Windows
+from scissorcal.recipe.requirements import LITTLE
 from scissorcal.recording.recording import Recording
 
 Mask = NDArray[np.bool_]
@@ -16,8 +17,6 @@ Spans = NDArray[np.int64]
 
 GAP, EDGE, INVALID = "gap", "edge of a piece", "invalid sensor value"
 SLOW, OTHER = "rest or too slow", "no window"
-LITTLE = 0.5
-"""Speeds of which a smaller share is used are named."""
 
 
 @dataclass(frozen=True)

@@ -17,30 +17,34 @@ if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.report import Cell, FactSheet, Geometry
+    from scissorcal.report import Cell, Geometry
 
 RIG: "tuple[CaptureKind, ...]" = ("friction", "cut")
 
 
 @dataclass(frozen=True)
 class Reported:
-    """The report's two files, the fits that it shows, and every verdict in it."""
+    """The report's two files, the fits that it shows, and every verdict in it.
+
+    ``written`` is false where the files were left as they are.
+    """
 
     html: Path
     json: Path
     fits: tuple[str, ...]
     verdicts: tuple[Verdict, ...]
+    written: bool = True
 
 
 def write_workspace_report(
     engine: Engine, *, anew: bool = False, now: datetime | None = None
 ) -> Reported:
-    """Write report/report.html and report/report.json from the workspace's fits and package.
+    """Write report/report.html and report/report.json from the workspace's fits.
 
     A fit that is missing is named in the report; fits of photographs alone are enough. A report
-    that is signed and current is left as it is, unless ``anew``. Where nothing that it says has
-    changed, it keeps its time, and with it a signature. Raises MissingError where there is no fit,
-    or one is stale.
+    that is signed and current is left as it is, unless ``anew`` or its page is missing. Where
+    nothing that it says has changed, it keeps its time, and with it a signature, which the page
+    shows. Raises MissingError where there is no fit, or one is stale.
     """
     from scissorcal.report import build_report
 
@@ -50,9 +54,10 @@ def write_workspace_report(
     if not fits and not geometry.fits:
         raise MissingError("There is nothing to report yet: run 'scissorcal fit' first.")
     checks = _trust_checks(engine, fits)
-    sheets = _package_sheets(engine)
     workspace = engine.workspace
-    if anew or engine.state("report sign").state not in ("done", "failed"):
+    signed = engine.state("report sign").state in ("done", "failed")
+    written = anew or not signed or not workspace.report_html.is_file()
+    if written:
         build_report(
             engine.recipe,
             list(fits.values()),
@@ -60,7 +65,6 @@ def write_workspace_report(
             workspace.report_html.parent,
             created=now or datetime.now(UTC),
             recipe_text=read_text(workspace.recipe_path),
-            sheets=sheets,
             checks=checks,
             geometry=geometry,
             inputs_hash=engine.identity("report"),
@@ -70,9 +74,8 @@ def write_workspace_report(
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
     verdicts += [v for found in fits.values() for v in found.verdicts]
     verdicts += [v for found in checks.values() for v in found.verdicts]
-    verdicts += [v for sheet in sheets for v in sheet.verdicts]
     names = (*geometry.fits, *fits)
-    return Reported(workspace.report_html, workspace.report_json, names, tuple(verdicts))
+    return Reported(workspace.report_html, workspace.report_json, names, tuple(verdicts), written)
 
 
 def _refuse_stale(engine: Engine) -> None:
@@ -136,34 +139,3 @@ def _geometry(engine: Engine) -> "Geometry":
         sha256={kind: engine.index.digest(path) for kind, path in files.items()},  # type: ignore[misc]
         missing=missing,  # type: ignore[arg-type]
     )
-
-
-def _package_sheets(engine: Engine) -> "list[FactSheet]":
-    """What the workspace's package states, where there is one that can be opened."""
-    from scissorcal.package import REVIEW_CHECK, check_package, open_package
-    from scissorcal.report import sheet_from_mapping
-
-    if not engine.needed("package build"):
-        return []
-    path = engine.file("package build")
-    if not path.is_file():
-        return []
-    try:
-        package = open_package(path, warn=False)
-    except InputError as error:
-        return [sheet_from_mapping("Package", "package", {}, notes=[str(error)])]
-    manifest = package.manifest
-    facts = {
-        "file": engine.workspace.relative(path),
-        "content hash": manifest.content_hash,
-        "error bound": manifest.bound.model_dump(),
-        "ranges": {key: list(value) for key, value in manifest.ranges.model_dump().items()},
-    }
-    notes = []
-    if manifest.provenance.inputs_hash != engine.identity("package build"):
-        notes.append(
-            "The package was built from other fits or settings than this report shows: run "
-            "`scissorcal package build`."
-        )
-    verdicts = [verdict for verdict in check_package(package) if verdict.check != REVIEW_CHECK]
-    return [sheet_from_mapping("Package", "package", facts, verdicts=verdicts, notes=notes)]

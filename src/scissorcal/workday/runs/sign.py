@@ -25,13 +25,13 @@ def sign_report(
 ) -> "Review":
     """Write report/signature.json: who decided what on the report as it lies there.
 
-    Raises MissingError where there is no report or it is stale, InputError where the name is empty
-    or the file cannot be written.
+    The page takes the signature first: where that fails, nothing is signed. Raises MissingError
+    where there is no report or it is stale, InputError where the name is empty, the page cannot
+    take the signature, or a file cannot be written.
     """
     from pydantic import ValidationError
 
     from scissorcal.package import REVIEW_FORMAT, Review, stamp
-    from scissorcal.report import sign_page
 
     state = engine.state("report")
     if state.state == "missing":
@@ -55,8 +55,7 @@ def sign_report(
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"The {place} cannot be signed with: {first['msg']}.") from None
-    _write(engine.file("report sign"), review.model_dump_json(indent=2) + "\n")
-    sign_page(engine.workspace.report_html, review)
+    _write(engine.file("report sign"), engine.workspace.report_html, review)
     engine.refresh()
     return review
 
@@ -69,9 +68,17 @@ def standing_review(engine: Engine) -> "Review | None":
     return None if found is None else Review.model_validate(found)
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, html: Path, review: "Review") -> None:
+    """Sign the page and write the signature, or leave both as they were."""
+    from scissorcal.report import sign_page
+
+    before = html.read_bytes() if html.is_file() else None
     try:
         with replacing(path) as part:
-            part.write_text(text, encoding="utf-8")
+            part.write_text(review.model_dump_json(indent=2) + "\n", encoding="utf-8")
+            sign_page(html, review)
     except OSError as error:
+        if before is not None:
+            with replacing(html) as part:
+                part.write_bytes(before)
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
