@@ -145,7 +145,9 @@ def test_two_runs_stand_side_by_side_or_are_refused_for_what_differs(
     said = cli("report", "compare", recorded.root, recorded.report_json, "--json")
     assert said.code == 0
     panels = {panel["id"]: panel for panel in said.envelope["result"]["panels"]}
-    assert panels["cut-parameters"]["sentence"] == "No parameter has changed."
+    assert panels["cut-parameters"]["sentence"] == (
+        "No parameter has changed by more than 3 standard deviations."
+    )
     for row in panels["cut-parameters"]["rows"]:
         assert [value["number"] for value in row["values"] if value["name"] == "in sd"] == [0.0]
     twin = json.loads((tmp_path / "comparison" / "comparison.json").read_text(encoding="utf-8"))

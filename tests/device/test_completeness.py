@@ -1,12 +1,14 @@
 """Planned, recorded and used: by cell of motion, by stroke and by sheet."""
 
 import copy
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.capture import capture_cut, capture_friction, open_writer
 from scissorcal.device.completeness import completeness
 from scissorcal.device.counting import count_recorded, count_used
 from scissorcal.device.lockstep import LockstepLink
@@ -90,3 +92,135 @@ def test_an_import_has_no_cells(recording):
     assert count_recorded(foreign, RECIPE, "friction") == {}
     assert count_used(foreign, RECIPE, "friction", everything) == {}
     assert completeness([{}], RECIPE, "friction", [{}]).summary == ()
+
+
+def test_excitation_has_a_row_that_is_short_where_it_is_missing(recording, recorded):
+    everything = count_used(recording, RECIPE, "friction", np.array([[0, len(recording.samples)]]))
+    *_, row = found(recorded, everything).summary
+    assert (row.name, row.unit) == ("excitation", "s of excitation")
+    assert (row.planned, row.recorded, row.used) == (1, 1, None)
+    assert row.motion.endswith(" s used")
+    longer = changed_friction(RECIPE, excitation_s=12.0)
+    *_, row = found(recorded, everything, longer).summary
+    assert (row.planned, row.recorded) == (12, 1)
+    assert found(recorded, None, longer).missing[-1].endswith("of 12 s recorded")
+    without = changed_friction(RECIPE, excitation_s=0.0)
+    assert found(recorded, None, without).excitation is None
+
+
+@pytest.mark.parametrize(("share", "counted"), [(0.0, 0), (0.001, 0), (0.45, 0), (0.55, 1)])
+def test_a_stroke_is_used_from_half_of_its_samples(recording, share, counted):
+    label = recording.samples["stroke"]
+    (chosen, *_) = [s for s in recording.strokes if s.kind == "closing"]
+    here = np.flatnonzero(label == chosen.index)
+    spans = np.array([[here[0], here[0] + int(np.ceil(share * len(here)))]])
+    used = count_used(recording, RECIPE, "friction", spans)
+    assert used["strokes"] == [[chosen.kind, chosen.speed]] * counted
+
+
+def changed_friction(recipe: Recipe, **keys: object) -> Recipe:
+    friction = recipe.capture.friction.model_copy(update=keys)
+    capture = recipe.capture.model_copy(update={"friction": friction})
+    return recipe.model_copy(update={"capture": capture})
+
+
+def changed_cut(recipe: Recipe, **keys: object) -> Recipe:
+    cut = recipe.capture.cut.model_copy(update=keys)
+    capture = recipe.capture.model_copy(update={"cut": cut})
+    return recipe.model_copy(update={"capture": capture})
+
+
+def cut_of(folder: Path, recipe: Recipe, specimen: str, *, hand: bool = False) -> Recording:
+    link = LockstepLink(specimen, np.random.default_rng(1))
+    path = folder / "cut.mcap"
+    with open_writer(path, "cut", link, recipe, "", hand=hand) as writer:
+        capture_cut(link, recipe, writer, hand=hand)
+    return read_recording(path)
+
+
+CUT = short("paper-80gsm", sheets=2)
+
+
+@pytest.fixture(scope="module")
+def cut(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return cut_of(tmp_path_factory.mktemp("cut"), CUT, "office-paper")
+
+
+def missing(recordings: list[Recording], recipe: Recipe) -> tuple[str, ...]:
+    counts = [count_recorded(one, recipe, "cut") for one in recordings]
+    return completeness(counts, recipe, "cut").missing
+
+
+def until(recording: Recording, stroke: int) -> Recording:
+    """What was recorded until shortly after a stroke."""
+    last = int(np.flatnonzero(recording.samples["stroke"] == stroke)[-1])
+    return replace(recording, samples=recording.samples[: last + 50])
+
+
+def test_a_whole_cut_has_all_its_sheets(cut):
+    result = completeness([count_recorded(cut, CUT, "cut")], CUT, "cut")
+    assert result.missing == ()
+    assert [(s.sheet, s.planned, s.recorded) for s in result.sheets] == [(1, 2, 2), (2, 2, 2)]
+    assert {row.kind for row in result.strokes} == {"closing"}, "a fit is not of return strokes"
+
+
+def test_as_many_strokes_on_fewer_sheets_are_incomplete(cut):
+    """Two sheets of two strokes are not four of one."""
+    four = changed_cut(CUT, sheets=4, strokes_per_sheet=1)
+    assert missing([cut], four) == ("sheets 3, 4: 0 of 1 closing strokes recorded each",)
+    result = completeness([count_recorded(cut, four, "cut")], four, "cut")
+    assert [row.planned for row in result.sheets] == [1] * 4
+    rows = [row for row in result.summary if row.unit == "closing strokes"]
+    assert [row.recorded for row in rows] == [2, 2, 0, 0]
+
+
+def test_a_sheet_that_was_left_early_is_named_until_another_takes_its_place(cut):
+    last = [s.index for s in cut.strokes if s.kind == "closing"][2]
+    short_of_one = until(cut, last)
+    assert "sheet 2: 1 of 2 closing strokes recorded" in missing([short_of_one], CUT)
+    assert missing([short_of_one, cut], CUT) == ()
+    counts = [count_recorded(one, CUT, "cut") for one in (short_of_one, cut)]
+    sheets = completeness(counts, CUT, "cut").sheets
+    assert [(s.planned, s.recorded) for s in sheets] == [(2, 2), (0, 1), (2, 2), (0, 2)]
+
+
+def test_a_cut_stroke_is_used_by_what_follows_its_first_used_sample(cut):
+    label = cut.samples["stroke"]
+    closing = [s.index for s in cut.strokes if s.kind == "closing"]
+    late, brief, broken, whole = (np.flatnonzero(label == index) for index in closing)
+    spans = np.array(
+        [
+            [late[int(0.7 * len(late))], late[-1] + 1],  # free of the material until then
+            [brief[-1], brief[-1] + 1],
+            [broken[0], broken[int(0.3 * len(broken))]],
+            [whole[0], whole[-1] + 1],
+        ]
+    )
+    used = count_used(cut, CUT, "cut", spans)
+    assert used["sheets"] == [1, 1]
+    assert len(used["strokes"]) == 2
+    returns = np.flatnonzero(np.isin(label, [s.index for s in cut.strokes if s.kind == "opening"]))
+    spans = np.array([[int(returns[0]), int(returns[-1]) + 1]])
+    kinds = {kind for kind, _ in count_used(cut, CUT, "cut", spans)["strokes"]}
+    assert "opening" not in kinds
+
+
+def test_whole_presses_are_complete_although_all_are_on_one_piece(tmp_path):
+    recipe = short("press-only", sheets=2)
+    pressed = cut_of(tmp_path, recipe, "soft-pad")
+    assert missing([pressed], recipe) == ()
+    result = completeness([count_recorded(pressed, recipe, "cut")], recipe, "cut")
+    assert result.sheets == ()
+    assert {row.kind for row in result.strokes} == {"press"}
+
+
+def test_a_hand_is_held_to_sheets_alone(tmp_path):
+    byhand = cut_of(tmp_path, CUT, "office-paper", hand=True)
+    assert missing([byhand], CUT) == ()
+    three = changed_cut(CUT, sheets=3)
+    found = missing([byhand], three)
+    assert found[-1] == "sheet 3: 0 of 2 closing strokes recorded"
+    assert found[0] == "closing strokes: 4 of 6 recorded"
+    result = completeness([count_recorded(byhand, CUT, "cut")], CUT, "cut")
+    assert result.cells == ()
+    assert [(s.planned, s.recorded) for s in result.sheets] == [(2, 2), (2, 2)]

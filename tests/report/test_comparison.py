@@ -80,4 +80,6 @@ def test_a_fit_alone_has_parameters_and_no_torque_to_compare() -> None:
     alone = Side("cut.nc", document_of_fit(known_cut(Truth()), None))
     found = compared(alone, alone)
     assert "is a fit alone" in panel(found, "torque").notes[0]
-    assert panel(found, "cut-parameters").sentence == "No parameter has changed."
+    assert panel(found, "cut-parameters").sentence == (
+        "No parameter has changed by more than 3 standard deviations."
+    )

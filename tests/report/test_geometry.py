@@ -122,7 +122,7 @@ def test_verdicts_join_the_list_on_top(shown: Shown) -> None:
     rows = values_of(panel_of(shown.built.twin, "decision-trust"))
     assert {name: row["decision"]["text"] for name, row in rows.items()} == {
         "camera": "✗ do not use",
-        "blade": "? not verified",
+        "blade": "✓ checks passed",
         "plate": "! use with care",
     }
 

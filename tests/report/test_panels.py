@@ -221,8 +221,8 @@ def test_every_planned_stroke_is_counted_as_recorded_and_used() -> None:
     assert [row.marked for row in every.rows] == [True, False, False]
 
 
-def test_a_capture_that_ended_early_says_how_to_complete_it() -> None:
-    remark = "Run `scissorcal capture cut --resume`."
+def test_a_capture_that_ended_early_says_what_was_recorded() -> None:
+    remark = "1.2 s recorded"
     short = Cell("cut", "closing at 0.6 rad/s", 4, 1, 1, remark=remark)
     decision, every = data_panels([short])
     assert "1 of 4 strokes recorded" in decision.sentence

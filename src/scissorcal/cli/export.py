@@ -11,7 +11,7 @@ from scissorcal.cli.output import Answer, command
 @command
 def export(
     recording: Annotated[
-        Path, typer.Argument(dir_okay=False, help="A recording (.mcap), or fits/camera.json.")
+        Path, typer.Argument(dir_okay=False, help="A recording (.mcap), or fits/camera.nc.")
     ],
     table: Annotated[Path, typer.Argument(dir_okay=False, help="The file to write.")],
     overwrite: Annotated[

@@ -1,5 +1,6 @@
 """``scissorcal report``"""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -88,6 +89,10 @@ def compare(
     done = compare_runs(first, second, output)
     found = done.comparison
     shown = [panel for panel in found.panels if panel.id.endswith("-parameters")]
+    for panel in found.panels:
+        if panel.id == "verdicts-all":
+            changed = tuple(row for row in panel.rows if row.marked)
+            shown.append(replace(panel, rows=changed))
     text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{done.html} and {done.json} show it"
     result = {
         "first": found.first,

@@ -14,6 +14,7 @@ from scissorcal.recipe.priors import LogNormalPrior, Section
 
 _Size = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
 _SizeOrNone = Annotated[float, Field(ge=0, le=1e4, allow_inf_nan=False)]
+_ShareOrNone = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 
 
 class CameraPriors(Section):
@@ -58,7 +59,7 @@ class BladePriors(PrintPriors):
         description="shift of a border in shares of its blur, since a camera's tone curve differs "
         "from sRGB",
     )
-    grain_percent: _SizeOrNone = Field(
+    grain_percent: _ShareOrNone = Field(
         default=50.0,
         description="share of a border point's noise that its neighbours have too, by streaks of "
         "brushed metal",

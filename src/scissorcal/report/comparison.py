@@ -152,7 +152,12 @@ def compare_rows(one: Panel, other: Panel) -> Panel | None:
     marked = [row.name for row in rows if row.marked]
     rows.sort(key=lambda row: not (row.marked or every))
     if every:
-        sentence = f"Changed: {', '.join(marked)}." if marked else "No parameter has changed."
+        limit = f"more than {short(NOTABLE_SD)} standard deviations"
+        sentence = (
+            f"Changed by {limit}: {', '.join(marked)}."
+            if marked
+            else f"No parameter has changed by {limit}."
+        )
     else:
         sentence = f"{len(rows)} of {compared} values differ, {len(marked)} of them notably."
     caption = (

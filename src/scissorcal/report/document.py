@@ -140,7 +140,7 @@ def compose(
         totals,
         decision.checked_panel(list(named.values()), checks),
         decision.felt_panel(found, why, fits, recipe),
-        decision.weaknesses_panel(fits, found),
+        decision.weaknesses_panel(fits, found, verdicts, cells),
         verdict_panel(verdicts),
         every_cell,
         *scene,

@@ -128,8 +128,8 @@ def geometry_headline(kind: GeometryKind, verdicts: Sequence[Verdict]) -> Headli
         return Headline(kind, "care", f"Use the {kind} fit with care: {brief}.", brief, steps)
     passed = f"passed all {len(verdicts)} checks" if len(verdicts) > 1 else "passed its one check"
     sentence = (
-        f"The {kind} fit is not verified: it {passed}, but whether its intervals hold the truth "
-        "was not tested on these photographs."
+        f"The {kind} fit {passed}. Whether its intervals hold the truth is not among them: fits of "
+        "photographs have no trust check."
     )
     step = "Look at its pictures: is what was drawn what you see?"
     return Headline(kind, "unverified", sentence, passed, (step,))

@@ -34,6 +34,7 @@ SIGNATURE = ("<!--signature-->", "<!--/signature-->")
 DECISIONS = {
     "✓ trust": "pass",
     "? not verified": "not_evaluated",
+    "✓ checks passed": "pass",
     "! use with care": "not_evaluated",
     "✗ do not use": "fail",
 }

@@ -106,7 +106,7 @@ class Cell:
     """One planned cell of a capture, such as all closing strokes at one speed.
 
     ``planned``, ``recorded`` and ``used`` (by the fit) count ``unit``; None where that is not
-    known. ``remark`` says what is missing and which command completes it.
+    known. ``remark`` adds to that, such as the seconds of motion that were recorded and used.
     """
 
     capture: str

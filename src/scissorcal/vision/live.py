@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.files import replacing
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
 from scissorcal.vision.targets.detect import Detection, find_any_board
@@ -140,5 +141,6 @@ def _moved(one: Detection | None, other: Detection | None) -> float:
 def _stored(frame: Any, path: Path) -> Path:
     import cv2
 
-    path.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
+    with replacing(path) as part:
+        part.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
     return path

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError, file_error
+from scissorcal.files import replacing
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -130,7 +131,8 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     parse_recipe(text, str(source))
     try:
         workspace.root.mkdir(parents=True, exist_ok=True)
-        workspace.recipe_path.write_text(text, encoding="utf-8")
+        with replacing(workspace.recipe_path) as part:
+            part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise file_error(error, workspace.root) or error from None
     return workspace

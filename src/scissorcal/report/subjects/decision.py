@@ -19,11 +19,16 @@ from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
 from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
 from scissorcal.report.subjects.torque import held_out_summary
 from scissorcal.report.subjects.trust import coverage_found
+from scissorcal.verdicts import Verdict, failed
 
 PART = "decision"
 SIMULATOR = 0x8000
 """The capability of a device that is a simulator, as in docs/protocol.md."""
 MOST_CELLS = 3
+NO_WEAKNESS = (
+    "No check failed, no recorded stroke, range or photograph is known to be unused, and the data "
+    "are of no kind that is known to give poor intervals."
+)
 
 Origin = Literal["simulated", "real", "mixed", "unknown"]
 TITLES: dict[Origin, str] = {
@@ -38,28 +43,39 @@ OUTCOMES: dict[Stance, str] = {
     "care": "Use with care",
     "reject": "Do not use",
 }
+PHOTOGRAPHS_PASSED = "✓ checks passed"
+"""Of a fit of photographs, for which there is no trust check that could be missing."""
 
 
 def origin_of(recordings: Sequence[RecordingSummary]) -> Origin:
     """Whether recordings come from a simulator, as their devices state it."""
-    stated = [one.device.get("capabilities") for one in recordings if one.device]
-    flags = {bool(value & SIMULATOR) for value in stated if isinstance(value, int)}
+    flags = {_simulated(one) for one in recordings} - {None}
     if len(flags) != 1:
         return "mixed" if flags else "unknown"
     return "simulated" if flags.pop() else "real"
 
 
 def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Panel:
-    """Simulated or real."""
+    """Simulated or real, as far as it is stated."""
     said = {
-        "simulated": "All recordings come from a virtual rig: no value here is of a real specimen.",
+        "simulated": "All recordings that state their device come from a virtual rig: no value of "
+        "theirs is of a real specimen.",
         "real": "All recordings that state their device come from a real rig.",
         "mixed": "Some recordings come from a virtual rig and some from a real one.",
         "unknown": "No recording states the device that it comes from.",
     }[origin]
+    silent = sum(_simulated(one) is None for one in recordings)
+    if silent and origin != "unknown":
+        said += f" {silent} of {len(recordings)} recordings do not state it."
     names = sorted({str(r.device["serial"]) for r in recordings if r.device.get("serial")})
     device = f" Device: {', '.join(names)}." if names else ""
     return Panel(f"{PART}-origin", PART, TITLES[origin], said + device)
+
+
+def _simulated(recording: RecordingSummary) -> bool | None:
+    """Whether the device states that it is a simulator; None where it states neither."""
+    stated = recording.device.get("capabilities") if recording.device else None
+    return bool(stated & SIMULATOR) if isinstance(stated, int) else None
 
 
 def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
@@ -67,7 +83,7 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
     rows = tuple(
         Row(
             one.fit,
-            (words("decision", SAID[one.stance]), words("why", one.brief)),
+            (words("decision", _decision(one, rig)), words("why", one.brief)),
             link=one.fit,
             marked=one.stance in {"reject", "care"},
         )
@@ -77,14 +93,21 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
     own = [one for one in headlines if one.stance == overall]
     first = next((one for one in own if one.fit in rig), own[0] if own else None)
     sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
-    return Panel(f"{PART}-trust", PART, OUTCOMES[overall], sentence, rows)
+    title = "Checks passed" if first and _photographs_passed(first, rig) else OUTCOMES[overall]
+    return Panel(f"{PART}-trust", PART, title, sentence, rows)
+
+
+def _decision(one: Headline, rig: Sequence[str]) -> str:
+    return PHOTOGRAPHS_PASSED if _photographs_passed(one, rig) else SAID[one.stance]
+
+
+def _photographs_passed(one: Headline, rig: Sequence[str]) -> bool:
+    return one.fit not in rig and one.stance == "unverified"
 
 
 def overall_stance(headlines: Sequence[Headline], rig: Sequence[str]) -> Stance:
     """The worst stance; photographs that passed their checks do not lower that of the rig."""
-    counted = [
-        h.stance for h in headlines if not (rig and h.fit not in rig and h.stance == "unverified")
-    ]
+    counted = [h.stance for h in headlines if not (rig and _photographs_passed(h, rig))]
     return min(counted or ["unverified"], key=STANCES.index)
 
 
@@ -94,7 +117,8 @@ def cells_of(
     """What was counted by cells of motion, where it was; else strokes; and photographs by fit.
 
     Of strokes, planned are those that a recording lists, recorded those with samples (where these
-    are at hand), used those with samples in the fit's series.
+    are at hand), used those of which the fit's series has any sample: the share is not known here.
+    Return strokes of a cut are not counted: a cut is fitted to closing strokes and what unloads.
     """
     cells = list(evidence.completeness)
     counted = {cell.capture for cell in cells}
@@ -119,8 +143,8 @@ def cells_of(
         for name, numbers in planned.items():
             kept = sum(n in used for n in numbers)
             returns = name.startswith(kind_word("opening", fit.position_unit))
-            if fit.what == "cut" and kept == 0 and returns:
-                continue  # return strokes: a cut is fitted to closing strokes alone
+            if fit.what == "cut" and returns:
+                continue
             there = sum(n in recorded for n in numbers) if known else None
             cells.append(Cell(fit.what, name, len(numbers), there, kept))
     return (*cells, *_photographs(evidence.geometry))
@@ -148,9 +172,7 @@ def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
         ("Incomplete", [cell for cell in cells if cell.incomplete]),
         ("Not used", [cell for cell in cells if cell.unused]),
     ):
-        named = "; ".join(f"{c.capture}, {c.name}: {_lack(head, c)}" for c in odd[:MOST_CELLS])
-        more = f"; {len(odd) - MOST_CELLS} more" if len(odd) > MOST_CELLS else ""
-        said += [f"{head}: {named}{more}."] if odd else []
+        said += [f"{head}: {_named(head, odd)}."] if odd else []
     sentence = " ".join(said) or "All that was planned is recorded and used."
     if not cells:
         sentence = "Nothing is known of the data."
@@ -173,6 +195,11 @@ def _counts(cells: Sequence[Cell]) -> tuple[Value, ...]:
         known = [getattr(cell, name) for cell in cells]
         values.append(words(name, "–") if None in known or not known else count(name, sum(known)))
     return tuple(values)
+
+
+def _named(head: str, odd: Sequence[Cell]) -> str:
+    named = "; ".join(f"{c.capture}, {c.name}: {_lack(head, c)}" for c in odd[:MOST_CELLS])
+    return f"{named}; {len(odd) - MOST_CELLS} more" if len(odd) > MOST_CELLS else named
 
 
 def _lack(head: str, cell: Cell) -> str:
@@ -235,9 +262,21 @@ def felt_panel(
     return Panel(f"{PART}-felt", PART, "Felt error", sentence, tuple(rows))
 
 
-def weaknesses_panel(fits: Sequence[FitResult], found: SceneTorque | None) -> Panel:
-    """What is known to be poor in these fits."""
-    notes = [
+def weaknesses_panel(
+    fits: Sequence[FitResult],
+    found: SceneTorque | None,
+    verdicts: Sequence[Verdict] = (),
+    cells: Sequence[Cell] = (),
+) -> Panel:
+    """What is known to be poor: failed checks, unused data, and kinds of data with poor intervals.
+
+    The last are those of the table in docs/uncertainty.md.
+    """
+    wrong = [f"{verdict.scope} {verdict.check}" for verdict in failed(tuple(verdicts))]
+    unused = [cell for cell in cells if cell.unused]
+    notes = [f"Failed checks: {', '.join(wrong)}."] if wrong else []
+    notes += [f"Not used: {_named('Not used', unused)}."] if unused else []
+    notes += [
         f"{fit.what}, {', '.join(caveat.parameters)}: {caveat.sentence}"
         for fit in fits
         for caveat in caveats_of(fit)
@@ -247,6 +286,6 @@ def weaknesses_panel(fits: Sequence[FitResult], found: SceneTorque | None) -> Pa
             f"Not measured, and not in the band: {name}, up to {percent(share)} of the mean torque."
             for name, share in found.not_in_band
         ]
-    sentence = "" if notes else "No known weakness applies to these fits."
+    sentence = "" if notes else NO_WEAKNESS
     title = "Known weaknesses of this fit"
     return Panel(f"{PART}-weaknesses", PART, title, sentence, notes=tuple(notes))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
+from scissorcal.files import replacing
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import load_result
@@ -178,7 +179,7 @@ def _write_table(found: "Prediction", path: Path, position: str, effort: str) ->
     head += [f"{name}_{unit}" for name in ("measured", "predicted", "low", "high")]
     arrays = (found.time_s, found.opening, found.rate, found.moving.astype(int))
     numbers = (*arrays, found.measured, found.predicted, found.low, found.high)
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(head)
         for row in zip(*(array.tolist() for array in numbers), strict=True):
@@ -203,4 +204,6 @@ def _write_plot(found: "Prediction", band: "Band", path: Path, unit: str) -> Non
     axes.set_xlabel("time / s")
     axes.set_ylabel(f"effort / ({unit})")
     axes.legend(loc="upper right", ncols=3, fontsize="small")
-    figure.savefig(path, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
+    kind = path.suffix.lower()[1:]
+    with replacing(path) as part:
+        figure.savefig(part, format=kind, metadata={"Date": None} if kind == "svg" else None)
