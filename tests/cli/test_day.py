@@ -65,9 +65,8 @@ def test_the_day_from_captures_to_package(
     reported = cli("report", "--json")
     assert reported.code == 0
     assert len(reported.envelope["result"]["fits"]) == 2
-    assert {"fit.friction", "fit.cut", "package"} <= {
-        verdict["scope"] for verdict in reported.envelope["verdicts"]
-    }
+    scopes = {verdict["scope"] for verdict in reported.envelope["verdicts"]}
+    assert scopes == {"fit.friction", "fit.cut"}, "the report shows no package"
 
     plan = cli("plan", "--json").envelope["result"]
     needed = [s for s in plan["steps"] if not s["optional"]]
@@ -100,6 +99,11 @@ def test_a_signature_travels_with_the_package_and_is_void_once_the_report_change
     assert cli("plan", "--json").envelope["result"]["next_command"] == "scissorcal verify"
     assert "left as they are" in cli("report").out
     assert hashlib.sha256(recorded.report_json.read_bytes()).hexdigest() == digest
+    assert cli("report", "--anew", "--json").envelope["result"]["signed"] == signed
+    assert hashlib.sha256(recorded.report_json.read_bytes()).hexdigest() == digest
+    again = cli("report", "sign", "--name", "A. Reviewer", "--decision", "accept").out
+    assert again.endswith("next: scissorcal package build\n")
+    assert again.count("next:") == 1
 
     whole = recorded.report_json.read_text(encoding="utf-8")
     recorded.report_json.write_text(whole.replace("accepted", "x") + " ", encoding="utf-8")
@@ -144,6 +148,8 @@ def test_two_runs_stand_side_by_side_or_are_refused_for_what_differs(
     monkeypatch.chdir(tmp_path)
     said = cli("report", "compare", recorded.root, recorded.report_json, "--json")
     assert said.code == 0
+    told = cli("report", "compare", recorded.root, recorded.report_json).out
+    assert "Verdicts: 0 of " in told
     panels = {panel["id"]: panel for panel in said.envelope["result"]["panels"]}
     assert panels["cut-parameters"]["sentence"] == (
         "No parameter has changed by more than 3 standard deviations."

@@ -8,13 +8,20 @@ import pytest
 from scissorcal.calibration.result import FitResult
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
-from scissorcal.report.headline import Headline, write_headline
+from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Cell, Evidence
 from scissorcal.report.panel import Panel, Row, Value, columns
 from scissorcal.report.reduce import block_means
 from scissorcal.report.strokes import strokes_of
 from scissorcal.report.subjects.closing import left_out_panel, trace
-from scissorcal.report.subjects.decision import cells_of, data_panels, origin_of
+from scissorcal.report.subjects.decision import (
+    cells_of,
+    data_panels,
+    origin_of,
+    origin_panel,
+    trust_panel,
+    weaknesses_panel,
+)
 from scissorcal.report.subjects.torque import group_strokes, torque_panel
 from scissorcal.report.text import panel_text
 from scissorcal.verdicts import Verdict
@@ -242,6 +249,52 @@ def test_what_was_counted_by_cell_takes_the_place_of_strokes() -> None:
     assert [row.name for row in decision.rows] == ["cut strokes", "cut ranges of opening"]
     assert "cut, closing at 0.6 rad/s: 3 of 8 ranges of opening used" in decision.sentence
     assert [row.marked for row in every.rows] == [False, True]
+
+
+def test_missing_excitation_makes_the_data_incomplete() -> None:
+    row = Cell("friction", "excitation", 12, 3, None, "s of excitation", "3.4 s recorded")
+    decision, every = data_panels([row])
+    assert decision.sentence == (
+        "Incomplete: friction, excitation: 3 of 12 s of excitation recorded."
+    )
+    assert every.rows[0].marked
+
+
+def test_failed_checks_and_unused_data_are_weaknesses() -> None:
+    wrong = Verdict("fit.friction", "whiteness", "fail", 1.0, 0.5, "Made to fail.")
+    slow = Cell("friction", "closing at 0.05 rad/s", 2, 2, 0)
+    panel = weaknesses_panel([], None, [wrong], [slow])
+    assert panel.sentence == ""
+    assert panel.notes == (
+        "Failed checks: fit.friction whiteness.",
+        "Not used: friction, closing at 0.05 rad/s: 0 of 2 strokes used.",
+    )
+    good = weaknesses_panel([], None, [replace(wrong, status="pass")], [replace(slow, used=2)])
+    assert good.notes == ()
+    assert good.sentence.startswith("No check failed, ")
+
+
+def test_what_no_device_states_is_not_called_simulated() -> None:
+    summary = cut_recording()
+    simulated = replace(summary, device={"capabilities": 0x8003})
+    every = origin_panel("simulated", [simulated]).sentence
+    assert every.startswith("All recordings that state their device come from a virtual rig")
+    assert "do not state it" not in every
+    some = origin_panel("simulated", [simulated, summary]).sentence
+    assert "1 of 2 recordings do not state it." in some
+
+
+def test_photographs_that_passed_claim_no_trust_check() -> None:
+    passed = Verdict("fit.blade", "halves", "pass", 0.4, 0.01, "They agree.")
+    headline = geometry_headline("blade", [passed])
+    assert "verified" not in headline.sentence
+    assert "no trust check" in headline.sentence
+    alone = trust_panel([headline], [])
+    assert alone.title == "Checks passed"
+    assert alone.rows[0].values[0].text == "✓ checks passed"
+    both = trust_panel([headline, headline_of(good(friction_fit()))], ["friction"])
+    assert both.title == "Not verified"
+    assert [row.values[0].text for row in both.rows] == ["✓ checks passed", "? not verified"]
 
 
 def test_a_simulator_is_named_by_what_its_device_states() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.store import load, save
-from scissorcal.errors import MissingError
+from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
 from scissorcal.workday.plan import make_plan
@@ -59,6 +59,45 @@ def test_photographs_alone_can_be_reported_and_signed(workspace: Workspace) -> N
     review = sign_report(engine, "A. Lovelace", "accept")
     hashes = {what: engine.facts(f"fit {what}")["inputs"] for what in written.fits}
     assert review.fit_hashes == hashes
+    assert standing_review(engine) == review
+
+
+def test_a_page_that_cannot_take_the_signature_leaves_the_report_unsigned(
+    workspace: Workspace,
+) -> None:
+    engine = Engine.of(workspace)
+    write_workspace_report(engine)
+    workspace.report_html.write_text("no page", encoding="utf-8")
+    with pytest.raises(InputError, match="cannot take the signature"):
+        sign_report(engine, "A. Lovelace", "accept")
+    assert not workspace.signature_path.exists()
+    assert Engine.of(workspace).state("report sign").state == "missing"
+
+
+def test_a_signature_that_cannot_be_written_leaves_the_page_unsigned(workspace: Workspace) -> None:
+    engine = Engine.of(workspace)
+    write_workspace_report(engine)
+    page = workspace.report_html.read_bytes()
+    workspace.signature_path.mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        sign_report(engine, "A. Lovelace", "accept")
+    assert workspace.report_html.read_bytes() == page
+    assert list(workspace.report_html.parent.glob("*.part")) == []
+
+
+def test_a_missing_page_of_a_signed_report_is_written_again_with_its_signature(
+    workspace: Workspace,
+) -> None:
+    engine = Engine.of(workspace)
+    write_workspace_report(engine)
+    review = sign_report(engine, "A. Lovelace", "accept")
+    page, twin = workspace.report_html.read_bytes(), workspace.report_json.read_bytes()
+    assert not write_workspace_report(engine).written
+    workspace.report_html.unlink()
+    engine = Engine.of(workspace)
+    assert write_workspace_report(engine).written
+    assert workspace.report_html.read_bytes() == page
+    assert workspace.report_json.read_bytes() == twin
     assert standing_review(engine) == review
 
 
