@@ -14,8 +14,8 @@ from scissorcal.cli.fit_law import text
 from scissorcal.inference import Posterior, SearchStatus, infer
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
-from scissorcal.workday.engine import StepState
 from scissorcal.workday.runs.fit import FitOutcome
+from scissorcal.workday.states import StepState
 from tests.calibration.test_comparison import line
 from tests.calibration.truth import Truth, friction_recording, make_recording, sweep
 

@@ -56,10 +56,17 @@ def test_a_fit_without_its_trust_check_is_unverified() -> None:
 
 def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
     fit = good(friction_fit())
-    checked = (Verdict("verify.friction", "halves", "pass", 0.4, 0.0025, "They agree."),)
-    headline = write_headline(replace(fit, verdicts=fit.verdicts[:-1]), checked)
+    halves = Verdict("verify.friction", "halves", "pass", 0.4, 0.0025, "They agree.")
+    ranks = Verdict("verify.friction", "calibration", "pass", 0.4, 0.005, "Ranks are uniform.")
+    fit = replace(fit, verdicts=fit.verdicts[:-1])
+    alone = write_headline(fit, (halves,))
+    assert (alone.stance, alone.brief) == (
+        "unverified",
+        "passed all 4 checks; coverage not counted",
+    )
+    headline = write_headline(fit, (ranks, halves))
     assert headline.stance == "trust"
-    assert "passed all 4 checks" in headline.sentence
+    assert "passed all 5 checks" in headline.sentence
     assert "% (median; worst" in headline.sentence
     assert headline.next_steps == ("Read on, and sign with `scissorcal report sign`.",)
 

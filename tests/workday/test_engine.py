@@ -5,18 +5,20 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from scissorcal.calibration import store
 from scissorcal.calibration.store import load_fit, save
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.device.capture import capture_friction, open_writer
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recording import read_recording, write_recording
-from scissorcal.verdicts import Verdict
-from scissorcal.workday.engine import WAITING, Engine
+from scissorcal.verdicts import Status, Verdict
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
 from scissorcal.workday.index import FileIndex
 from scissorcal.workday.plan import make_plan
@@ -24,6 +26,7 @@ from scissorcal.workday.recordings import exclude_recording, include_recording, 
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.report import write_workspace_report
+from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_cut, record_friction
@@ -196,6 +199,98 @@ def test_a_fit_that_ran_out_of_time_is_incomplete(copied: Workspace) -> None:
     found = Engine.of(copied).state("fit friction")
     assert found.state == "incomplete"
     assert found.command == "scissorcal fit friction --max-minutes 60"
+
+
+def test_a_stopped_fit_of_other_data_is_stale(copied: Workspace) -> None:
+    path = copied.fit_path("friction")
+    fit = load_fit(path)
+    save(replace(fit, inputs_hash=f"unfinished:{fit.inputs_hash}"), path)
+    record_friction(copied, seed=9)
+    assert state(copied, "fit friction") == "stale"
+    assert state(copied, "fit cut") == "stale"
+
+
+def check_of(workspace: Workspace, what: Literal["friction", "cut"], status: Status) -> None:
+    """Keep a trust check of the fit as it is now, with coverage counted."""
+    engine = Engine.of(workspace)
+    fit = load_fit(engine.file(f"fit {what}"))
+    verdict = Verdict(f"verify.{what}", "calibration", status, 0.4, 0.5, "Ranks as they are.")
+    check = VerifyResult(
+        format="scissorcal-verify/1",
+        what=what,
+        fit_hash=fit.inputs_hash,
+        rung=fit.rung,
+        effort=fit.effort,
+        seed=0,
+        calibration=None,
+        halves=None,
+        sensitivity=None,
+        not_done=(),
+        false_alarm=0.01,
+        verdicts=(verdict,),
+        fit_content=engine.identity(f"verify {what}"),
+    )
+    save(check, engine.file(f"verify {what}"))
+
+
+def test_a_trust_check_that_fails_later_reaches_the_cut_and_the_package(copied: Workspace) -> None:
+    build_workspace_package(Engine.of(copied))
+    assert state(copied, "package build") == "done"
+    check_of(copied, "friction", "fail")
+    assert state(copied, "fit friction") == "failed"
+    cut = Engine.of(copied).state("fit cut")
+    assert (cut.state, cut.failed) == ("failed", ("fit friction failed",))
+    assert state(copied, "package build") == "stale"
+    with pytest.raises(VerdictError, match="--allow-failed"):
+        build_workspace_package(Engine.of(copied))
+    built = build_workspace_package(Engine.of(copied), allow_failed=True)
+    assert any("verify.friction, calibration" in why for why in built.manifest.failed_checks)
+    assert any("failed 1 check" in warning for warning in built.warnings)
+    assert state(copied, "package build") == "failed"
+
+
+def test_a_check_with_coverage_verifies(copied: Workspace) -> None:
+    check_of(copied, "friction", "pass")
+    assert state(copied, "fit friction") == "done"
+    check_of(copied, "friction", "not_evaluated")
+    assert state(copied, "fit friction") == "unverified"
+
+
+def test_a_report_without_its_page_is_missing(copied: Workspace) -> None:
+    write_workspace_report(Engine.of(copied))
+    assert state(copied, "report") == "done"
+    copied.report_html.unlink()
+    assert state(copied, "report") == "missing"
+
+
+def test_a_recording_copied_under_another_name_counts_once(copied: Workspace) -> None:
+    (path,) = copied.recordings("friction")
+    before = Engine.of(copied).state("capture friction").content
+    shutil.copy(path, path.with_name("friction-20990101T000000Z.mcap"))
+    found = Engine.of(copied).state("capture friction")
+    assert found.content == before
+    assert any(f"it has the same content as {path.name}" in note for note in found.notes)
+
+
+def test_only_recordings_of_friction_and_cuts_are_excluded(copied: Workspace) -> None:
+    stray = copied.captures_dir / "render-20990101T000000Z.mcap"
+    stray.write_bytes(b"")
+    with pytest.raises(MissingError, match="no recording of friction or a cut called render"):
+        exclude_recording(copied, stray.name, "not a capture")
+
+
+def test_a_capture_that_the_rig_cannot_follow_is_not_done(
+    captured: Workspace, tmp_path: Path
+) -> None:
+    shutil.copytree(captured.root, tmp_path / "beyond")
+    workspace = Workspace(tmp_path / "beyond")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    beyond = text.replace("opening_deg = [12.0, 50.0]", "opening_deg = [100.0, 120.0]")
+    workspace.recipe_path.write_text(beyond, encoding="utf-8")
+    found = Engine.of(workspace).state("capture friction")
+    assert found.state in ("incomplete", "stale")
+    if found.state == "incomplete":
+        assert "a plan that this rig can follow" in found.found
 
 
 @pytest.fixture(scope="module")

@@ -81,7 +81,7 @@ def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
 
     Any failed verdict rejects. Missing verdicts, checks that were not evaluated, draft effort, or
     a parameter that repeats its prior ask for care. Without a trust check a fit that passed its
-    own checks is not verified.
+    own checks is not verified, nor with one that counted no coverage.
     """
     verdicts = (*fit.verdicts, *checked)
     failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
@@ -96,13 +96,13 @@ def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
         sentence = f"Use the {fit.what} fit with care: {brief}.{error}"
         return Headline(fit.what, "care", sentence, brief, steps)
     passed = f"passed all {len(verdicts)} checks" if len(verdicts) > 1 else "passed its one check"
-    if not checked:
+    if not any(v.check == "calibration" and v.status != "not_evaluated" for v in checked):
         sentence = (
             f"The {fit.what} fit is not verified: it {passed}, but whether its intervals hold the "
             f"truth was not tested.{error}"
         )
         step = f"Run `scissorcal verify {fit.what}`, then `scissorcal report`."
-        brief = f"{passed}; trust check not done"
+        brief = f"{passed}; {'coverage not counted' if checked else 'trust check not done'}"
         return Headline(fit.what, "unverified", sentence, brief, (step,))
     sentence = f"The {fit.what} fit can be trusted: it {passed}.{error}"
     step = "Read on, and sign with `scissorcal report sign`."

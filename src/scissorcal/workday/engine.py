@@ -9,13 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.facts import UNFINISHED, photographs, rendering
+from scissorcal.workday.facts import UNFINISHED, photographs, refuse_changed, rendering
 from scissorcal.workday.index import FileIndex
 from scissorcal.workday.recordings import (
     RecordingRow,
@@ -26,43 +26,12 @@ from scissorcal.workday.recordings import (
     refuse_mixed_joints,
 )
 from scissorcal.workday.remedies import remedy
+from scissorcal.workday.states import CHANGED, WAITING, State, StepState
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.device.completeness import Completeness
-
-State = Literal["missing", "incomplete", "stale", "failed", "unverified", "done", "excluded"]
-"""What a step may be in, in the order in which it is decided.
-
-missing: there is no result. stale: it was made from other inputs than there are now, or an input is
-missing or stale. incomplete: a capture lacks what the recipe plans, or a fit ran out of time.
-failed: a check of it failed, it cannot be read, or a person rejected it. unverified: no trust check
-of this very fit is there. done: none of these. excluded: the scene does not need it.
-"""
-
-WAITING: frozenset[State] = frozenset({"missing", "stale"})
-"""States of an input in which what builds on it is stale."""
-
-
-@dataclass(frozen=True)
-class StepState:
-    """One step as it stands: its state, what was found, and the command that comes next for it.
-
-    ``why`` says what the scene needs it for. ``command`` is empty where nothing is to be done.
-    ``content`` is the digest of its result, empty where there is none.
-    """
-
-    name: str
-    state: State
-    found: str
-    why: str = ""
-    command: str = ""
-    files: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    content: str = ""
-    failed: tuple[str, ...] = ()
-    optional: bool = False
 
 
 @dataclass
@@ -126,15 +95,16 @@ class Engine:
             return self.index.digest(self.file(step.inputs[0]))
         if step.kind == "sign":
             return self.index.digest(self.file("report"))
-        return digest(
-            {
-                "step": name,
-                "version": step.version,
-                "settings": step.settings(self.recipe),
-                "effort": effort if step.by_effort else "",
-                "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
-            }
-        )
+        made_from = {
+            "step": name,
+            "version": step.version,
+            "settings": step.settings(self.recipe),
+            "effort": effort if step.by_effort else "",
+            "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
+        }
+        if step.kind == "package":  # it says which checks its fits failed
+            made_from["failed"] = {item: self.state(item).failed for item in step.inputs}
+        return digest(made_from)
 
     def review(self) -> dict[str, Any] | None:
         """The signature that stands under the report, as stored; None where there is none."""
@@ -225,11 +195,14 @@ class Engine:
         return self._completeness(kind, self.file(fit) if there else None)
 
     def _completeness(self, kind: CaptureKind, fit: Path | None) -> "Completeness":
-        from scissorcal.device.completeness import completeness
+        from scissorcal.device.completeness import Completeness, completeness
 
         used = None
         rows = [row for row in self.recordings(kind) if row.use == "used"]
         counts = [counts_of(row, self.recipe, kind, self.index) for row in rows]
+        unplanned = next((str(count["unplanned"]) for count in counts if "unplanned" in count), "")
+        if unplanned:
+            return Completeness(missing=(f"a plan that this rig can follow: {unplanned}",))
         if fit is not None:
             used = [
                 counts_used(row, self.recipe, kind, fit, self.index) if count else {}
@@ -241,7 +214,9 @@ class Engine:
         name = self.workspace.relative(row.path)
         if row.use == "unreadable":
             return f"{row.why} {exclude_hint(row.path)}"
-        reason = {"excluded": "excluded", "other recipe": "recorded otherwise"}[row.use]
+        reason = {"excluded": "excluded", "other recipe": "recorded otherwise"}.get(
+            row.use, row.use
+        )
         return f"{name} is not used ({reason}): {row.why}."
 
     def _notes_of(self, used: Sequence[RecordingRow]) -> tuple[str, ...]:
@@ -260,6 +235,8 @@ class Engine:
         paths = self._photographs(step)
         try:
             read = [self.index.facts(path, "photographs", photographs) for path in paths]
+            for path, facts in zip(paths, read, strict=True):
+                refuse_changed(path.parent, facts["sha256"], self.index.digest)
         except InputError as error:
             return StepState(step.name, "failed", str(error), why, step.command)
         first = [path for path in paths if path.parent.name.startswith(f"{step.photographs[0]}-")]
@@ -310,6 +287,8 @@ class Engine:
 
         if not path.is_file():
             return found_as("missing", "not there yet")
+        if step.kind == "report" and not self.workspace.report_html.is_file():
+            return found_as("missing", "its page is not there")
         content = self.index.digest(path)
         try:
             facts = self.facts(step.name)
@@ -323,16 +302,23 @@ class Engine:
         kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
+        if behind:
+            return found_as("stale", behind, **kept)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
             return found_as("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
-        if behind:
-            return found_as("stale", behind, **kept)
         notes = self._little_used(step)
         if failed:
             command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
             return found_as("failed", found, command, notes=notes, **kept)
+        if facts.get("lacks"):
+            return found_as("incomplete", f"{facts['label']}; {facts['lacks']}", **kept)
+        below = self._failed_below(step)
+        if below:
+            found = f"{facts['label']}; {below.name} failed: {', '.join(below.failed)}"
+            kept["failed"] = (f"{below.name} failed",)
+            return found_as("failed", found, below.command, notes=notes, **kept)
         check = self.state(step.verified_by) if step.verified_by else None
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
@@ -341,6 +327,13 @@ class Engine:
         if check and check.state != "done":
             return found_as("unverified", facts["label"], check.command, notes=notes, **kept)
         return found_as("done", facts["label"], "", notes=notes, **kept)
+
+    def _failed_below(self, step: Step) -> StepState | None:
+        """A fit that this fit builds on and that failed, if only by its trust check."""
+        if step.kind != "fit":
+            return None
+        fits = (self.state(_plain(item)) for item in step.inputs if self._counts(step, item))
+        return next((state for state in fits if state.state == "failed" and state.failed), None)
 
     def _little_used(self, step: Step) -> tuple[str, ...]:
         """Which planned motion a fit hardly uses, as sentences."""
@@ -357,8 +350,9 @@ class Engine:
             if state.state in WAITING and self._counts(step, item):
                 return f"{item} is {state.state}"
         efforts = EFFORTS if step.by_effort else ("",)
-        if facts["inputs"] not in {self.identity(step.name, effort) for effort in efforts}:
-            return _CHANGED.get(step.kind, "its inputs or settings changed since")
+        inputs = str(facts["inputs"]).removeprefix(UNFINISHED)
+        if inputs not in {self.identity(step.name, effort) for effort in efforts}:
+            return CHANGED.get(step.kind, "its inputs or settings changed since")
         if step.kind == "package" and facts["review"] != self.review():
             return "it carries another review than there is now"
         return ""
@@ -382,14 +376,6 @@ class Engine:
         if facts["package"] != package:
             return found_as("stale", "of another package")
         return found_as("done", _count(len(recordings), "recording"), "")
-
-
-_CHANGED = {
-    "verify": "of an earlier fit",
-    "sign": "the report changed since it was signed",
-    "report": "it shows other fits, trust checks or settings than there are now",
-    "package": "built from other fits or settings than there are now",
-}
 
 
 def _captured(step: Step) -> CaptureKind:

@@ -6,6 +6,7 @@ One function a kind of file; each gives plain values, which the index keeps. Eve
 """
 
 import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,10 @@ def fit(path: Path) -> Facts:
 
 
 def trust_check(path: Path) -> Facts:
-    """Facts of a trust check; its inputs are the fit that it checked."""
+    """Facts of a trust check; its inputs are the fit that it checked.
+
+    ``lacks`` says what it must have for the fit to count as verified.
+    """
     from scissorcal.calibration.store import load
     from scissorcal.calibration.verify.result import VerifyResult
 
@@ -43,7 +47,13 @@ def trust_check(path: Path) -> Facts:
     done = {"ranks": check.calibration, "halves": check.halves, "prior": check.sensitivity}
     label = ", ".join(name for name, part in done.items() if part is not None)
     failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
-    return {"inputs": check.fit_content, "label": label or "nothing checked", "failed": failed}
+    lacks = "" if check.counted_coverage else "coverage was not counted"
+    return {
+        "inputs": check.fit_content,
+        "label": label or "nothing checked",
+        "failed": failed,
+        "lacks": lacks,
+    }
 
 
 def report(path: Path) -> Facts:
@@ -53,8 +63,6 @@ def report(path: Path) -> Facts:
         inputs = str(twin["inputs_hash"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} cannot be read ({error}): run 'scissorcal report'.") from None
-    if not path.with_suffix(".html").is_file():
-        raise InputError(f"{path.with_suffix('.html')} is gone: run 'scissorcal report'.")
     return {"inputs": inputs, "label": "shows the current fits", "failed": []}
 
 
@@ -102,14 +110,27 @@ def rendering(path: Path) -> Facts:
     return {"package": ""}
 
 
+def refuse_changed(folder: Path, sha256: Mapping[str, str], digest: Callable[[Path], str]) -> None:
+    """Raise InputError where a photograph is gone, or no longer what was captured."""
+    for name, expected in sha256.items():
+        path = folder / name
+        there = path.is_file()
+        if not there or digest(path) != expected:
+            what = "was changed since it was captured" if there else "is gone"
+            raise InputError(
+                f"{folder.name}/{name} {what}: put it back as it was, or remove {folder.name} and "
+                "capture its photographs again."
+            )
+
+
 def photographs(path: Path) -> Facts:
     """Facts of a folder of photographs by its index file."""
     try:
         index = json.loads(path.read_text(encoding="utf-8"))
-        count = len(index["photographs"])
+        sha256 = {str(one["file"]): str(one["sha256"]) for one in index["photographs"]}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"{path} cannot be read ({error}): remove {path.parent.name} and capture its "
             "photographs again."
         ) from None
-    return {"content": file_digest(path), "photographs": count}
+    return {"content": file_digest(path), "photographs": len(sha256), "sha256": sha256}

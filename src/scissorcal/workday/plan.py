@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from scissorcal.recipe.requirements import Requirement, requirements
-from scissorcal.workday.engine import Engine, StepState
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.states import StepState
 from scissorcal.workday.workspace import Workspace
 
 

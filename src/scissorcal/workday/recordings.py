@@ -19,7 +19,7 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.recording import Recording
 
-Use = Literal["used", "excluded", "other recipe", "unreadable"]
+Use = Literal["used", "excluded", "other recipe", "repeated", "unreadable"]
 
 
 @dataclass(frozen=True)
@@ -46,24 +46,44 @@ def list_recordings(
     """List the recordings of one kind, oldest first, with the use that fits make of them.
 
     A recording is not used where a person excluded it, where it cannot be read, or where the
-    recipe at its capture names another rig, material or scene (`capture_facts`). An import carries
-    no recipe and is always used.
+    recipe at its capture names another rig, material or scene (`capture_facts`), and where one
+    before it has the same content. An import carries no recipe and counts as of this one.
     """
     excluded = exclusions(workspace)
+    first: dict[str, str] = {}
     rows = []
     for path in workspace.recordings(kind):
-        if path.name in excluded:
-            rows.append(RecordingRow(path, kind, "excluded", excluded[path.name]["why"], {}))
-            continue
+        out = excluded.get(path.name)
         try:
             facts = index.facts(path, f"recording {kind}", lambda file: _facts(file, kind))
         except InputError as error:
-            rows.append(RecordingRow(path, kind, "unreadable", str(error), {}))
+            broken: Use = "excluded" if out else "unreadable"
+            rows.append(RecordingRow(path, kind, broken, out["why"] if out else str(error), {}))
             continue
-        changed = _changed(facts, recipe, kind)
-        use: Use = "other recipe" if changed else "used"
-        rows.append(RecordingRow(path, kind, use, changed, facts))
+        content = str(facts["content"])
+        use, why = _use(facts, recipe, kind, out, first.get(content, ""))
+        if use == "used":
+            first[content] = path.name
+        rows.append(RecordingRow(path, kind, use, why, facts))
     return tuple(rows)
+
+
+def _use(
+    facts: Mapping[str, Any],
+    recipe: Recipe,
+    kind: CaptureKind,
+    excluded: Mapping[str, str] | None,
+    same_as: str,
+) -> tuple[Use, str]:
+    """The use of a recording that can be read, and why it is not used."""
+    if excluded:
+        return "excluded", excluded["why"]
+    changed = _changed(facts, recipe, kind)
+    if changed:
+        return "other recipe", changed
+    if same_as:
+        return "repeated", f"it has the same content as {same_as}"
+    return "used", ""
 
 
 def used_recordings(
@@ -96,9 +116,9 @@ def refuse_mixed_joints(rows: tuple[RecordingRow, ...]) -> None:
 def counts_of(
     row: RecordingRow, recipe: Recipe, kind: CaptureKind, index: FileIndex
 ) -> Mapping[str, Any]:
-    """Count what one recording holds of the recipe's plan; nothing where that has no plan for it.
+    """Count what one recording holds of the recipe's plan; nothing where no plan made it.
 
-    See `device.counting`.
+    See `device.counting`. ``unplanned`` says why its device cannot follow the recipe's plan.
     """
 
     def count(path: Path) -> dict[str, Any]:
@@ -107,8 +127,8 @@ def counts_of(
 
         try:
             return count_recorded(read_recording(path), recipe, kind)
-        except InputError:
-            return {}
+        except InputError as error:
+            return {"unplanned": str(error)}
 
     return index.facts(row.path, f"recorded {kind}", count, given=_planning(recipe))
 
@@ -177,10 +197,10 @@ def exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
         return {}
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        return {str(name): {"why": str(row["why"]), **row} for name, row in found.items()}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        return {str(name): {**row, "why": str(row["why"])} for name, row in found.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         raise InputError(
-            f"{path} cannot be read ({error}). It lists the excluded recordings: correct it, or "
+            f"{path} is not a list of exclusions. It lists the excluded recordings: correct it, or "
             "remove it to use every recording."
         ) from None
 
@@ -239,14 +259,13 @@ def _changed(facts: Mapping[str, Any], recipe: Recipe, kind: CaptureKind) -> str
 
 
 def _named(workspace: Workspace, name: str) -> Path:
-    path = workspace.captures_dir / Path(name).name
-    if not path.is_file():
-        there = [p.name for kind in ("friction", "cut") for p in workspace.recordings(kind)]
+    there = {p.name: p for kind in ("friction", "cut") for p in workspace.recordings(kind)}
+    if Path(name).name not in there:
         raise MissingError(
-            f"{workspace.captures_dir} has no recording {path.name}. It has: "
-            f"{', '.join(there) or 'none'}."
+            f"{workspace.captures_dir} has no recording of friction or a cut called "
+            f"{Path(name).name}. It has: {', '.join(there) or 'none'}."
         )
-    return path
+    return there[Path(name).name]
 
 
 def _note(workspace: Workspace, noted: Mapping[str, Mapping[str, str]]) -> None:

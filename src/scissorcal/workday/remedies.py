@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from scissorcal.workday.steps import BY_EFFORT, BY_NAME, Step
 
 if TYPE_CHECKING:
-    from scissorcal.workday.engine import StepState
+    from scissorcal.workday.states import StepState
 
 
 def remedy(
@@ -17,12 +17,14 @@ def remedy(
     A check of what the fit builds on leads to that step; one of the search to a longer search,
     unless it was the longest; every other to new data.
     """
+    if step.kind == "sign":
+        return "scissorcal report --anew"  # once what was rejected is mended
     if step.kind != "fit":
         return step.command
     if "foundations" in failed:
         for item in step.inputs:
             below = state(item.rstrip("?"))
-            if below.state == "failed":
+            if below.state in ("failed", "incomplete", "stale"):
                 return below.command
     if set(failed) <= BY_EFFORT and effort != "thorough":
         return f"{step.command} --effort thorough"

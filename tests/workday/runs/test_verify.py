@@ -93,6 +93,12 @@ def test_a_report_is_stale_once_its_check_is_another_or_gone(
     """A check of more fits, of the same seed, is another one."""
     path = Engine.of(cleared).file("verify friction")
     save(whole, path)
+    assert Engine.of(cleared).state("fit friction").state == "unverified", "six fits are too few"
+    judged = [
+        replace(v, status="pass", value=0.5) for v in whole.verdicts if v.check == "calibration"
+    ]
+    whole = replace(whole, verdicts=(*judged, *whole.verdicts[1:]))
+    save(whole, path)
     write_workspace_report(Engine.of(cleared))
     assert Engine.of(cleared).state("report").state == "done"
     assert Engine.of(cleared).state("fit friction").state == "done"
@@ -181,7 +187,9 @@ def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
     unverified = Engine.of(workspace).state("fit friction")
     assert (unverified.state, unverified.command) == ("unverified", "scissorcal verify friction")
     verify_workspace(workspace, (), VerifySettings(checks=("prior",)), workers=1)
-    assert Engine.of(workspace).state("fit friction").state == "done"
+    check = Engine.of(workspace).state("verify friction")
+    assert (check.state, check.found) == ("incomplete", "prior; coverage was not counted")
+    assert Engine.of(workspace).state("fit friction").state == "unverified"
     assert make_plan(workspace).next_command == "scissorcal report"
 
 

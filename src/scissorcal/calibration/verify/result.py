@@ -177,3 +177,11 @@ class VerifyResult(Result):
     false_alarm: float
     verdicts: tuple[Verdict, ...]
     fit_content: str = ""
+
+    @property
+    def counted_coverage(self) -> bool:
+        """Whether coverage was counted, on enough simulated fits to judge it.
+
+        Only such a check verifies a fit; halves and prior sensitivity alone do not.
+        """
+        return any(v.check == "calibration" and v.status != "not_evaluated" for v in self.verdicts)

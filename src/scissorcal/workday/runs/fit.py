@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.engine import Engine, StepState
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import save_version
+from scissorcal.workday.states import StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
 

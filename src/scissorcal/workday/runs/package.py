@@ -1,9 +1,11 @@
 """Build a workspace's model package from its fits, only where something changed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scissorcal.calibration.store import load
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, VerdictError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
@@ -78,11 +80,18 @@ def build_workspace_package(
 
 
 def _fits(engine: Engine) -> dict[str, Any]:
-    """The fits that the package is compiled from; None where the scene does not need one."""
+    """The fits that the package is compiled from; None where the scene does not need one.
+
+    What their trust checks failed is among their verdicts, so that the package says so.
+    """
     found: dict[str, Any] = {}
     for item in BY_NAME["package build"].inputs:
-        what = BY_NAME[item].what
-        found[what] = load_result(engine, what) if engine.needed(item) else None
+        step = BY_NAME[item]
+        fit = load_result(engine, step.what) if engine.needed(item) else None
+        if fit and step.verified_by and engine.state(step.verified_by).state == "failed":
+            check = load(engine.file(step.verified_by), VerifyResult)
+            fit = replace(fit, verdicts=(*fit.verdicts, *check.rejected))
+        found[step.what] = fit
     return found
 
 

@@ -1,0 +1,45 @@
+"""The states that a step of the day may be in."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+State = Literal["missing", "stale", "incomplete", "failed", "unverified", "done", "excluded"]
+"""What a step may be in, in the order in which it is decided.
+
+missing: there is no result. stale: it was made from other inputs than there are now, or an input is
+missing or stale. incomplete: a capture lacks what the recipe plans, a fit ran out of time, or a
+trust check counted no coverage. failed: a check of it or of a fit below it failed, it cannot be
+read, or a person rejected it. unverified: no complete trust check of this very fit is there. done:
+none of these. excluded: the scene does not need it.
+"""
+
+WAITING: frozenset[State] = frozenset({"missing", "stale"})
+"""States of an input in which what builds on it is stale."""
+
+CHANGED = {
+    "verify": "of an earlier fit",
+    "sign": "the report changed since it was signed",
+    "report": "it shows other fits, trust checks or settings than there are now",
+    "package": "built from other fits or settings than there are now",
+}
+"""Why a result of this kind is stale, where its inputs are all there."""
+
+
+@dataclass(frozen=True)
+class StepState:
+    """One step as it stands: its state, what was found, and the command that comes next for it.
+
+    ``why`` says what the scene needs it for. ``command`` is empty where nothing is to be done.
+    ``content`` is the digest of its result, empty where there is none.
+    """
+
+    name: str
+    state: State
+    found: str
+    why: str = ""
+    command: str = ""
+    files: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    content: str = ""
+    failed: tuple[str, ...] = ()
+    optional: bool = False
