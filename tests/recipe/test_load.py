@@ -265,3 +265,8 @@ def toml(value: object) -> str:
     if isinstance(value, str):
         return f"'{value}'"
     return repr(value)
+
+
+def test_a_share_is_at_most_all_of_it() -> None:
+    text = PAPER + "\n[fit.blade.priors]\ngrain_percent = 120.0\n"
+    assert "grain_percent" in refused(text)
