@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 def open_workspace(path: Path | str = ".") -> "Workspace":
     """Open the workspace that the folder ``path`` lies in.
 
-    The workspace names its files: ``recipe()``, ``recordings("friction")``, ``fit_path("cut")``.
+    The workspace names its files: ``recipe()``, ``recordings("friction")`` (all of them, excluded
+    ones too), ``fit_path("cut")``.
     Unlike the commands it recovers no interrupted capture. Raises MissingError where there is no
     such folder, or no recipe.toml in it or above it.
 

@@ -99,10 +99,13 @@ def comparison_sentence(rows: Sequence[CandidateRow], units: str) -> str:
     others = [row.name for row in rows if row.equivalent and not row.chosen]
     if not others:
         return f"{chosen.name} is used: every other candidate predicts hold-out {units} worse."
-    return (
-        f"{chosen.name} is used: the simplest of {len(others) + 1} candidates that hold-out "
-        f"{units} do not distinguish from the best. The others are {', '.join(others)}."
-    )
+    also = f"The others are {', '.join(others)}."
+    if len(others) == 1:
+        also = f"The other is {others[0]}."
+    count = f"{len(others) + 1} candidates that hold-out {units} do not distinguish from the best"
+    if chosen.parameters > min(row.parameters for row in rows if row.equivalent):
+        return f"{chosen.name} is used, one of {count}, though not the simplest (see notes). {also}"
+    return f"{chosen.name} is used: the simplest of {count}. {also}"
 
 
 def standard_error(scores: Array) -> float:

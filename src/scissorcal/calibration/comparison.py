@@ -32,6 +32,9 @@ PLACES = 5
 """Stretches of speed, and of contact or opening, among which the place of most difference lies."""
 FEWEST_BINS = 10
 
+MOST_MORE = 20
+"""Times the recorded motion beyond which nobody records more to distinguish two candidates."""
+
 
 def choose(fitted: Sequence[FittedCandidate], signal_rms: float = 0.0) -> FittedCandidate:
     """Take the simplest candidate that is not distinguishable from the best.
@@ -130,7 +133,7 @@ def comparison_text(
     time) is what it would take there for 3 nats.
     """
     if len(fitted) == 1:
-        return f"The recipe names {chosen.name}; it was compared with no other candidate."
+        return f"{chosen.name} was compared with no other candidate."
     rows = [
         replace(row, chosen=row.name == chosen.name, equivalent=row.name in chosen.equivalent)
         for row in _rows(fitted, 0.0)
@@ -195,6 +198,11 @@ def _advice(place: _Place, chosen: FittedCandidate, bins: Bins, joint: Joint) ->
     more = f"{count * bins.bin_s:.2g} s more of motion"
     if not np.isfinite(bins.bin_s):
         more = f"{max(1, round(count))} more segments of the path"
+    if count > MOST_MORE * len(bins.rate):
+        return (
+            f"{chosen.name} and {place.other} differ by at most {place.difference:.2g} "
+            f"{joint.effort_unit} (rms): no practical amount of motion would distinguish them."
+        )
     return (
         f"{chosen.name} and {place.other} differ most, by {place.difference:.2g} "
         f"{joint.effort_unit} (rms), at {place.speed[0]:.2g} to {place.speed[1]:.2g} "

@@ -116,9 +116,16 @@ def _reported(path: Path, kind: type[Result]) -> Iterator[None]:
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
-            f"{path} is not a {kind.title} of scissorcal, or it is damaged ({why}): remove it and "
-            f"run '{kind.command}' again."
+            f"{path} is not a {kind.title} of scissorcal, or it is damaged ({why}): "
+            f"{_again(path, kind)}."
         ) from error
+
+
+def _again(path: Path, kind: type[Result]) -> str:
+    """How to make a result again; the name of a fit's file is that of its command."""
+    if kind.command != Result.command or path.suffix != ".nc":
+        return f"remove it and run '{kind.command}' again"
+    return f"run '{kind.command} {path.stem} --force'"
 
 
 @contextmanager

@@ -125,8 +125,10 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
     if tally.lost or tally.garbled or tally.faults:
         lines.append(
             f"{tally.lost} frames lost in {tally.gaps} gaps, {tally.garbled} garbled, "
-            f"{tally.faults} faults latched"
+            f"{tally.faults} fault{'' if tally.faults == 1 else 's'} latched"
         )
+    if tally.faults:
+        lines.append("'scissorcal recording show' states when each fault latched, and which it was")
     latency = report.motion.latency
     if latency is not None:
         lines.append(

@@ -94,6 +94,7 @@ def _text(rendered: "Rendered") -> str:
         for name, value in asdict(result.ledger).items()
         if name.endswith("_J") and math.isfinite(value)
     ]
+    ledger.append(["energy error", f"{1e3 * max(result.ledger.created_J, 0.0):.2f}"])
     lines.append(table(ledger, right=[1]))
     if result.warnings:
         lines += ["", *(f"note: {warning}" for warning in result.warnings)]

@@ -58,7 +58,7 @@ def scissorcal_command(
 
     A workspace is a folder with a recipe.toml. Every command takes --json. Exit codes: 0 done,
     1 unexpected failure, 2 wrong usage or input file, 3 a verdict failed, 4 device or link fault,
-    5 another command must run first.
+    5 another command must run first, 130 interrupted from the keyboard.
 
     \b
     Example:

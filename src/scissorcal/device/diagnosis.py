@@ -68,12 +68,17 @@ def _round_trip(m: Measurements) -> Verdict:
         f"{m.unanswered} of {m.round_trips} unanswered."
     )
     bad = (
-        f"{found} Connect the device directly (no hub), set the adapter's latency timer to 1 ms, "
-        "and close programs that load the processor."
+        f"{found} Connect the device directly (no hub){_timer_too(m)}, and close programs that "
+        "load the processor."
     )
     if m.unanswered:
         return Verdict("device.port", "round trip", "fail", m.round_trip.p99, limit, bad)
     return judge("device.port", "round trip", m.round_trip.p99, limit, found, bad)
+
+
+def _timer_too(m: Measurements) -> str:
+    """The remedy of an adapter that collects bytes, where there is one."""
+    return "" if m.adapter_timer_ms is None else ", set the adapter's latency timer to 1 ms"
 
 
 def _intervals(m: Measurements) -> Verdict:
@@ -88,8 +93,7 @@ def _intervals(m: Measurements) -> Verdict:
         m.interval.p99,
         INTERVAL_LIMIT_TICKS * m.tick_ms,
         found,
-        f"{found} Frames arrive in batches: set the adapter's latency timer to 1 ms, and close "
-        "programs that load the processor.",
+        f"{found} Frames arrive in batches{_timer_too(m)}: close programs that load the processor.",
     )
 
 

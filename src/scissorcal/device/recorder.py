@@ -102,7 +102,12 @@ class Recorder:
             flags = StateFlag(int(samples["flags"][index]) & 0xFFFF)
             names = ", ".join(flag.name or "" for flag in flags)
             at = f"{self._sample_time(samples[index]):.3f} s"
-            self._note("fault", f"The device latched a fault at {at} ({names}).")
+            late = (
+                " Close programs that load this computer."
+                if StateFlag.COMMANDS_LOST in flags
+                else ""
+            )
+            self._note("fault", f"The device latched a fault at {at} ({names}).{late}")
         self._faulty = bool(faulty[-1])
         self._enabled_once = bool(since[-1])
 

@@ -64,7 +64,8 @@ def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
             part.write_bytes(archive_bytes(manifest, arrays))
     except OSError as error:
         raise InputError(
-            f"{path} cannot be written ({error.strerror}): choose another place, or make room."
+            f"{path} cannot be written ({error.strerror}): make room, move away a file that stands "
+            "in its place, or choose another place."
         ) from error
 
 

@@ -68,6 +68,16 @@ class Engine:
         """Whether the scene needs the step. Photographs may be fitted where it does not."""
         return bool(BY_NAME[name].why(self._needs))
 
+    def leads_to(self, name: str) -> str:
+        """The command with which to begin, so that the step of this name becomes current."""
+        step = BY_NAME[name]
+        for item in step.inputs:
+            state = self.state(_plain(item))
+            waits = state.state in WAITING or (state.state == "failed" and not state.content)
+            if waits and not item.endswith("?") and self._counts(step, item):
+                return self.leads_to(_plain(item))
+        return self.state(name).command
+
     def refresh(self) -> None:
         """Forget what was worked out, after a result was written."""
         self._states.clear()
@@ -340,7 +350,12 @@ class Engine:
         if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "recordings":
             return ()
         found = self._completeness(_captured(step), self.file(step.name))
-        return tuple(f"{step.name}, {sentence}." for sentence in found.little_used)
+        keys = f"capture.{step.what}.speeds_rad_per_s"
+        return tuple(
+            f"{step.name}, {sentence}. The fit's notes say why; leave speeds that it cannot use "
+            f"out of {keys}."
+            for sentence in found.little_used
+        )
 
     def _behind(self, step: Step, facts: dict[str, Any]) -> str:
         """Say why a result is stale; empty where it is current."""
@@ -375,6 +390,8 @@ class Engine:
             return found_as("failed", str(error))
         if facts["package"] != package:
             return found_as("stale", "of another package")
+        if self.state("package build").state in WAITING:
+            return found_as("stale", f"package build is {self.state('package build').state}")
         return found_as("done", _count(len(recordings), "recording"), "")
 
 

@@ -66,7 +66,7 @@ class Workspace:
         return load_recipe(self.recipe_path)
 
     def recordings(self, kind: RecordingKind) -> tuple[Path, ...]:
-        """Return the recordings of one kind, oldest first."""
+        """Return all recordings of one kind, oldest first, also those that fits do not use."""
         return tuple(sorted(self.captures_dir.glob(f"{kind}-*.mcap"), key=lambda path: path.stem))
 
     def new_recording(self, kind: RecordingKind, now: datetime | None = None) -> Path:

@@ -122,7 +122,8 @@ def test_what_must_come_first_is_named(tmp_path: Path, fitted: Workspace) -> Non
         fit_workspace(empty)
     with pytest.raises(MissingError, match="scissorcal capture cut --device PORT"):
         fit_workspace(fitted, ("cut",))
-    with pytest.raises(MissingError, match="There is no fit of cut yet: run 'scissorcal fit cut'"):
+    begin = "There is no fit of cut yet: run 'scissorcal capture cut --device PORT' first"
+    with pytest.raises(MissingError, match=begin):
         load_result(Engine.of(fitted), "cut")
 
 

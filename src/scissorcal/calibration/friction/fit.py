@@ -128,6 +128,7 @@ def fit_friction(
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
+            *_symmetry_note(law, chosen),
             *draft_note(effort, every_law, laws),
             usage.sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
@@ -260,6 +261,18 @@ def _notes(
             f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
         )
     return (*notes, *cogging_notes(cogging, posterior, joint))
+
+
+def _symmetry_note(law: FrictionExperiment, chosen: FittedCandidate) -> tuple[str, ...]:
+    """Why an asymmetric law is used where a symmetric one is equivalent."""
+    other = law.name.replace("asymmetric", "symmetric")
+    if other == law.name or other not in chosen.equivalent:
+        return ()
+    return (
+        "Friction of scissors keeps a level for each direction unless hold-out strokes exclude it: "
+        "unequal levels are felt at the handles, and the symmetric law has an offset of the sensor "
+        "in their place.",
+    )
 
 
 def _tails_if_heavy(chosen: FittedCandidate) -> dict[str, float]:

@@ -173,11 +173,13 @@ def load_result(engine: Engine, what: str) -> Any:
     step = BY_NAME[f"fit {what}"]
     state = engine.state(step.name)
     if state.state == "missing" or not engine.file(step.name).exists():
-        raise MissingError(f"There is no fit of {what} yet: run '{step.command}' first.")
+        raise MissingError(
+            f"There is no fit of {what} yet: run '{engine.leads_to(step.name)}' first."
+        )
     if state.state == "stale":
         raise MissingError(
             f"{engine.workspace.relative(engine.file(step.name))} is stale ({state.found}): run "
-            f"'{step.command}' first."
+            f"'{engine.leads_to(step.name)}' first."
         )
     return _load(step, engine.file(step.name))
 

@@ -84,7 +84,7 @@ def _refuse_stale(engine: Engine) -> None:
         if state.state == "stale" and engine.needed(step.name):
             raise MissingError(
                 f"The {step.name.replace('fit', 'fit of')} is stale ({state.found}): run "
-                f"'{step.command}' first."
+                f"'{engine.leads_to(step.name)}' first."
             )
         if state.state == "failed" and not state.content:
             raise InputError(f"{state.found}: run '{state.command}' first.")
