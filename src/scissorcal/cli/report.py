@@ -135,7 +135,14 @@ def sign(
     from scissorcal.workday.runs.sign import sign_report
 
     workspace = open_workspace(folder)
-    review = sign_report(Engine.of(workspace), name, decision, note)
+    engine = Engine.of(workspace)
+    review = sign_report(engine, name, decision, note)
     path = workspace.signature_path
     text = f"{workspace.relative(path)}: {review.words}"
+    unverified = [state.name for state in engine.states() if state.state == "unverified"]
+    if unverified:
+        text += (
+            f"\nnote: {' and '.join(unverified)} {'is' if len(unverified) == 1 else 'are'} "
+            "unverified: a trust check that is made later voids this signature"
+        )
     return Answer(review.model_dump(), text, files=[path])
