@@ -10,19 +10,14 @@ import scissorcal
 from tests.test_docs import ROOT, words_not_used
 
 PACKAGE = Path(scissorcal.__file__).parent
-NAME = re.compile(r"`+[^`]*`+|\w+ = ")
-ROOMS = ("cli", "device", "inference", "kernel", "model", "recording")
-"""Rooms whose sentences are held to the list; the modules beside the rooms are, too."""
-
-HELD = sorted(
-    [*PACKAGE.glob("*.py"), *(path for room in ROOMS for path in (PACKAGE / room).rglob("*.py"))]
-)
+NAME = re.compile(r"`+[^`]*`+|\w+ = |\w+(?:\.\w+)+")
+HELD = sorted(PACKAGE.rglob("*.py"))
 
 
 def sentences_of(source: str) -> list[tuple[int, str]]:
     """Line and text of every string that has a space and is no key of a dict.
 
-    Left out are names of code and of settings (in backticks, or before an equals sign), and what
+    Left out are names of code and of settings (in backticks, dotted, or before an equals sign), and what
     an f-string inserts.
     """
     tree = ast.parse(source)

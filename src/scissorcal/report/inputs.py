@@ -79,7 +79,7 @@ def summarise_recording(recording: Recording) -> RecordingSummary:
 class Geometry:
     """What photographs gave: fits of the camera, the blade and the plate, as far as there are any.
 
-    By fit: ``pictures`` are the files that it drew, ``sha256`` is of its own file, and ``missing``
+    By fit: ``pictures`` are the files that it drew, ``sha256`` is of its file, and ``missing``
     says in a sentence why one that the scene requires is not there, and what to run.
     """
 

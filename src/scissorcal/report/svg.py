@@ -1,6 +1,6 @@
 """Charts as inline SVG that takes the page's colours, light or dark, and needs no script.
 
-Each series is a group of its own, so that a script can switch it and read its points back from the
+Each series is a separate group, so that a script can switch it and read its points back from the
 path: the axes' ranges stand in ``data-`` attributes of the figure.
 """
 

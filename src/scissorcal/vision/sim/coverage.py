@@ -13,7 +13,7 @@ def coverage(polygons: Iterable[Array], width: int, height: int) -> NDArray[np.f
 
     Vertices (n, 2) are pixels, with the centre of the first one at (0, 0). A polygon that runs the
     other way round subtracts, which makes holes. Every side is cut at the pixels' borders; a piece
-    within one pixel covers all that is to the right of it by its height, and of its own pixel the
+    within one pixel covers all that is to the right of it by its height, and of that pixel the
     part to the right of its middle. The running sum over a row is then exact.
     """
     sides = np.concatenate(
