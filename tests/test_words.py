@@ -17,8 +17,8 @@ HELD = sorted(PACKAGE.rglob("*.py"))
 def sentences_of(source: str) -> list[tuple[int, str]]:
     """Line and text of every string that has a space and is no key of a dict.
 
-    Left out are names of code and of settings (in backticks, dotted, or before an equals sign), and what
-    an f-string inserts.
+    Left out are names of code and of settings (in backticks, dotted, or before an equals sign),
+    and what an f-string inserts.
     """
     tree = ast.parse(source)
     texts: list[tuple[int, str]] = []
