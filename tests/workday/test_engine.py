@@ -288,9 +288,11 @@ def test_a_capture_that_the_rig_cannot_follow_is_not_done(
     beyond = text.replace("opening_deg = [12.0, 50.0]", "opening_deg = [100.0, 120.0]")
     workspace.recipe_path.write_text(beyond, encoding="utf-8")
     found = Engine.of(workspace).state("capture friction")
-    assert found.state in ("incomplete", "stale")
-    if found.state == "incomplete":
-        assert "a plan that this rig can follow" in found.found
+    assert (found.state, found.command) == (
+        "incomplete",
+        "scissorcal capture friction --device PORT",
+    )
+    assert "lacks a plan that this rig can follow" in found.found
 
 
 @pytest.fixture(scope="module")

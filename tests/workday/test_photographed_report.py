@@ -1,5 +1,6 @@
 """A workspace's report and signature follow the fits of its photographs."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.store import load, save
 from scissorcal.errors import InputError, MissingError
+from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
 from scissorcal.workday.plan import make_plan
@@ -156,3 +158,24 @@ def test_a_scene_without_photographs_needs_none_of_their_steps(workspace: Worksp
     assert "fit camera" not in [step.name for step in make_plan(workspace).steps]
     with pytest.raises(MissingError, match="nothing to report"):
         write_workspace_report(engine)
+
+
+@pytest.mark.parametrize("change", ["changed", "gone"])
+def test_a_photograph_that_is_no_longer_what_was_captured_fails_its_capture(
+    workspace: Workspace, change: str
+) -> None:
+    folder = next(workspace.captures_dir.glob("blade-*"))
+    picture = folder / "001-blade.jpg"
+    picture.write_bytes(b"as it was captured")
+    listed = {"photographs": [{"file": picture.name, "sha256": file_digest(picture)}]}
+    (folder / INDEX_FILE).write_text(json.dumps(listed), encoding="utf-8")
+    assert Engine.of(workspace).state("capture blade").state == "done"
+    if change == "gone":
+        picture.unlink()
+    else:
+        picture.write_bytes(b"as another program left it")
+    found = Engine.of(workspace).state("capture blade")
+    assert found.state == "failed"
+    assert found.found.startswith(f"{folder.name}/{picture.name} ")
+    assert "put it back as it was" in found.found
+    assert Engine.of(workspace).state("fit blade").state == "stale"
