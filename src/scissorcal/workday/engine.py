@@ -164,27 +164,24 @@ class Engine:
         broken = [row for row in rows if row.use == "unreadable"]
         used = [row for row in rows if row.use == "used"]
 
-        def found_as(
-            state: State, found: str, command: str = step.command, **more: Any
-        ) -> StepState:
+        def made(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
             return StepState(step.name, state, found, why, command, **{"notes": notes, **more})
 
         if broken:
             name = broken[0].path.name
             command = f"scissorcal recording exclude {name} --why 'cannot be read'"
-            return found_as("failed", f"{name} cannot be read", command)
+            return made("failed", f"{name} cannot be read", command)
         if not used:
             if not rows:
-                return found_as("missing", "nothing recorded yet")
+                return made("missing", "nothing recorded yet")
             if all(row.use == "excluded" for row in rows):
-                return found_as("missing", "every recording is excluded")
-            return found_as("stale", "recorded with another rig, material or scene")
+                return made("missing", "every recording is excluded")
+            return made("stale", "recorded with another rig, material or scene")
         try:
             refuse_mixed_joints(rows)
         except InputError as error:
-            return found_as(
-                "failed", "rotary and linear joints are mixed", notes=(*notes, str(error))
-            )
+            mixed = (*notes, str(error))
+            return made("failed", "rotary and linear joints are mixed", notes=mixed)
         notes = (*notes, *self._notes_of(used))
         content = digest(sorted(str(row.facts["content"]) for row in used))
         files = tuple(self.workspace.relative(row.path) for row in used)
@@ -194,8 +191,8 @@ class Engine:
             sentence = "; ".join(missing)
             notes = (*notes, f"{step.name} lacks: {sentence}.")
             found = f"{found}; lacks {missing[0]}" + (" ..." if len(missing) > 1 else "")
-            return found_as("incomplete", found, content=content, files=files, notes=notes)
-        return found_as("done", found, "", content=content, files=files, notes=notes)
+            return made("incomplete", found, content=content, files=files, notes=notes)
+        return made("done", found, "", content=content, files=files, notes=notes)
 
     def completeness(self, kind: CaptureKind) -> "Completeness":
         """Planned, recorded, and used by the fit where there is a current one."""
@@ -224,9 +221,7 @@ class Engine:
         name = self.workspace.relative(row.path)
         if row.use == "unreadable":
             return f"{row.why} {exclude_hint(row.path)}"
-        reason = {"excluded": "excluded", "other recipe": "recorded otherwise"}.get(
-            row.use, row.use
-        )
+        reason = "recorded otherwise" if row.use == "other recipe" else row.use
         return f"{name} is not used ({reason}): {row.why}."
 
     def _notes_of(self, used: Sequence[RecordingRow]) -> tuple[str, ...]:
@@ -290,53 +285,50 @@ class Engine:
         path = self.file(step.name)
         name = self.workspace.relative(path)
 
-        def found_as(
-            state: State, found: str, command: str = step.command, **more: Any
-        ) -> StepState:
+        def made(state: State, found: str, command: str = step.command, **more: Any) -> StepState:
             return StepState(step.name, state, found, why, command, optional=step.optional, **more)
 
         if not path.is_file():
-            return found_as("missing", "not there yet")
+            return made("missing", "not there yet")
         if step.kind == "report" and not self.workspace.report_html.is_file():
-            return found_as("missing", "its page is not there")
+            return made("missing", "its page is not there")
         content = self.index.digest(path)
         try:
             facts = self.facts(step.name)
         except InputError as error:
             force = " --force" if step.kind in ("fit", "package") else ""
             why_not = (str(error),)
-            return found_as(
-                "failed", f"{name} cannot be read", f"{step.command}{force}", notes=why_not
-            )
+            again = f"{step.command}{force}"
+            return made("failed", f"{name} cannot be read", again, notes=why_not)
         failed = tuple(facts["failed"])
         kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
         if behind:
-            return found_as("stale", behind, **kept)
+            return made("stale", behind, **kept)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
-            return found_as("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
+            return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         notes = self._little_used(step)
         if failed:
             command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
-            return found_as("failed", found, command, notes=notes, **kept)
+            return made("failed", found, command, notes=notes, **kept)
         if facts.get("lacks"):
-            return found_as("incomplete", f"{facts['label']}; {facts['lacks']}", **kept)
+            return made("incomplete", f"{facts['label']}; {facts['lacks']}", **kept)
         below = self._failed_below(step)
         if below:
             found = f"{facts['label']}; {below.name} failed: {', '.join(below.failed)}"
             kept["failed"] = (f"{below.name} failed",)
-            return found_as("failed", found, below.command, notes=notes, **kept)
+            return made("failed", found, below.command, notes=notes, **kept)
         check = self.state(step.verified_by) if step.verified_by else None
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return found_as("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
+            return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
         if check and check.state != "done":
-            return found_as("unverified", facts["label"], check.command, notes=notes, **kept)
-        return found_as("done", facts["label"], "", notes=notes, **kept)
+            return made("unverified", facts["label"], check.command, notes=notes, **kept)
+        return made("done", facts["label"], "", notes=notes, **kept)
 
     def _failed_below(self, step: Step) -> StepState | None:
         """A fit that this fit builds on and that failed, if only by its trust check."""
@@ -376,23 +368,23 @@ class Engine:
         """A rendering is done where the newest one is of the package that is there."""
         recordings = self.workspace.recordings("render")
 
-        def found_as(state: State, found: str, command: str = step.command) -> StepState:
+        def made(state: State, found: str, command: str = step.command) -> StepState:
             files = tuple(self.workspace.relative(path) for path in recordings)
             return StepState(step.name, state, found, why, command, files, optional=True)
 
         if not recordings:
-            return found_as("missing", "not rendered yet")
+            return made("missing", "not rendered yet")
         path = self.file("package build")
         try:
             facts = self.index.facts(recordings[-1], "rendering", rendering)
             package = self.facts("package build")["content"] if path.is_file() else ""
         except InputError as error:
-            return found_as("failed", str(error))
+            return made("failed", str(error))
         if facts["package"] != package:
-            return found_as("stale", "of another package")
+            return made("stale", "of another package")
         if self.state("package build").state in WAITING:
-            return found_as("stale", f"package build is {self.state('package build').state}")
-        return found_as("done", _count(len(recordings), "recording"), "")
+            return made("stale", f"package build is {self.state('package build').state}")
+        return made("done", _count(len(recordings), "recording"), "")
 
 
 def _captured(step: Step) -> CaptureKind:

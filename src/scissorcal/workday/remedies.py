@@ -18,7 +18,7 @@ def remedy(
     unless it was the longest; every other to new data.
     """
     if step.kind == "sign":
-        return "scissorcal report --anew"  # once what was rejected is mended
+        return "scissorcal report --anew"  # after what was rejected is corrected
     if step.kind != "fit":
         return step.command
     if "foundations" in failed:

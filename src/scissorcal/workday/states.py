@@ -27,7 +27,7 @@ CHANGED = {
 
 @dataclass(frozen=True)
 class StepState:
-    """One step as it stands: its state, what was found, and the command that comes next for it.
+    """The state of one step, what was found, and the command that comes next for it.
 
     ``why`` says what the scene needs it for. ``command`` is empty where nothing is to be done.
     ``content`` is the digest of its result, empty where there is none.
