@@ -29,6 +29,8 @@ Samples = NDArray[np.void]
 QuantileMethod = Literal["linear", "inverted_cdf"]
 
 BLOCK_S = 0.05
+STOP_MARGIN_RAD = 0.05
+"""Openings are usable up to so far beyond the stops that a device states."""
 
 
 @dataclass(frozen=True)
