@@ -106,10 +106,20 @@ def test_one_place_that_leaps_moves_no_crack(leap: float) -> None:
 def test_places_that_stay_wrong_stop() -> None:
     servo, tick = at_work()
     crack = servo.crack
-    for k in range(1, 6):
+    for k in range(1, 5):
         servo.step(state(tick + k, place(tick + k) - 0.25))
     assert servo.stop_reason is StopReason.IMPLAUSIBLE
     assert servo.crack == crack
+
+
+def test_a_motion_that_is_too_fast_stops() -> None:
+    servo = rendering()
+    for tick in range(1, 6):
+        servo.step(state(tick, 0.7))
+    for k in range(1, 30):
+        command = servo.step(state(5 + k, 0.7 - 0.04 * min(k, 10)))
+    assert servo.stop_reason is StopReason.OVERSPEED
+    assert (command.flags, command.torque) == (0, 0.0)
 
 
 def test_openings_beyond_the_stops_are_not_usable() -> None:

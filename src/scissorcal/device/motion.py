@@ -208,7 +208,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         if lost is not None:
             return lost
         sentence = self.stop_reason.sentence
-        if self.stop_reason is StopReason.TRACKING_LOST:
+        if self.stop_reason in (StopReason.TRACKING_LOST, StopReason.OVERSPEED):
             sentence += (
                 " If 'scissorcal device doctor' finds the port slow, lower the gains in the "
                 "recipe's rig.control."

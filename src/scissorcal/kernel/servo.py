@@ -24,7 +24,7 @@ WIDEST_OPENING = 3.125
 
 OPENING_RATE_LIMIT = 30.0
 """Chosen: three times the rate of a hand that closes 1 rad in 0.1 s. A place that is off by 0.25 rad
-then stops the servo before the time since the last usable one makes it plausible (8 ms)."""
+then stops the servo before the time since the last usable one makes it plausible (4.2 ms)."""
 ADVANCE_RATE_LIMIT = 5.0
 """Chosen: 5 mm in a tick of 1 ms, far beyond any sledge."""
 
@@ -61,6 +61,7 @@ class StopReason(IntEnum):
     BAD_BLOCK = 9
     IMPLAUSIBLE = 10
     DEVICE_CLOCK = 11
+    OVERSPEED = 12
 
     @property
     def sentence(self) -> str:
@@ -98,10 +99,14 @@ _STOP_SENTENCES = {
     ),
     StopReason.IMPLAUSIBLE: (
         "The device reported openings or advances beyond its stops, not finite, or too far apart "
-        "for any motion, five frames in a row; check the encoders and their cables."
+        "for any motion, four frames in a row; check the encoders and their cables."
     ),
     StopReason.DEVICE_CLOCK: (
         "The device's clock (device_us) stood still for 20 frames; restart the device."
+    ),
+    StopReason.OVERSPEED: (
+        "The blades moved faster than any capture or hand moves them; check that the motor and "
+        "its encoder have the same sense, and that nothing is loose."
     ),
 }
 
@@ -127,8 +132,9 @@ class ServoConfig:
     motor off) and the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
     full force. ``damping_Nm_s_per_rad`` acts in DAMP. ``rate_cutoff_Hz``: low-pass of the rate
     estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
-    Openings (rad) outside ``opening_low`` to ``opening_high`` are not usable, nor are places that
-    would need a motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s).
+    A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
+    mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
+    usable, nor are places that would need twice as fast a motion.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
     more stops. Raises ValueError for a number that is not finite or below 0.

@@ -299,6 +299,7 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         book_work(servo, &before, state);
         servo->engaged_s += dt;
+        sc_servo_watch_speed(config, servo);
     } else {
         servo->invalid_frames++;
         servo->sample.flags |= SC_SAMPLE_INVALID;

@@ -33,7 +33,8 @@ enum {
     SC_STOP_LINE_ERROR = 8,
     SC_STOP_BAD_BLOCK = 9,
     SC_STOP_IMPLAUSIBLE = 10,
-    SC_STOP_DEVICE_CLOCK = 11
+    SC_STOP_DEVICE_CLOCK = 11,
+    SC_STOP_OVERSPEED = 12
 };
 
 /* A sample's flags above the 16 bits of the device. */
@@ -59,8 +60,9 @@ typedef struct {
     float opening_error_limit; /* TRACK stops beyond this error [rad] ... */
     float advance_error_limit; /* ... or this [m] */
     float opening_low, opening_high; /* openings beyond them are not usable [rad] */
-    float opening_rate_limit;  /* nor are places that would need a faster motion [rad/s] ... */
-    float advance_rate_limit;  /* ... [m/s] */
+    float opening_rate_limit;  /* a faster motion stops while the motors are on [rad/s] ... */
+    float advance_rate_limit;  /* ... [m/s]; places that would need twice as fast a one are not
+                                  usable */
     uint32_t supervisor_ms;    /* without heartbeat until damping only; five times as long until
                                   the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
@@ -173,7 +175,7 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
  *
  * model and reference may be null: RENDER and TRACK then give no torque. A state whose opening or
  * advance is not usable (not finite, beyond the stops, or a leap that no motion makes) gets zero
- * torque and moves nothing; five in a row stop. A device whose clock decreases has restarted: its
+ * torque and moves nothing; four in a row stop. A device whose clock decreases has restarted: its
  * rates start again from 0. One whose clock stands is taken at a tick a frame; 20 in a row stop. */
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,

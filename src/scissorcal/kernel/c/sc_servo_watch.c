@@ -3,12 +3,13 @@
 #include <math.h>
 #include <string.h>
 
+static const float LEAP = 2.0f; /* times the limit of the rate, beyond which no motion is taken */
 static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider */
 
 enum {
     SILENCE_UNTIL_STOP = 5,
     LONGEST_US = 0x40000000,
-    IMPLAUSIBLE_UNTIL_STOP = 5,
+    IMPLAUSIBLE_UNTIL_STOP = 4,
     STUCK_UNTIL_STOP = 20
 };
 
@@ -123,12 +124,22 @@ int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const 
     if (plausible && last->started && passed_us <= SC_LONGEST_GAP_US) {
         const float time_s = (float)passed_us * 1e-6f;
         plausible =
-            fabsf(state->opening - last->opening) <= config->opening_rate_limit * time_s &&
-            fabsf(state->advance - last->advance) <= config->advance_rate_limit * time_s;
+            fabsf(state->opening - last->opening) <= LEAP * config->opening_rate_limit * time_s &&
+            fabsf(state->advance - last->advance) <= LEAP * config->advance_rate_limit * time_s;
     }
     servo->implausible_frames = plausible ? 0 : servo->implausible_frames + 1;
     if (servo->implausible_frames >= IMPLAUSIBLE_UNTIL_STOP) {
         sc_servo_stop(servo, SC_STOP_IMPLAUSIBLE);
     }
     return plausible;
+}
+
+void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo)
+{
+    const sc_motion *motion = &servo->motion;
+    const int fast = fabsf(motion->opening_rate) > config->opening_rate_limit ||
+                     fabsf(motion->advance_rate) > config->advance_rate_limit;
+    if (fast && servo->mode != SC_MODE_IDLE) {
+        sc_servo_stop(servo, SC_STOP_OVERSPEED);
+    }
 }

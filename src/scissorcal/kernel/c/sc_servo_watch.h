@@ -20,4 +20,7 @@ uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
 int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
                           uint32_t passed_us);
 
+/* Stop where the blades move faster than allowed while a mode drives them. */
+void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo);
+
 #endif
