@@ -178,7 +178,7 @@ def loop() -> Drawing:
     drawing.arrow([(460, 142), (520, 268)], INK)
     drawing.arrow([(700, 142), (640, 268)], INK)
     drawing.text((694, 214), "supervisor silent for", INK, 14)
-    drawing.text((694, 232), "supervisor_ticks frames", INK, 14)
+    drawing.text((694, 232), "supervisor_ms", INK, 14)
     drawing.arrow([(580, 352), (580, 448)], INK)
     drawing.text((594, 396), "supervisor silent five times as long", INK, 14)
     drawing.text((594, 414), "(from every mode)", INK, 14)

@@ -97,7 +97,11 @@ static sc_block *new_block(void)
     block->config.rate_cutoff_Hz = 100.0f;
     block->config.opening_error_limit = 1.0f;
     block->config.advance_error_limit = 1.0f;
-    block->config.supervisor_ticks = 100;
+    block->config.supervisor_ms = 100;
+    block->config.opening_low = -3.0f;
+    block->config.opening_high = 3.0f;
+    block->config.opening_rate_limit = 30.0f;
+    block->config.advance_rate_limit = 5.0f;
     block->config.tick_us = 1000;
     CHECK(sc_block_is_sound(block, block->size), "block");
     CHECK(!sc_block_is_sound(block, block->size - 1), "block");
@@ -167,7 +171,7 @@ static void run_latched(int clears)
         exit(2);
     }
     block->config.fault_clearings = 1;
-    block->config.supervisor_ticks = 0;
+    block->config.supervisor_ms = 0;
     device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, 0, clears};
     sc_block_order(block, SC_MODE_DAMP);
     pthread_create(&thread, NULL, play_latched, &rig);

@@ -30,6 +30,10 @@ static sc_servo_config load_config(const json *from)
     c.advance_ki = (float)json_number(from, "advance_ki");
     c.opening_error_limit = (float)json_number(from, "opening_error_limit");
     c.advance_error_limit = (float)json_number(from, "advance_error_limit");
+    c.opening_low = (float)json_number(from, "opening_low");
+    c.opening_high = (float)json_number(from, "opening_high");
+    c.opening_rate_limit = (float)json_number(from, "opening_rate_limit");
+    c.advance_rate_limit = (float)json_number(from, "advance_rate_limit");
     c.fault_clearings = (uint32_t)json_number(from, "fault_clearings");
     c.tick_us = (uint32_t)json_number(from, "tick_us");
     return c;
@@ -78,7 +82,9 @@ static void check_case(const json *one, const sc_reference *reference, double to
     CHECK(sc_servo_config_is_sound(&config), title);
     for (size_t i = 0; i < torque->size; i++) {
         const sc_state state = state_at(one, i);
+        sc_servo_pass(&config, &orders, &servo, config.tick_us);
         CHECK(sc_servo_step(&config, NULL, reference, &orders, &servo, &state, &command), title);
+        sc_servo_sent(&servo);
         CHECK(command.echo_sequence == state.sequence, title);
         NEAR(command.torque, torque->items[i].number, tolerance * largest(torque), "torque", title);
         NEAR(command.force, force->items[i].number, tolerance * largest(force), "force", title);

@@ -42,7 +42,7 @@ class ReferenceServo:
         c = self.config
         limits = ((c.torque_limit, c.torque_slew), (c.force_limit, c.force_slew))
         for axis, (limit, slew) in enumerate(limits):
-            change = slew * min(dt, 0.01)
+            change = slew * self.config.tick_us * 1e-6
             aim = min(max(wanted[axis], -limit), limit)
             low, high = self.sent[axis] - change, self.sent[axis] + change
             self.sent[axis] = min(max(aim, low), high)
@@ -53,8 +53,9 @@ class ReferenceServo:
             self.last = (us, opening, advance)
             return 0.0
         passed = (us - self.last[0]) % 2**32
-        if passed == 0:
+        if passed == 0 and (opening, advance) == self.last[1:]:
             return 0.0
+        passed = passed or self.config.tick_us
         if passed > 100_000:
             self.rates = [0.0, 0.0]
             passed = self.config.tick_us if passed >= 2**31 else passed
@@ -64,7 +65,7 @@ class ReferenceServo:
             for axis, moved in enumerate((opening - self.last[1], advance - self.last[2])):
                 self.rates[axis] += share * (moved / (passed * 1e-6) - self.rates[axis])
         self.last = (us, opening, advance)
-        return passed * 1e-6
+        return min(passed * 1e-6, 0.01)
 
     def _track(self, index: int, opening: float, advance: float, dt: float) -> list[float]:
         c = self.config

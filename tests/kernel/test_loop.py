@@ -42,7 +42,7 @@ CONFIG = ServoConfig(
     damping_Nm_s_per_rad=0.05,
     opening_kp=1.0,
     opening_error_limit=1.0,
-    supervisor_ticks=0,
+    supervisor_ms=0,
 )
 PATIENCE_S = 20.0
 
@@ -246,7 +246,7 @@ def test_a_missing_heartbeat_means_damping_then_a_stop(device: Device) -> None:
         force_limit=10.0,
         force_slew=100.0,
         damping_Nm_s_per_rad=0.1,
-        supervisor_ticks=30,
+        supervisor_ms=30,
     )
     block = LoopBlock.create(config, make_tables())
     loop = Loop(device, block)

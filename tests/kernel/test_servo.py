@@ -179,9 +179,9 @@ def test_tracking_that_is_lost_stops() -> None:
     servo = Servo(None, replace(CONFIG, opening_error_limit=0.2))
     servo.set_reference([0.6], [0.0], [-0.02], [0])
     servo.engage(Mode.TRACK)
-    servo.step(state(1, 0.45))
+    servo.step(state(1, 0.42))
     assert servo.stop_reason is StopReason.NONE
-    command = servo.step(state(2, 0.35))
+    command = servo.step(state(2, 0.395))
     assert servo.stop_reason is StopReason.TRACKING_LOST
     assert command == Command(0, 2, 0.0, 0.0)
 
@@ -202,7 +202,7 @@ def test_the_stop_latches() -> None:
 
 
 def test_a_missing_heartbeat_leaves_damping_then_stops() -> None:
-    servo = Servo(make_tables(), replace(CONFIG, supervisor_ticks=20))
+    servo = Servo(make_tables(), replace(CONFIG, supervisor_ms=20))
     servo.engage(Mode.RENDER)
     states = closing()
     for _ in range(100):
@@ -219,18 +219,35 @@ def test_a_missing_heartbeat_leaves_damping_then_stops() -> None:
     assert servo.telemetry()["flags"][0] & SampleFlag.FALLBACK
 
 
-def test_fallback_stays_until_a_mode_is_requested_again() -> None:
-    servo = Servo(make_tables(), replace(CONFIG, supervisor_ticks=20))
+def test_rendering_ramps_up_again_when_the_heartbeat_returns() -> None:
+    servo = Servo(make_tables(), replace(CONFIG, supervisor_ms=20))
     servo.engage(Mode.RENDER)
     states = closing()
     for _ in range(30):
         servo.step(next(states), heartbeat=False)
-    servo.step(next(states))
     assert servo.mode is Mode.DAMP
-    servo.engage(Mode.RENDER)
-    command = servo.step(next(states))
+    crack = servo.crack
+    first = servo.step(next(states))
     assert servo.mode is Mode.RENDER
-    assert abs(command.force) < 0.02
+    assert servo.crack >= crack
+    assert abs(first.force) < 0.02
+    for _ in range(120):
+        last = servo.step(next(states))
+    assert abs(last.force) > 10 * abs(first.force)
+    assert not servo.telemetry()["flags"][0] & SampleFlag.FALLBACK
+
+
+def test_tracking_is_not_taken_up_in_the_middle_of_its_path() -> None:
+    servo = Servo(None, replace(CONFIG, supervisor_ms=20))
+    servo.set_reference([0.6] * 500, [0.0] * 500, [-0.02] * 500, [0] * 500)
+    servo.engage(Mode.TRACK)
+    for tick in range(1, 31):
+        servo.step(state(tick), heartbeat=False)
+    servo.step(state(31))
+    assert servo.mode is Mode.DAMP
+    servo.engage(Mode.TRACK)
+    servo.step(state(32))
+    assert servo.mode is Mode.TRACK
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 7.0])
@@ -403,7 +420,7 @@ def test_invalid_values_are_refused() -> None:
         {"force_slew": math.inf},
         {"tick_us": 0},
         {"opening_error_limit": 0.0},
-        {"supervisor_ticks": -1},
+        {"supervisor_ms": -1},
     ],
 )
 def test_limits_that_are_not_numbers_are_refused(change: dict[str, float]) -> None:

@@ -12,7 +12,7 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_strokes, hand_travel
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
-from scissorcal.device.motion import Motion, MotionReport, Samples
+from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
@@ -160,7 +160,9 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
         advance_ki=control.advance_ki_N_per_m_s,
         opening_error_limit=OPENING_ERROR_RAD,
         advance_error_limit=ADVANCE_ERROR_M,
-        supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
+        opening_low=identity.opening_min - STOP_MARGIN_RAD,
+        opening_high=identity.opening_max + STOP_MARGIN_RAD,
+        supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
     )

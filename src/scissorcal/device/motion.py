@@ -29,6 +29,8 @@ Samples = NDArray[np.void]
 QuantileMethod = Literal["linear", "inverted_cdf"]
 
 BLOCK_S = 0.05
+STOP_MARGIN_RAD = 0.05
+"""Openings are usable up to so far beyond the stops that a device states."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         if lost is not None:
             return lost
         sentence = self.stop_reason.sentence
-        if self.stop_reason is StopReason.TRACKING_LOST:
+        if self.stop_reason in (StopReason.TRACKING_LOST, StopReason.OVERSPEED):
             sentence += (
                 " If 'scissorcal device doctor' finds the port slow, lower the gains in the "
                 "recipe's rig.control."

@@ -196,7 +196,7 @@ class LoopBlock(ServoView):
         lib.sc_block_fresh_sheet(self.pointer, crack)
 
     def beat(self) -> None:
-        """Send a heartbeat to the loop; at least every supervisor_ticks ticks."""
+        """Send a heartbeat to the loop; at least every supervisor_ms."""
         lib.sc_block_beat(self.pointer)
 
     def stop(self) -> None:

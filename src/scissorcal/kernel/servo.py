@@ -19,6 +19,23 @@ SAMPLE_DTYPE = dtype_of("sc_sample")
 
 U32 = 0xFFFFFFFF
 
+WIDEST_OPENING = 3.125
+"""rad; just within half a turn, and the same number in 32 bits."""
+
+OPENING_RATE_LIMIT = 30.0
+"""Chosen: three times the rate of a hand that closes 1 rad in 0.1 s. A place that is off by 0.25 rad
+then stops the servo before the time since the last usable one makes it plausible (4.2 ms)."""
+ADVANCE_RATE_LIMIT = 5.0
+"""Chosen: 5 mm in a tick of 1 ms, far beyond any sledge."""
+
+_ABOVE_ZERO = (
+    "opening_error_limit",
+    "advance_error_limit",
+    "opening_rate_limit",
+    "advance_rate_limit",
+    "tick_us",
+)
+
 
 class Mode(IntEnum):
     """IDLE: motors off. TRACK: follow the reference. RENDER: the model. DAMP: damping only."""
@@ -42,6 +59,9 @@ class StopReason(IntEnum):
     SILENCE = 7
     LINE_ERROR = 8
     BAD_BLOCK = 9
+    IMPLAUSIBLE = 10
+    DEVICE_CLOCK = 11
+    OVERSPEED = 12
 
     @property
     def sentence(self) -> str:
@@ -77,6 +97,17 @@ _STOP_SENTENCES = {
         "The loop refused its parameters: a limit, gain or table is not a finite number. Check the "
         "recipe's limits and rig.control."
     ),
+    StopReason.IMPLAUSIBLE: (
+        "The device reported openings or advances beyond its stops, not finite, or too far apart "
+        "for any motion, four frames in a row; check the encoders and their cables."
+    ),
+    StopReason.DEVICE_CLOCK: (
+        "The device's clock (device_us) stood still for 20 frames; restart the device."
+    ),
+    StopReason.OVERSPEED: (
+        "The blades moved faster than any capture or hand moves them; check that the motor and "
+        "its encoder have the same sense, and that nothing is loose."
+    ),
 }
 
 
@@ -101,7 +132,10 @@ class ServoConfig:
     motor off) and the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
     full force. ``damping_Nm_s_per_rad`` acts in DAMP. ``rate_cutoff_Hz``: low-pass of the rate
     estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
-    ``supervisor_ticks`` frames without a heartbeat leave damping only, five times as many stop;
+    A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
+    mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
+    usable, nor are places that would need twice as fast a motion.
+    ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
     more stops. Raises ValueError for a number that is not finite or below 0.
     """
@@ -121,20 +155,27 @@ class ServoConfig:
     advance_ki: float = 0.0
     opening_error_limit: float = 0.5
     advance_error_limit: float = 0.1
-    supervisor_ticks: int = 200
+    opening_low: float = -WIDEST_OPENING
+    opening_high: float = WIDEST_OPENING
+    opening_rate_limit: float = OPENING_RATE_LIMIT
+    advance_rate_limit: float = ADVANCE_RATE_LIMIT
+    supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not 0 <= value <= U32:  # NaN and infinity fail this too
+            least = -WIDEST_OPENING if field.name in ("opening_low", "opening_high") else 0
+            if not least <= value <= U32:  # NaN and infinity fail this too
                 raise ValueError(
                     f"{field.name} = {value} is not usable: give a number from 0 to 2**32 - 1."
                 )
-        for name in ("opening_error_limit", "advance_error_limit", "tick_us"):
+        for name in _ABOVE_ZERO:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0.")
+        if not self.opening_low < self.opening_high:
+            raise ValueError("opening_low must be below opening_high.")
 
     def fill(self, struct: Any) -> None:
         """Copy every number into the C struct of the same field names."""
@@ -253,6 +294,7 @@ class Servo(ServoView):
         self._state = ffi.new("sc_state *")
         self._command = ffi.new("sc_command *")
         self._payload = ffi.new("uint8_t[]", int(lib.SC_SIZE_COMMAND))
+        self._waiting = False
 
     def engage(self, mode: Mode) -> None:
         """Request a mode; it engages with the next frame (RENDER from zero force)."""
@@ -297,8 +339,9 @@ class Servo(ServoView):
         """Take a state and return the command.
 
         ``heartbeat=False`` simulates a supervisor without heartbeat. ``answered=False`` says that
-        this command is not sent, as for all but the newest of states that arrived at once: a fault
-        that the device has latched stops only once 100 commands that were sent have not cleared it.
+        this command is not sent, as for all but the newest of states that arrived at once: a tick
+        of time passes with the first of them, and slews and clearings of faults count by commands
+        that are sent.
         """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
@@ -329,6 +372,10 @@ class Servo(ServoView):
     def _step(self, heartbeat: bool, host_time_ns: int, answered: bool) -> None:
         if heartbeat:
             self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
+        if not self._waiting:
+            tick_us = self.config.tick_us
+            lib.sc_servo_pass(self._config, self._orders, self._servo, tick_us)
+        self._waiting = not answered
         fresh = lib.sc_servo_step(
             self._config,
             self._model,
@@ -341,7 +388,10 @@ class Servo(ServoView):
         if fresh:
             self._servo.sample.host_time_ns = host_time_ns
         if answered:
+            lib.sc_servo_sent(self._servo)
             lib.sc_servo_answered(self._servo)
+        else:
+            lib.sc_servo_not_sent(self._servo)
 
     def telemetry(self) -> NDArray[np.void]:
         """The last frame's sample, shape (1,), SAMPLE_DTYPE; a copy."""

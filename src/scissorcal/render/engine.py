@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.device.capture import identity_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
@@ -245,7 +245,9 @@ def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) ->
         ramp_s=applied.engagement_ramp_s,
         damping_Nm_s_per_rad=FALLBACK_DAMPING,
         rate_cutoff_Hz=RATE_CUTOFF_HZ,
-        supervisor_ticks=round(SUPERVISOR_S * 1e6 / identity.tick_us),
+        opening_low=identity.opening_min - STOP_MARGIN_RAD,
+        opening_high=identity.opening_max + STOP_MARGIN_RAD,
+        supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
     )

@@ -107,6 +107,9 @@ void sc_block_read_orders(const sc_block *block, sc_orders *orders)
 
 void sc_block_push(sc_block *block, const sc_sample *sample)
 {
+    /* No part of this sample may be seen before the count of those before it, or a reader on
+     * another core would take an overwritten sample for a whole one. */
+    __atomic_thread_fence(__ATOMIC_RELEASE);
     block->ring[block->written % SC_RING_SAMPLES] = *sample;
     __atomic_store_n(&block->written, block->written + 1, __ATOMIC_RELEASE);
 }

@@ -42,7 +42,7 @@ static inline uint8_t get_u8(const uint8_t *at)
 
 static inline uint16_t get_u16(const uint8_t *at)
 {
-    return (uint16_t)(at[0] | (at[1] << 8));
+    return (uint16_t)((uint16_t)at[0] | (uint16_t)((uint16_t)at[1] << 8));
 }
 
 static inline uint32_t get_u32(const uint8_t *at)

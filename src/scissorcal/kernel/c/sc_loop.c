@@ -30,6 +30,7 @@ typedef struct {
     sc_command command;
     int64_t epoch_ns; /* CLOCK_REALTIME at the start, less CLOCK_MONOTONIC then */
     int64_t arrived_ns;
+    int64_t passed_ns; /* until when the servo was told of the time */
     int64_t last_state_ns;
     int64_t silent_ns;  /* listened since then without a state */
     int64_t counted_ns; /* when an answer was last counted as one */
@@ -95,12 +96,19 @@ static int send_payload(loop *self, const uint8_t *payload, size_t size)
     return flush_pending(self);
 }
 
+/* A command that the line has taken in part is sent, too: its rest goes out before all else. */
 static void send_command(loop *self)
 {
     uint8_t payload[SC_SIZE_COMMAND];
     const size_t size = sc_pack_command(&self->command, payload);
+    const uint64_t unsent = self->block->unsent;
     if (send_payload(self, payload, size)) {
         self->block->answers++;
+    }
+    if (self->block->unsent == unsent) {
+        sc_servo_sent(&self->block->servo);
+    } else {
+        sc_servo_not_sent(&self->block->servo);
     }
 }
 
@@ -156,7 +164,6 @@ static void note_interval(loop *self)
     }
     self->has_state = 1;
     self->last_state_ns = self->arrived_ns;
-    self->silent_ns = 0;
 }
 
 /* Step the servo; the sample waits until its command is out or the next state comes. */
@@ -165,6 +172,7 @@ static void take_state(loop *self, const sc_state *state)
     sc_block *block = self->block;
     sc_orders orders;
     if (self->unanswered) {
+        sc_servo_not_sent(&block->servo);
         sc_block_push(block, &block->servo.sample);
         self->unanswered = 0;
     }
@@ -175,6 +183,7 @@ static void take_state(loop *self, const sc_state *state)
                       &self->command)) {
         block->servo.sample.host_time_ns = self->epoch_ns + self->arrived_ns;
         self->unanswered = 1;
+        self->silent_ns = 0; /* a device that repeats itself is silent */
     }
 }
 
@@ -250,30 +259,37 @@ static void read_line(loop *self, short events)
     }
 }
 
-/* Time in which this computer stalled does not count as silence of the device. */
-static void count_silence(loop *self, int64_t passed_ns)
+/* Let time pass. That in which this computer stalled counts neither as silence of the device nor of
+ * the supervisor. */
+static void pass_time(loop *self)
 {
-    self->silent_ns += passed_ns < LONGEST_LISTENED_NS ? passed_ns : LONGEST_LISTENED_NS;
+    sc_block *block = self->block;
+    sc_orders orders;
+    const int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
+    const int64_t passed_ns = now_ns - self->passed_ns;
+    const int64_t listened_ns = passed_ns < LONGEST_LISTENED_NS ? passed_ns : LONGEST_LISTENED_NS;
+    const int64_t whole_us = listened_ns / 1000;
+    if (whole_us <= 0) {
+        return;
+    }
+    self->passed_ns = passed_ns > listened_ns ? now_ns : self->passed_ns + whole_us * 1000;
+    self->silent_ns += whole_us * 1000;
+    sc_block_read_orders(block, &orders);
+    sc_servo_pass(&block->config, &orders, &block->servo, (uint32_t)whole_us);
+    if (self->silent_ns > (int64_t)block->silence_limit_ms * 1000000) {
+        sc_servo_stop(&block->servo, SC_STOP_SILENCE);
+    }
 }
 
 static void wait_and_serve(loop *self)
 {
-    sc_orders orders;
     struct pollfd line = {self->fd, POLLIN, 0};
-    const int64_t begun_ns = clock_ns(CLOCK_MONOTONIC);
     const int ready = poll(&line, 1, POLL_MS);
+    pass_time(self);
     if (ready > 0) {
         read_line(self, line.revents);
     } else if (ready < 0 && errno != EINTR) {
         fail(self, SC_STOP_LINE_ERROR, errno);
-    }
-    sc_block_read_orders(self->block, &orders);
-    if (orders.stop) {
-        sc_servo_stop(&self->block->servo, SC_STOP_ASKED);
-    }
-    count_silence(self, clock_ns(CLOCK_MONOTONIC) - begun_ns);
-    if (self->silent_ns > (int64_t)self->block->silence_limit_ms * 1000000) {
-        sc_servo_stop(&self->block->servo, SC_STOP_SILENCE);
     }
 }
 
@@ -292,6 +308,7 @@ uint32_t sc_loop_run(int fd, sc_block *block)
     self.model = block->has_model ? &model : NULL;
     sc_decoder_init(&self.decoder);
     self.last_state_ns = clock_ns(CLOCK_MONOTONIC);
+    self.passed_ns = self.last_state_ns;
     self.epoch_ns = clock_ns(CLOCK_REALTIME) - self.last_state_ns;
     block->started_ns = self.epoch_ns + self.last_state_ns;
     __atomic_store_n(&block->running, 1u, __ATOMIC_RELEASE);

@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-static const uint32_t LONGEST_GAP_US = 100000u;
 static const uint32_t FELL_BACK_US = 0x80000000u; /* half the clock's range: time ran backwards */
 
 static float low_pass(float old, float fresh, float cutoff_Hz, float dt)
@@ -17,9 +16,12 @@ float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t tick_us, uin
 {
     uint32_t passed_us = device_us - motion->last_us;
     if (motion->started && passed_us == 0) {
-        return 0.0f;
+        if (opening == motion->opening && advance == motion->advance) {
+            return 0.0f;
+        }
+        passed_us = tick_us; /* the clock stands, the blades do not */
     }
-    const int restart = !motion->started || passed_us > LONGEST_GAP_US;
+    const int restart = !motion->started || passed_us > SC_LONGEST_GAP_US;
     if (!motion->started) {
         passed_us = 0;
     } else if (passed_us >= FELL_BACK_US) {

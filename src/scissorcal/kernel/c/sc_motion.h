@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+enum { SC_LONGEST_GAP_US = 100000 };
+
 typedef struct {
     int64_t device_time_us; /* unwrapped, never falls */
     uint32_t last_us;
@@ -18,7 +20,8 @@ typedef struct {
  *
  * Rates are backward differences behind a first-order low-pass at cutoff_Hz (0: none). A gap of
  * time is divided by its true length; after more than 0.1 s, or when the clock decreased (a device
- * that restarted), the rates start again from 0. A repeated time changes nothing and returns 0. */
+ * that restarted), the rates start again from 0. A repeated measurement changes
+ * nothing and returns 0; another place at a repeated time counts as a tick later. */
 float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t tick_us, uint32_t device_us,
                        float opening, float advance);
 

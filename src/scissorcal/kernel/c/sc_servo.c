@@ -1,24 +1,20 @@
 #include "sc_servo.h"
+#include "sc_servo_watch.h"
 
 #include <math.h>
 #include <string.h>
 
-static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider */
 static const float LONGEST_TICK_S = 0.01f;       /* a gap does not widen the slew without bound */
 
-enum { SILENCE_UNTIL_STOP = 5, CLEARINGS_UNTIL_STOP = 100 };
+enum {
+    CLEARINGS_UNTIL_STOP = 100,
+    STALE_US = 20000 /* a torque without news acts for 20 ms at most, as the device's own brake */
+};
 
 typedef struct {
     float torque;
     float force;
 } effort;
-
-void sc_servo_stop(sc_servo *servo, uint32_t reason)
-{
-    if (servo->stop_reason == SC_STOP_NONE) {
-        servo->stop_reason = reason;
-    }
-}
 
 static int is_level(float value)
 {
@@ -34,57 +30,10 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            is_level(config->opening_kd) && is_level(config->opening_ki) &&
            is_level(config->advance_kp) && is_level(config->advance_kd) &&
            is_level(config->advance_ki) && config->opening_error_limit > 0.0f &&
-           config->advance_error_limit > 0.0f && config->tick_us > 0;
-}
-
-/* Begin a mode again. The energy stored in the model's material ends with its mode. */
-static void engage(sc_servo *servo, uint32_t mode)
-{
-    servo->ledger.arrest_J += servo->ledger.stored_J;
-    servo->ledger.stored_J = 0.0;
-    memset(&servo->step, 0, sizeof servo->step);
-    servo->mode = mode;
-    servo->engaged_at = servo->sequence;
-    servo->engaged_s = 0.0f;
-    servo->opening_integral = 0.0f;
-    servo->advance_integral = 0.0f;
-    servo->track_index = 0;
-}
-
-/* Follow the supervisor: a new order engages its mode; without a heartbeat the servo falls back to
- * damping, then stops. */
-static void obey(const sc_servo_config *config, const sc_orders *orders, sc_servo *servo)
-{
-    if (orders->stop) {
-        sc_servo_stop(servo, SC_STOP_ASKED);
-    }
-    if (orders->order != servo->order) {
-        servo->order = orders->order;
-        servo->fallback = 0;
-        engage(servo, orders->mode <= SC_MODE_DAMP ? orders->mode : SC_MODE_IDLE);
-    }
-    if (orders->sheet != servo->sheet) {
-        servo->sheet = orders->sheet;
-        servo->crack.crack = isfinite(orders->crack) ? orders->crack : 0.0f;
-        servo->crack.detached = 0;
-    }
-    if (config->supervisor_ticks == 0) {
-        return;
-    }
-    if (orders->heartbeat != servo->heartbeat) {
-        servo->heartbeat = orders->heartbeat;
-        servo->silent_frames = 0;
-        return;
-    }
-    servo->silent_frames++;
-    if (servo->silent_frames / SILENCE_UNTIL_STOP >= config->supervisor_ticks) {
-        sc_servo_stop(servo, SC_STOP_SUPERVISOR_LOST);
-    } else if (servo->silent_frames >= config->supervisor_ticks && !servo->fallback) {
-        servo->fallback = 1;
-        if (servo->mode != SC_MODE_IDLE) {
-            engage(servo, SC_MODE_DAMP);
-        }
-    }
+           config->advance_error_limit > 0.0f && config->tick_us > 0 &&
+           isfinite(config->opening_low) && isfinite(config->opening_high) &&
+           config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
+           config->advance_rate_limit > 0.0f;
 }
 
 /* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
@@ -105,10 +54,10 @@ static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc
         servo->fault_seen = 1;
         servo->clearings_sent = 0;
         servo->faults += servo->enabled_once;
-        servo->engaged_s = 0.0f;
         servo->opening_integral = 0.0f;
         servo->advance_integral = 0.0f;
     }
+    servo->engaged_s = 0.0f; /* the ramp begins when the fault ends */
     servo->engaged_at = servo->sequence - servo->track_index; /* the reference waits, too */
     if (servo->faults > config->fault_clearings ||
         servo->clearings_sent >= CLEARINGS_UNTIL_STOP) {
@@ -176,7 +125,7 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
 }
 
 /* Limit an effort: finite, within the limit, and no faster than the slew. */
-static float limited(float wanted, float last, float limit, float most_change, uint64_t *at_limit,
+static float limited(float wanted, float sent, float limit, float most_change, uint64_t *at_limit,
                      uint64_t *slewed)
 {
     float given = isfinite(wanted) ? wanted : 0.0f;
@@ -184,23 +133,24 @@ static float limited(float wanted, float last, float limit, float most_change, u
         given = given > 0.0f ? limit : -limit;
         (*at_limit)++;
     }
-    if (given > last + most_change || given < last - most_change) {
-        given = given > last ? last + most_change : last - most_change;
+    if (given > sent + most_change || given < sent - most_change) {
+        given = given > sent ? sent + most_change : sent - most_change;
         (*slewed)++;
     }
     return fminf(fmaxf(given, -limit), limit);
 }
 
-static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort wanted, float dt)
+static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort wanted)
 {
     const uint64_t torque_before = servo->torque_limited;
     const uint64_t force_before = servo->force_limited;
-    dt = fminf(dt, LONGEST_TICK_S);
-    servo->torque = limited(wanted.torque, servo->torque, config->torque_limit,
-                            config->torque_slew * dt, &servo->torque_limited,
+    const float time_s = fminf((float)servo->slew_us * 1e-6f, LONGEST_TICK_S);
+    servo->torque = limited(wanted.torque, servo->sent_torque, config->torque_limit,
+                            config->torque_slew * time_s, &servo->torque_limited,
                             &servo->torque_slewed);
-    servo->force = limited(wanted.force, servo->force, config->force_limit,
-                           config->force_slew * dt, &servo->force_limited, &servo->force_slewed);
+    servo->force =
+        limited(wanted.force, servo->sent_force, config->force_limit,
+                config->force_slew * time_s, &servo->force_limited, &servo->force_slewed);
     if (servo->torque_limited != torque_before) {
         servo->sample.flags |= SC_SAMPLE_TORQUE_LIMITED;
     }
@@ -209,7 +159,7 @@ static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort 
     }
 }
 
-/* Work of the last command over the motion since, if the motors were on. */
+/* Work of the last command that was sent over the motion since, if the motors were on. */
 static void book_work(sc_servo *servo, const sc_motion *before, const sc_state *state)
 {
     if (!before->started || !(state->flags & SC_STATE_MOTOR_ENABLED)) {
@@ -217,7 +167,8 @@ static void book_work(sc_servo *servo, const sc_motion *before, const sc_state *
     }
     const double turned = (double)state->opening - (double)before->opening;
     const double moved = (double)state->advance - (double)before->advance;
-    servo->ledger.delivered_J += (double)servo->torque * turned + (double)servo->force * moved;
+    servo->ledger.delivered_J +=
+        (double)servo->sent_torque * turned + (double)servo->sent_force * moved;
     if (servo->mode == SC_MODE_RENDER) {
         servo->ledger.friction_J -= (double)servo->step.friction_torque * turned;
     }
@@ -233,6 +184,10 @@ static void count_frame(sc_servo *servo, const sc_state *state)
     }
     servo->sequence = state->sequence;
     servo->started = 1;
+    if (servo->begins) {
+        servo->engaged_at = servo->sequence;
+        servo->begins = 0;
+    }
     if (state->flags & SC_STATE_TORQUE_SATURATED) {
         servo->device_saturated++;
     }
@@ -288,7 +243,7 @@ static effort effort_of_mode(const sc_servo_config *config, const sc_model *mode
 
 /* Set the command: motors released unless there is no fault. */
 static void answer(const sc_servo_config *config, sc_servo *servo, int valid, int faulty,
-                   effort wanted, float dt, sc_command *command)
+                   effort wanted, sc_command *command)
 {
     const uint16_t clear = faulty ? SC_COMMAND_CLEAR_FAULT : 0;
     if (servo->stop_reason != SC_STOP_NONE) {
@@ -298,31 +253,53 @@ static void answer(const sc_servo_config *config, sc_servo *servo, int valid, in
     } else if (faulty || !valid) {
         release_motors(servo, SC_COMMAND_ENABLE | clear, command);
     } else {
-        apply_limits(config, servo, wanted, dt);
+        apply_limits(config, servo, wanted);
         write_command(servo, SC_COMMAND_ENABLE, command);
     }
+}
+
+/* The last command again; without news for too long it falls to zero as fast as the slew lets it. */
+static void repeat_command(const sc_servo_config *config, sc_servo *servo, sc_command *command)
+{
+    const effort none = {0.0f, 0.0f};
+    if (servo->stop_reason != SC_STOP_NONE) {
+        release_motors(servo, 0, command);
+        return;
+    }
+    if (servo->mode == SC_MODE_IDLE) {
+        release_motors(servo, (uint16_t)(servo->command_flags & SC_COMMAND_CLEAR_FAULT), command);
+        return;
+    }
+    if (servo->stale_us > STALE_US) {
+        apply_limits(config, servo, none);
+    }
+    write_command(servo, (uint16_t)servo->command_flags, command);
 }
 
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command)
 {
+    sc_servo_obey(orders, servo);
     if (servo->started && state->sequence == servo->sequence) {
         servo->duplicates++;
-        write_command(servo, (uint16_t)servo->command_flags, command);
+        repeat_command(config, servo, command);
         return 0;
     }
+    const uint32_t passed_us = sc_servo_time_since(config, servo, state);
     begin_sample(servo, state);
     count_frame(servo, state);
-    obey(config, orders, servo);
-    const int valid = fabsf(state->opening) <= WIDEST_OPENING && isfinite(state->advance);
+    servo->stale_us = 0;
+    const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
     float dt = 0.0f;
     if (valid) {
         const sc_motion before = servo->motion;
         dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
                               state->device_us, state->opening, state->advance);
+        dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         book_work(servo, &before, state);
         servo->engaged_s += dt;
+        sc_servo_watch_speed(config, servo);
     } else {
         servo->invalid_frames++;
         servo->sample.flags |= SC_SAMPLE_INVALID;
@@ -337,8 +314,21 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     if (valid && !faulty && servo->stop_reason == SC_STOP_NONE) {
         wanted = effort_of_mode(config, model, reference, servo, dt);
     }
-    answer(config, servo, valid, faulty, wanted, dt, command);
+    answer(config, servo, valid, faulty, wanted, command);
     return 1;
+}
+
+void sc_servo_sent(sc_servo *servo)
+{
+    servo->sent_torque = servo->torque;
+    servo->sent_force = servo->force;
+    servo->slew_us = 0;
+}
+
+void sc_servo_not_sent(sc_servo *servo)
+{
+    servo->sample.torque_command = (double)servo->sent_torque;
+    servo->sample.force_command = (double)servo->sent_force;
 }
 
 void sc_servo_answered(sc_servo *servo)

@@ -5,8 +5,11 @@
  * RENDER  torque and force come from the model, ramped up from 0 when it engages
  * DAMP    torque = -damping * rate, no force
  *
- * All commands pass the same limits: at most torque_limit and force_limit, and no faster than the
- * slews. A command that is not finite becomes 0.
+ * All commands pass the same limits: at most torque_limit and force_limit, and from one command
+ * that is sent to the next no faster than the slews. A command that is not finite becomes 0.
+ *
+ * Time that passes is the host's (sc_servo_pass), so that neither a backlog of frames nor a device
+ * that repeats itself changes what silence means.
  */
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
@@ -28,7 +31,10 @@ enum {
     SC_STOP_HANGUP = 6,
     SC_STOP_SILENCE = 7,
     SC_STOP_LINE_ERROR = 8,
-    SC_STOP_BAD_BLOCK = 9
+    SC_STOP_BAD_BLOCK = 9,
+    SC_STOP_IMPLAUSIBLE = 10,
+    SC_STOP_DEVICE_CLOCK = 11,
+    SC_STOP_OVERSPEED = 12
 };
 
 /* A sample's flags above the 16 bits of the device. */
@@ -53,8 +59,12 @@ typedef struct {
     float advance_kp, advance_kd, advance_ki;
     float opening_error_limit; /* TRACK stops beyond this error [rad] ... */
     float advance_error_limit; /* ... or this [m] */
-    uint32_t supervisor_ticks; /* frames without heartbeat until damping only; five times as many
-                                  until the stop; 0: no supervision */
+    float opening_low, opening_high; /* openings beyond them are not usable [rad] */
+    float opening_rate_limit;  /* a faster motion stops while the motors are on [rad/s] ... */
+    float advance_rate_limit;  /* ... [m/s]; places that would need twice as fast a one are not
+                                  usable */
+    uint32_t supervisor_ms;    /* without heartbeat until damping only; five times as long until
+                                  the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
 } sc_servo_config;
@@ -68,7 +78,7 @@ typedef struct {
 } sc_reference;
 
 /* The supervisor's orders. `order` and `sheet` count up: a new number engages the mode again, or
- * puts the crack at `crack`. `heartbeat` has to change within supervisor_ticks. */
+ * puts the crack at `crack`. `heartbeat` has to change within supervisor_ms. */
 typedef struct {
     uint32_t mode;
     uint32_t order;
@@ -117,16 +127,24 @@ typedef struct {
     uint32_t order;
     uint32_t sheet;
     uint32_t heartbeat;
-    uint32_t silent_frames;
+    uint32_t silent_us; /* of the supervisor */
+    uint32_t stale_us;  /* since the last state that was no repeat */
+    uint32_t slew_us;   /* since the last command that was sent, at most a tick */
+    uint32_t implausible_frames; /* in a row */
+    uint32_t stuck_frames;       /* in a row, with an unchanged clock of the device */
     uint32_t fallback;
+    uint32_t fallback_from; /* mode that the missing heartbeat ended */
     uint32_t stop_reason;
     uint32_t sequence;
+    uint32_t begins;     /* the next frame is the first of its mode */
     uint32_t engaged_at; /* sequence at which the mode engaged, less the time in faults */
     float engaged_s;     /* time since then */
     float opening_integral;
     float advance_integral;
-    float torque; /* last command */
+    float torque; /* answers the last state */
     float force;
+    float sent_torque; /* last command that was sent */
+    float sent_force;
     uint32_t track_index;
     uint32_t fault_seen;
     uint32_t clearings_sent; /* since the fault that stands was first seen */
@@ -145,20 +163,34 @@ typedef struct {
     uint64_t faults;
 } sc_servo;
 
+/* Let time pass, by the host's clock: call it before the states that arrived then, also when none
+ * did. A supervisor whose heartbeat is missing for supervisor_ms leaves damping only; RENDER
+ * engages again, from zero force, when it returns. Time in which this computer stalled must not be
+ * in elapsed_us: the supervisor could not beat then either. */
+void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_servo *servo,
+                   uint32_t elapsed_us);
+
 /* Answer a state. Returns 1, and servo->sample is of this frame; or 0 for a frame that repeats the
- * last sequence, which gets the last command again and changes nothing else.
+ * last sequence: it gets the last command again, for 20 ms at most, then one that falls to zero.
  *
  * model and reference may be null: RENDER and TRACK then give no torque. A state whose opening or
- * advance is not usable gets zero torque. A device whose clock decreases has restarted: its
- * rates start again from 0. */
+ * advance is not usable (not finite, beyond the stops, or a leap that no motion makes) gets zero
+ * torque and moves nothing; four in a row stop. A device whose clock decreases has restarted: its
+ * rates start again from 0. One whose clock stands is taken at a tick a frame; 20 in a row stop. */
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command);
 
-/* State that the last command was sent. A caller that takes several states at once and sends
- * the newest command alone calls this once for them, and at most once a tick: the device must have
- * had time to act before a fault counts as one that does not clear. Without these
- * calls no fault does. */
+/* State that the last command was sent. Slews are from one such command to the next, and work is
+ * booked for those alone. */
+void sc_servo_sent(sc_servo *servo);
+
+/* State that the last command is not sent, as where a newer state is there already: the sample then
+ * has the command that is in force. */
+void sc_servo_not_sent(sc_servo *servo);
+
+/* State that the device has had time to act on a command, at most once a tick: a fault that it has
+ * latched counts as one that does not clear by these calls alone. */
 void sc_servo_answered(sc_servo *servo);
 
 /* Latch the stop; the first reason stands. */

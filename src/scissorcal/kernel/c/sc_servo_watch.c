@@ -1,0 +1,145 @@
+#include "sc_servo_watch.h"
+
+#include <math.h>
+#include <string.h>
+
+static const float LEAP = 2.0f; /* times the limit of the rate, beyond which no motion is taken */
+static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider */
+
+enum {
+    SILENCE_UNTIL_STOP = 5,
+    LONGEST_US = 0x40000000,
+    IMPLAUSIBLE_UNTIL_STOP = 4,
+    STUCK_UNTIL_STOP = 20
+};
+
+void sc_servo_stop(sc_servo *servo, uint32_t reason)
+{
+    if (servo->stop_reason == SC_STOP_NONE) {
+        servo->stop_reason = reason;
+    }
+}
+
+void sc_servo_engage(sc_servo *servo, uint32_t mode)
+{
+    servo->ledger.arrest_J += servo->ledger.stored_J;
+    servo->ledger.stored_J = 0.0;
+    memset(&servo->step, 0, sizeof servo->step);
+    servo->mode = mode;
+    servo->begins = 1;
+    servo->engaged_s = 0.0f;
+    servo->opening_integral = 0.0f;
+    servo->advance_integral = 0.0f;
+    servo->track_index = 0;
+}
+
+void sc_servo_obey(const sc_orders *orders, sc_servo *servo)
+{
+    if (orders->stop) {
+        sc_servo_stop(servo, SC_STOP_ASKED);
+    }
+    if (orders->order != servo->order) {
+        servo->order = orders->order;
+        servo->fallback = 0;
+        sc_servo_engage(servo, orders->mode <= SC_MODE_DAMP ? orders->mode : SC_MODE_IDLE);
+    }
+    if (orders->sheet != servo->sheet) {
+        servo->sheet = orders->sheet;
+        servo->crack.crack = isfinite(orders->crack) ? orders->crack : 0.0f;
+        servo->crack.detached = 0;
+    }
+}
+
+static uint32_t longer(uint32_t time_us, uint32_t elapsed_us)
+{
+    return time_us < LONGEST_US && elapsed_us < LONGEST_US ? time_us + elapsed_us : LONGEST_US;
+}
+
+/* Without a heartbeat the servo falls back to damping, then stops. With its return RENDER ramps up
+ * again; a path that was left is not taken up in its middle. */
+static void watch_supervisor(const sc_servo_config *config, const sc_orders *orders,
+                             sc_servo *servo, uint32_t elapsed_us)
+{
+    if (orders->heartbeat != servo->heartbeat) {
+        servo->heartbeat = orders->heartbeat;
+        servo->silent_us = 0;
+        if (servo->fallback && servo->fallback_from == SC_MODE_RENDER) {
+            servo->fallback = 0;
+            sc_servo_engage(servo, SC_MODE_RENDER);
+        }
+        return;
+    }
+    servo->silent_us = longer(servo->silent_us, elapsed_us);
+    const uint32_t silent_ms = servo->silent_us / 1000u;
+    if (silent_ms / SILENCE_UNTIL_STOP >= config->supervisor_ms) {
+        sc_servo_stop(servo, SC_STOP_SUPERVISOR_LOST);
+    } else if (silent_ms >= config->supervisor_ms && !servo->fallback) {
+        servo->fallback = 1;
+        servo->fallback_from = servo->mode;
+        if (servo->mode != SC_MODE_IDLE) {
+            sc_servo_engage(servo, SC_MODE_DAMP);
+        }
+    }
+}
+
+void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_servo *servo,
+                   uint32_t elapsed_us)
+{
+    sc_servo_obey(orders, servo);
+    if (config->supervisor_ms > 0) {
+        watch_supervisor(config, orders, servo, elapsed_us);
+    }
+    servo->stale_us = longer(servo->stale_us, elapsed_us);
+    servo->slew_us = longer(servo->slew_us, elapsed_us);
+    if (servo->slew_us > config->tick_us) {
+        servo->slew_us = config->tick_us;
+    }
+}
+
+uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
+                                    const sc_state *state)
+{
+    if (!servo->motion.started) {
+        return 0;
+    }
+    const uint32_t passed_us = state->device_us - servo->motion.last_us;
+    if (passed_us > 0) {
+        servo->stuck_frames = 0;
+        return passed_us;
+    }
+    if (++servo->stuck_frames >= STUCK_UNTIL_STOP) {
+        sc_servo_stop(servo, SC_STOP_DEVICE_CLOCK);
+    }
+    return config->tick_us;
+}
+
+int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
+                        uint32_t passed_us)
+{
+    const sc_motion *last = &servo->motion;
+    int plausible = isfinite(state->opening) && isfinite(state->advance) &&
+                    fabsf(state->opening) <= WIDEST_OPENING &&
+                    state->opening >= config->opening_low &&
+                    state->opening <= config->opening_high;
+    if (plausible && last->started && passed_us <= SC_LONGEST_GAP_US) {
+        const float time_s = (float)passed_us * 1e-6f;
+        plausible =
+            fabsf(state->opening - last->opening) <= LEAP * config->opening_rate_limit * time_s &&
+            fabsf(state->advance - last->advance) <= LEAP * config->advance_rate_limit * time_s;
+    }
+    servo->implausible_frames = plausible ? 0 : servo->implausible_frames + 1;
+    if (servo->implausible_frames >= IMPLAUSIBLE_UNTIL_STOP) {
+        sc_servo_stop(servo, SC_STOP_IMPLAUSIBLE);
+    }
+    return plausible;
+}
+
+void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo)
+{
+    const sc_motion *motion = &servo->motion;
+    const int fast = fabsf(motion->opening_rate) > config->opening_rate_limit ||
+                     fabsf(motion->advance_rate) > config->advance_rate_limit;
+    if (fast && servo->mode != SC_MODE_IDLE) {
+        sc_servo_stop(servo, SC_STOP_OVERSPEED);
+    }
+}

@@ -1,0 +1,26 @@
+/* What the servo watches: the supervisor, time, the device's clock, and whether places are usable.
+ * For sc_servo.c alone; callers of the servo need sc_servo.h only. */
+#ifndef SC_SERVO_WATCH_H
+#define SC_SERVO_WATCH_H
+
+#include "sc_servo.h"
+
+/* Begin a mode again. The energy stored in the model's material ends with its mode. */
+void sc_servo_engage(sc_servo *servo, uint32_t mode);
+
+/* Follow the supervisor: a new order engages its mode, a new sheet moves the crack. */
+void sc_servo_obey(const sc_orders *orders, sc_servo *servo);
+
+/* Device time since the last usable state in us; a tick where its clock stands, which is counted.
+ * Zero for the first. */
+uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
+                             const sc_state *state);
+
+/* Whether the place is one that the blades can have, and can have come to since the last one. */
+int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
+                          uint32_t passed_us);
+
+/* Stop where the blades move faster than allowed while a mode drives them. */
+void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo);
+
+#endif
