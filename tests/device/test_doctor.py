@@ -8,8 +8,8 @@ import pytest
 from scissorcal.device.diagnosis import Measurements, diagnose
 from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
 from scissorcal.device.link import open_link
-from scissorcal.device.motion import Percentiles
 from scissorcal.device.sim.process import SimProcess
+from scissorcal.device.timing import Percentiles
 from scissorcal.verdicts import failed
 
 GOOD = Percentiles(0.9, 1.2, 1.5, 3.0)

@@ -135,6 +135,9 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
             f"reply to a frame: {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
             f"{latency.worst:.0f} us (worst)"
         )
+    lines.append(report.motion.lag.sentence)
+    if report.motion.rights is not None:
+        lines.append(report.motion.rights.sentence)
     return "\n".join(lines)
 
 

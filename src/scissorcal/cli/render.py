@@ -81,6 +81,9 @@ def _text(rendered: "Rendered") -> str:
         rows = [["latency (us)", "p50", "p99", "p99.9", "worst"]]
         rows.append(["", *(f"{value:.0f}" for value in (at.p50, at.p99, at.p999, at.worst))])
         lines += ["", table(rows, right=[1, 2, 3, 4])]
+    lines += ["", result.lag.sentence]
+    if result.rights is not None:
+        lines.append(result.rights.sentence)
     lines += [
         "",
         f"{result.misses} frames missed, {result.garbled} garbled, {result.stalls} stalls, "

@@ -23,7 +23,8 @@ from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
 CaptureProgress = Callable[[float, str, Recorder], None]
 """Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
-SUPERVISOR_S = 1.0
+SUPERVISOR_S = 0.3
+"""Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
 RATE_CUTOFF_HZ = 120.0
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
@@ -237,6 +238,9 @@ def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
 
 def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     report = motion.report()
+    recorder.writer.note(report.lag.sentence)
+    if report.rights:
+        recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
     return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
 

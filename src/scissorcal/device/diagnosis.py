@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from scissorcal.device.motion import Percentiles
+from scissorcal.device.timing import Percentiles
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 ROUND_TRIP_LIMIT_TICKS = 4.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scissorcal.device.diagnosis import Measurements, adapter_timer_path, diagnose
 from scissorcal.device.link import PortLink
-from scissorcal.device.motion import Percentiles
+from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
 from scissorcal.recording.summarising import missing_frames

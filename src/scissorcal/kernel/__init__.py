@@ -7,7 +7,8 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihood,
     cut_log_likelihoods,
 )
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.lag import LagCounts
+from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, lock_memory, run_loop
 from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -63,6 +64,7 @@ __all__ = [
     "Histogram",
     "Identity",
     "Kernel",
+    "LagCounts",
     "LoopBlock",
     "LoopCounters",
     "Message",
@@ -85,6 +87,7 @@ __all__ = [
     "decode",
     "encode",
     "encode_frame",
+    "lock_memory",
     "presliding_path",
     "run_loop",
     "walk_crack",

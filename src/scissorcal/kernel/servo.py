@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.tables import ModelTables, model_struct
@@ -261,6 +262,11 @@ class ServoView:
     def ledger(self) -> EnergyLedger:
         ledger = self._servo.ledger
         return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
+
+    @property
+    def lag(self) -> LagCounts:
+        """Lags so far, by the mode in force."""
+        return LagCounts.of(self._servo.lag)
 
     @property
     def counters(self) -> ServoCounters:

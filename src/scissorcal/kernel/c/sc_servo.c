@@ -290,6 +290,7 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     begin_sample(servo, state);
     count_frame(servo, state);
     servo->stale_us = 0;
+    sc_lag_state(&servo->lag, servo->mode, state->sequence);
     const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
     float dt = 0.0f;
     if (valid) {
@@ -323,6 +324,7 @@ void sc_servo_sent(sc_servo *servo)
     servo->sent_torque = servo->torque;
     servo->sent_force = servo->force;
     servo->slew_us = 0;
+    sc_lag_sent(&servo->lag, servo->sequence);
 }
 
 void sc_servo_not_sent(sc_servo *servo)

@@ -14,6 +14,7 @@
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
 
+#include "sc_lag.h"
 #include "sc_model.h"
 #include "sc_motion.h"
 #include "sc_wire.h"
@@ -161,6 +162,7 @@ typedef struct {
     uint64_t device_saturated;
     uint64_t fallback_frames;
     uint64_t faults;
+    sc_lag lag;
 } sc_servo;
 
 /* Let time pass, by the host's clock: call it before the states that arrived then, also when none

@@ -14,7 +14,7 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
     from scissorcal.render import RenderResult, VirtualStrokes
-    from scissorcal.render.engine import Progress
+    from scissorcal.render.watch import Progress
 
 
 @dataclass(frozen=True)
