@@ -7,7 +7,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Seed, Yes
+from scissorcal.cli.options import Baud, Device, Folder, Seed, Yes
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import ScissorcalError
 
@@ -47,7 +47,9 @@ def capture() -> None:
 
 
 @command
-def friction(device: Device, yes: Yes = False, seed: Seed = 0, folder: Folder = None) -> Answer:
+def friction(
+    device: Device, yes: Yes = False, seed: Seed = 0, baud: Baud = None, folder: Folder = None
+) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
     Keep the space between the blades empty: the motors move them.
@@ -59,7 +61,7 @@ def friction(device: Device, yes: Yes = False, seed: Seed = 0, folder: Folder = 
       80 of 80 cells filled
       ...
     """
-    return _capture("friction", device, hand=False, yes=yes, seed=seed, folder=folder)
+    return _capture("friction", device, hand=False, yes=yes, seed=seed, baud=baud, folder=folder)
 
 
 @command
@@ -70,6 +72,7 @@ def cut(
     ] = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
@@ -83,11 +86,18 @@ def cut(
       24 of 24 cells filled
       ...
     """
-    return _capture("cut", device, hand=hand, yes=yes, seed=seed, folder=folder)
+    return _capture("cut", device, hand=hand, yes=yes, seed=seed, baud=baud, folder=folder)
 
 
 def _capture(
-    kind: "CaptureKind", device: str, *, hand: bool, yes: bool, seed: int, folder: Path | None
+    kind: "CaptureKind",
+    device: str,
+    *,
+    hand: bool,
+    yes: bool,
+    seed: int,
+    baud: int | None,
+    folder: Path | None,
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
     from scissorcal.workday.runs.capture import capture_into
@@ -102,6 +112,7 @@ def _capture(
                 device,
                 hand=hand,
                 seed=seed,
+                baud=baud,
                 progress=view.show,
                 confirm=view.confirm,
             )

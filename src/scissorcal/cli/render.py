@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Seed, Yes, positive
+from scissorcal.cli.options import Baud, Device, Folder, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def render(
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
@@ -63,6 +64,7 @@ def render(
             strokes=VirtualStrokes(strokes, rate_rad_per_s),
             record=not no_record,
             seed=seed,
+            baud=baud,
             progress=view.show,
             confirm=view.confirm,
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -35,12 +35,14 @@ def render_workspace(
     strokes: "VirtualStrokes | None" = None,
     record: bool = True,
     seed: int = 0,
+    baud: int | None = None,
     progress: "Progress | None" = None,
     confirm: "Confirm | None" = None,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
-    ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``. The
+    ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``;
+    ``baud`` takes the place of the recipe's rate. The
     samples go to captures/render-<stamp>.mcap unless ``record`` is False. Raises MissingError
     where there is no package, and what opening it, the rig and the rendering raise.
     """
@@ -49,7 +51,7 @@ def render_workspace(
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
-    with open_rig(device, recipe.specimen, seed) as link:
+    with open_rig(device, recipe.specimen, seed, line=line_of(recipe, baud)) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
         path = workspace.new_recording("render") if record else None
         text = read_text(workspace.recipe_path)
