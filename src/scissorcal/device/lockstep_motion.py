@@ -102,6 +102,7 @@ class LockstepMotion(Motion):
             overrun=0,
             latency=None,
             interval=None,
+            watched=self._servo.watched,
         )
 
     def close(self) -> None:

@@ -6,9 +6,9 @@ in blocks, as they arrive.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -59,6 +59,7 @@ class MotionReport:
     pauses of more than five ticks between frames by the host's clock, ``overrun`` samples were
     overwritten before they were read. ``latency`` (arrival of a frame to departure of its
     command) and ``interval`` (between frames) are in microseconds, None in virtual time.
+    ``watched`` is the largest value that each watch has seen, as a share of what stops.
     """
 
     counters: ServoCounters
@@ -70,6 +71,7 @@ class MotionReport:
     overrun: int
     latency: Percentiles | None
     interval: Percentiles | None
+    watched: Mapping[str, float] = field(default_factory=dict)
 
 
 class Motion(AbstractContextManager["Motion"], ABC):

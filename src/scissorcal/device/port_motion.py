@@ -120,6 +120,7 @@ class PortMotion(Motion):
             overrun=line.lost_samples,
             latency=_percentiles(block.latency),
             interval=_percentiles(block.interval),
+            watched=block.watched,
         )
 
     def close(self) -> None:
