@@ -19,7 +19,7 @@ def doctor(
 ) -> Answer:
     """Measure the port, the timer and the scheduler, and name the remedy for what is wrong.
 
-    No motor is enabled.
+    No motor is enabled. The virtual rig is served on a pseudo-terminal, in real time.
 
     \b
     Example:
@@ -28,9 +28,9 @@ def doctor(
       ...
     """
     from scissorcal.device.doctor import examine
-    from scissorcal.workday.rigs import open_rig
+    from scissorcal.workday.rigs import open_port
 
-    with open_rig(device, "office-paper", seed) as link:
+    with open_port(device, "office-paper", seed) as link:
         identity = link.identity
         with progress() as tell:
             found = examine(link, seconds, tell)

@@ -28,6 +28,15 @@ Device = Annotated[
     ),
 ]
 
+Realtime = Annotated[
+    bool,
+    typer.Option(
+        "--realtime",
+        help="Serve the virtual rig on a pseudo-terminal, in real time; otherwise --device sim "
+        "runs in virtual time.",
+    ),
+]
+
 Yes = Annotated[
     bool,
     typer.Option("--yes", help="Ask no questions: the blades are clear, or material is loaded."),

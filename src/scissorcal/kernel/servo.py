@@ -13,7 +13,7 @@ from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
-from scissorcal.kernel.watching import WatchConfig, largest_seen
+from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")
@@ -75,7 +75,8 @@ class ServoConfig:
     usable, nor are places that would need twice as fast a motion.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
-    more stops. ``watch`` has the thresholds of the watches, by default none. Raises ValueError for a number that is not finite or below 0.
+    more stops. ``watch`` has the thresholds of the watches, by default none.
+    Raises ValueError for a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -100,7 +101,7 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
-    watch: WatchConfig = WatchConfig()
+    watch: WatchConfig = NO_WATCHES
 
     def __post_init__(self) -> None:
         for field in self._numbers():

@@ -56,6 +56,9 @@ class WatchConfig:
             setattr(struct, field.name, getattr(self, field.name))
 
 
+NO_WATCHES = WatchConfig()
+
+
 def largest_seen(watch: Any) -> dict[str, float]:
     """The largest value that each watch has seen as a share of its threshold, by its stop."""
     return {
