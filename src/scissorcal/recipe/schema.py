@@ -72,14 +72,18 @@ class Edge(Section):
 
 
 class Control(Section):
-    """Gains by which a motor-driven capture tracks its trajectory."""
+    """Gains by which a motor-driven capture tracks its trajectory.
 
-    opening_kp_Nm_per_rad: Positive = 6.0
-    opening_kd_Nm_s_per_rad: NonNegative = 0.06
-    opening_ki_Nm_per_rad_s: NonNegative = 20.0
-    advance_kp_N_per_m: Positive = 3000.0
-    advance_kd_N_s_per_m: NonNegative = 40.0
-    advance_ki_N_per_m_s: NonNegative = 10000.0
+    "auto" takes them from the inertia, the friction and the delay that the probe of the rig found.
+    Numbers are used as they are, and refused where the loop would be unstable.
+    """
+
+    opening_kp_Nm_per_rad: Positive | Literal["auto"] = "auto"
+    opening_kd_Nm_s_per_rad: NonNegative | Literal["auto"] = "auto"
+    opening_ki_Nm_per_rad_s: NonNegative | Literal["auto"] = "auto"
+    advance_kp_N_per_m: Positive | Literal["auto"] = "auto"
+    advance_kd_N_s_per_m: NonNegative | Literal["auto"] = "auto"
+    advance_ki_N_per_m_s: NonNegative | Literal["auto"] = "auto"
 
 
 class Line(Section):
