@@ -1,6 +1,7 @@
 """Felt lag of rendering and capture against a bare C loop, on a device that paces itself.
 
-    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy] [--seconds 10] [--rounds 3] [--no-rights]
+    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy]
+        [--seconds 10] [--rounds 3] [--no-rights]
 
 A device in C on a pseudo-terminal (benchmarks/latency_c/device.c) counts the lag in ticks by
 ``echo_sequence`` and the time from each STATE to the command that answers it, while its motors are
