@@ -60,7 +60,7 @@ static int by_size(const void *a, const void *b)
 static void figures(who stepper, const bench_case *one, const sc_model *model, int random,
                     uint32_t *took)
 {
-    static const sc_crack FRESH = {0.0f, 0};
+    static const sc_crack FRESH = {0.0f, 0, 0, 0};
     sc_crack state = FRESH;
     uint32_t seed = 20240501u;
     const uint32_t nothing = bench_nothing();

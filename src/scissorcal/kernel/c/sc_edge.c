@@ -65,11 +65,15 @@ static int beyond_end(const sc_table *edge, sc_turn turn, float x, int32_t end,
     return stand(turn, edge->y[end] + edge->slope[end] * away, point);
 }
 
-/* The last knot but the end's that stands no farther out than x. */
-static int32_t knot_before(const sc_table *edge, sc_turn turn, float x)
+/* The last knot but the end's that stands no farther out than x; `near` is tried first. */
+static int32_t knot_before(const sc_table *edge, sc_turn turn, float x, int32_t near)
 {
     int32_t low = 0;
     int32_t left = edge->size - 1;
+    if (near >= 0 && near < left && x_of_knot(edge, turn, near) <= x &&
+        x < x_of_knot(edge, turn, near + 1)) {
+        return near;
+    }
     while (left > 1) {
         const int32_t half = left / 2;
         low = x_of_knot(edge, turn, low + half) <= x ? low + half : low;
@@ -90,7 +94,7 @@ int sc_edge_over(const sc_table *edge, sc_turn turn, float x, sc_edge_point *poi
     if (x >= x_of_knot(edge, turn, last)) {
         return beyond_end(edge, turn, x, last, point);
     }
-    const int32_t knot = knot_before(edge, turn, x);
+    const int32_t knot = knot_before(edge, turn, x, point->knot);
     const sc_piece piece = sc_piece_from(edge, knot);
     const float t = sc_share_of_rise(piece.width * turn.cosine - piece.start * turn.sine,
                                      -piece.second * turn.sine, -piece.third * turn.sine,

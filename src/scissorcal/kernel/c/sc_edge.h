@@ -34,8 +34,9 @@ int sc_edge_at_station(const sc_table *edge, sc_turn turn, float station, sc_edg
 /* The same at a knot, without a look-up; the bend is left out. */
 int sc_edge_at_knot(const sc_table *edge, sc_turn turn, int32_t knot, sc_edge_point *point);
 
-/* The edge over x: one search for the interval and one cubic in it, closed form beyond the table's
- * ends, where the edge goes on straight. 0 if no edge of bearable steepness stands there. */
+/* The edge over x, looked for first at point->knot: one search for the interval and one cubic in it,
+ * closed form beyond the table's ends, where the edge goes on straight. 0 if no edge of bearable
+ * steepness stands there. */
 int sc_edge_over(const sc_table *edge, sc_turn turn, float x, sc_edge_point *point);
 
 #endif

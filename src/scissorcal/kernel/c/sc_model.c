@@ -184,7 +184,8 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
     const sc_crack before = *state;
     const sc_turn turn = turn_of(model, opening);
     sc_bite bite;
-    bite.knot = 0;
+    bite.point.knot = state->edge_knot;
+    bite.knot = state->response_knot;
     memset(out, 0, sizeof *out);
     if (!is_usable(opening, rate, state->crack - advance) ||
         !sc_edge_over(&model->edge, turn, state->crack - advance, &bite.point)) {
@@ -193,6 +194,8 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
     }
     sc_sit(model, &bite);
     press(model, state, turn, falls_at(model, opening), rate, &bite, out);
+    state->edge_knot = bite.point.knot;
+    state->response_knot = bite.knot;
     out->contact = bite.point.x;
     out->height = bite.point.y;
     out->indentation = bite.indentation;
@@ -214,7 +217,7 @@ float sc_model_settled_torque(const sc_model *model, float opening, float rate, 
 {
     const sc_turn turn = turn_of(model, opening);
     sc_bite bite;
-    bite.knot = 0;
+    bite.point.knot = bite.knot = 0;
     if (!is_usable(opening, rate, contact) ||
         !sc_edge_over(&model->edge, turn, contact, &bite.point)) {
         return 0.0f;

@@ -63,6 +63,7 @@ typedef struct {
 typedef struct {
     float crack;      /* X [m] */
     int32_t detached; /* the material left the blade at its tip; until the blades open again */
+    int32_t edge_knot, response_knot; /* where to look first; any value is right */
 } sc_crack;
 
 typedef struct {

@@ -28,11 +28,24 @@ int sc_table_is_sound(const sc_table *table)
     return 1;
 }
 
-/* Index of the last but the end's of ascending values that does not exceed the one sought. */
-static int32_t interval_of(const float *values, int32_t size, float sought)
+/* Index of the last but the end's of ascending values that does not exceed the one sought, which lies
+ * between their ends: `near` or beside it, or by halving. */
+static int32_t interval_of(const float *values, int32_t size, float sought, int32_t near)
 {
     int32_t low = 0;
     int32_t left = size - 1;
+    if (near >= 0 && near < left) {
+        if (values[near] <= sought) {
+            if (sought < values[near + 1]) {
+                return near;
+            }
+            if (near + 1 < left && sought < values[near + 2]) {
+                return near + 1;
+            }
+        } else if (near > 0 && values[near - 1] <= sought) {
+            return near - 1;
+        }
+    }
     while (left > 1) {
         const int32_t half = left / 2;
         low = values[low + half] <= sought ? low + half : low;
@@ -74,10 +87,7 @@ sc_piece sc_table_piece(const sc_table *table, float x, int32_t near)
     if (x >= table->x[last]) {
         return straight_from(table, last);
     }
-    if (near >= 0 && near < last && table->x[near] <= x && x < table->x[near + 1]) {
-        return sc_piece_from(table, near);
-    }
-    return sc_piece_from(table, interval_of(table->x, table->size, x));
+    return sc_piece_from(table, interval_of(table->x, table->size, x, near));
 }
 
 static float value_in(const sc_piece *piece, float t)
@@ -139,7 +149,7 @@ void sc_table_look(const sc_table *table, float x, sc_place *place)
 
 void sc_table_inverse(const sc_table *table, float y, sc_place *place)
 {
-    const int32_t last = table->size - 1, near = place->index;
+    const int32_t last = table->size - 1;
     if (y >= table->y[last]) {
         const sc_piece piece = straight_from(table, last);
         const float away = (y - piece.y) / piece.start;
@@ -148,9 +158,8 @@ void sc_table_inverse(const sc_table *table, float y, sc_place *place)
         place->y = y;
         return;
     }
-    const int found = near >= 0 && near < last && table->y[near] <= y && y < table->y[near + 1];
     const sc_piece piece =
-        sc_piece_from(table, found ? near : interval_of(table->y, table->size, y));
+        sc_piece_from(table, interval_of(table->y, table->size, y, place->index));
     const float t = sc_share_of_rise(piece.start, piece.second, piece.third, y - piece.y);
     place_in(table, &piece, t, place);
     place->x = piece.x + t * piece.width;
@@ -159,8 +168,9 @@ void sc_table_inverse(const sc_table *table, float y, sc_place *place)
 
 float sc_share_of_rise(float start, float second, float third, float rise)
 {
-    const float per_whole = 1.0f / (start + second + third);
-    const float even = rise * per_whole;
+    const float whole = start + second + third;
+    const float per_whole = 1.0f / whole;
+    const float even = rise / whole;
     float low = 0.0f;
     float high = 1.0f;
     if (!(even > 0.0f)) {
@@ -170,7 +180,11 @@ float sc_share_of_rise(float start, float second, float third, float rise)
         return 1.0f;
     }
     /* what the bend takes from an even rise, given back along the chord */
+    const float curved = (fabsf(second) + 3.0f * fabsf(third)) * per_whole;
     float t = even + even * (1.0f - even) * (second + third * (1.0f + even)) * per_whole;
+    if (curved * curved <= ROOT_CLOSE) {
+        return t; /* what this leaves is the square of the curvature */
+    }
     if (!(t > 0.0f && t < 1.0f)) {
         t = even;
     }
