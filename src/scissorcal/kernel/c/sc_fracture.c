@@ -10,6 +10,9 @@ static const float RESOLUTION = 1e-7f;  /* of a station: about the resolution of
  * of less than its square, 1e-6. */
 static const float SMALL_CHANGE = 1e-3f;
 
+/* Up to this share of the station, a step that is left is made along the tangent of the edge. */
+static const float SHORT_STEP = 1e-4f;
+
 void sc_sit(const sc_model *model, sc_bite *bite)
 {
     const sc_table *response = &model->response;
@@ -59,7 +62,8 @@ static void bear(const sc_model *model, float target, const sc_edge_point *point
     sc_table_inverse(&model->response, force, &at->response);
     at->gap = model->upper_face - point->y - at->response.x;
     at->grade = point->rise;
-    const float turns = point->bend * force;
+    const float deeper = 1.0f + at->gap / at->response.x;
+    const float turns = point->bend * force * deeper;
     const float yields = at->response.slope * point->run * point->run * point->slope;
     if (turns < yields * point->rise) {
         at->grade -= turns / yields;
@@ -68,7 +72,7 @@ static void bear(const sc_model *model, float target, const sc_edge_point *point
 
 /* After a step so short that the force changes little, what is borne follows the tangent, and what is
  * left of the gap is closed along it. 1 if that is as good as another round. */
-static int follow(const sc_model *model, float target, bearing *at, sc_edge_point *point)
+static int follow(const sc_model *model, float target, float low, bearing *at, sc_edge_point *point)
 {
     const float force = target / ((float)model->moving_blades * point->slope);
     const float change = force - at->response.y;
@@ -78,9 +82,9 @@ static int follow(const sc_model *model, float target, bearing *at, sc_edge_poin
     }
     const float deeper = change / at->response.slope;
     const float step = (model->upper_face - point->y - at->response.x - deeper) / at->grade;
-    const float resolution = RESOLUTION * fabsf(point->station);
-    if (!(fabsf(point->bend * step) * fabsf(step) <= resolution * point->rise) ||
-        !(fabsf(point->bend * step) <= RESOLUTION * point->rise)) {
+    if (!(fabsf(step) <= SHORT_STEP * fabsf(point->station)) ||
+        !(fabsf(point->bend * step) <= RESOLUTION * point->rise) ||
+        !(point->station + step > low && point->station + step < model->tip_station)) {
         return 0;
     }
     at->response.area += deeper * (at->response.y + 0.5f * change);
@@ -118,11 +122,21 @@ static int rest(const sc_model *model, const bearing *at, sc_bite *bite)
     return 1;
 }
 
+typedef enum { SC_AT_TIP, SC_RESTS, SC_OPEN } ending;
+
+/* Where nothing is found in between: the near side of what holds, or of what is past the tip. */
+static ending hold_at(const sc_model *model, sc_turn turn, float target, float station, sc_bite *bite)
+{
+    (void)sc_edge_at_station(&model->edge, turn, station, &bite->point);
+    sc_sit(model, bite);
+    return station < model->tip_station || !(sc_release(model, bite) > target) ? SC_RESTS : SC_AT_TIP;
+}
+
 /* The place between low, where *bite stands and the gap is open, and high, where it is closed; an
  * infinite high stands for the end of what the blade reaches, which is looked at only if the rounds
- * lead there. After `most` rounds, the nearest place known to hold. 0 at a tip that does not. */
-static int close_gap(const sc_model *model, sc_turn turn, float target, float high, int most,
-                     sc_bite *bite)
+ * lead there. Where they do not close the gap, *bite stays where it is known to be open. */
+static ending close_gap(const sc_model *model, sc_turn turn, float target, float *high, int most,
+                        sc_bite *bite)
 {
     sc_edge_point *point = &bite->point;
     bearing at = {{bite->knot, 0.0f, 0.0f, 0.0f, 0.0f}, 0.0f, 1.0f};
@@ -137,62 +151,78 @@ static int close_gap(const sc_model *model, sc_turn turn, float target, float hi
         if (at.gap > 0.0f) {
             low = point->station;
         } else {
-            high = point->station;
+            *high = point->station;
         }
         float next = point->station + step;
-        if (!(next < high) && !isfinite(high)) {
-            high = next = farthest(model, turn);
-            if (!(high > low)) {
-                return high < model->tip_station;
+        if (!isfinite(*high) && !(next < model->tip_station)) {
+            *high = next = farthest(model, turn);
+            if (!(next > low)) {
+                return next < model->tip_station ? SC_RESTS : SC_AT_TIP;
             }
-        } else if (!(next > low && next < high)) {
-            next = 0.5f * (low + high);
-            if (!(next > low && next < high)) {
-                break;
+        } else if (!(next > low && next < *high)) {
+            next = 0.5f * (low + *high);
+            if (!(next > low && next < *high)) {
+                return hold_at(model, turn, target, *high, bite);
             }
         }
         stands = sc_edge_at_station(&model->edge, turn, next, point);
-        if (stands && follow(model, target, &at, point)) {
+        if (stands && follow(model, target, low, &at, point)) {
             return rest(model, &at, bite);
         }
     }
-    if (isfinite(high)) {
-        (void)sc_edge_at_station(&model->edge, turn, high, point);
-    }
-    sc_sit(model, bite);
-    return point->station < model->tip_station || !(sc_release(model, bite) > target);
+    (void)sc_edge_at_station(&model->edge, turn, low, point);
+    return SC_OPEN;
 }
 
-/* From knot to knot, then to the end of what the blade reaches. */
-static int scan(const sc_model *model, sc_turn turn, float target, sc_bite *bite)
+/* Move *bite to the last knot before the place sought and give the next one's station, or the end of
+ * what the blade reaches, not yet looked at. Where the release falls the knots are halved, else tried
+ * one by one, so that it is the first such place. */
+static float between_knots(const sc_model *model, sc_turn turn, int falls, float target,
+                           sc_bite *bite)
 {
     const sc_table *edge = &model->edge;
     const float end = farthest(model, turn);
-    int32_t knot = 0;
-    while (knot < edge->size && edge->x[knot] <= bite->point.station) {
-        knot++;
+    int32_t open = bite->point.knot, closed = edge->size;
+    while (open + 1 < closed && edge->x[open + 1] <= bite->point.station) {
+        open++;
     }
-    for (;;) {
+    while (closed > 0 && edge->x[closed - 1] >= end) {
+        closed--;
+    }
+    const int32_t beyond = closed;
+    while (closed - open > 1) {
         sc_bite next = *bite;
-        const int at_end = knot >= edge->size || edge->x[knot] >= end;
-        const int stands = at_end ? sc_edge_at_station(edge, turn, end, &next.point)
-                                  : sc_edge_at_knot(edge, turn, knot, &next.point);
+        const int32_t knot = falls ? open + (closed - open) / 2 : open + 1;
+        const int stands = sc_edge_at_knot(edge, turn, knot, &next.point);
         sc_sit(model, &next);
-        if (!stands || !(sc_release(model, &next) > target)) {
-            return close_gap(model, turn, target, next.point.station, SC_CLOSE_ROUNDS, bite);
+        if (stands && sc_release(model, &next) > target) {
+            *bite = next;
+            open = knot;
+        } else {
+            closed = knot;
         }
-        *bite = next;
-        if (at_end) {
-            return end < model->tip_station;
-        }
-        knot++;
     }
+    return closed < beyond ? edge->x[closed] : end;
 }
 
 int sc_run_out(const sc_model *model, sc_turn turn, int falls, float target, sc_bite *bite)
 {
+    float high = INFINITY;
+    ending how = SC_OPEN;
     if (falls) {
-        return close_gap(model, turn, target, INFINITY, SC_RUN_ROUNDS, bite);
+        how = close_gap(model, turn, target, &high, SC_RUN_ROUNDS, bite);
     }
-    return scan(model, turn, target, bite);
+    if (how == SC_OPEN) {
+        high = between_knots(model, turn, falls, target, bite);
+        sc_bite there = *bite;
+        if (hold_at(model, turn, target, high, &there) == SC_AT_TIP || !(high > bite->point.station)) {
+            *bite = there;
+            return high < model->tip_station;
+        }
+        how = close_gap(model, turn, target, &high, SC_CLOSE_ROUNDS, bite);
+    }
+    if (how == SC_OPEN) {
+        how = hold_at(model, turn, target, high, bite);
+    }
+    return how == SC_RESTS;
 }

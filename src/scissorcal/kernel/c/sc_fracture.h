@@ -14,9 +14,9 @@
 
 #include "sc_model.h"
 
-/* Rounds of one run: on a blade along which the release falls, and in the interval that a scan of the
- * knots found on any other. */
-enum { SC_RUN_ROUNDS = 8, SC_CLOSE_ROUNDS = 24 };
+/* Rounds of one run: from where the crack stands, and within one interval of the edge, in which
+ * bisections alone would reach float's resolution. */
+enum { SC_RUN_ROUNDS = 4, SC_CLOSE_ROUNDS = 24 };
 
 /* The edge in the material: its place, how deep it sits, the response and m times its integral [J].
  * `knot`: as in sc_place, of the response. */
@@ -39,8 +39,10 @@ float sc_release(const sc_model *model, const sc_bite *bite);
  * is what that place bears, free of the rounding of upper_face - y. 0 if the target is not met before
  * the blade's tip; *bite is then there.
  *
- * At most SC_RUN_ROUNDS rounds where the release falls along the blade (falls). Elsewhere a
- * scan of the knots finds the first interval with such a place, and the rounds follow in it. */
+ * Where the release falls along the blade (falls), at most SC_RUN_ROUNDS rounds; of the few runs that
+ * they leave open, as towards a place where the edges are parallel, halving the knots finds the
+ * interval, and SC_CLOSE_ROUNDS the place in it. On any other blade the knots are tried one by one, so
+ * that it is the first such place. */
 int sc_run_out(const sc_model *model, sc_turn turn, int falls, float target, sc_bite *bite);
 
 #endif
