@@ -16,6 +16,8 @@ HEADERS = (
     "sc_edge.h",
     "sc_model.h",
     "sc_motion.h",
+    "sc_lag.h",
+    "sc_watch.h",
     "sc_servo.h",
     "sc_block.h",
     "sc_loop.h",

@@ -22,11 +22,11 @@ from scissorcal.kernel.servo import (
     Mode,
     ServoConfig,
     ServoView,
-    StopReason,
     reference_arrays,
     refuse_change,
     refuse_mode,
 )
+from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
 
 RING_SAMPLES = int(lib.SC_RING_SAMPLES)
@@ -41,6 +41,11 @@ def run_loop(fd: int, block: "LoopBlock") -> StopReason:
     run once; make a new one to start again.
     """
     return StopReason(lib.sc_loop_run(fd, block.pointer))
+
+
+def lock_memory() -> bool:
+    """Keep this process's memory from being paged out; whether the system grants it."""
+    return bool(lib.sc_loop_lock_memory())
 
 
 @dataclass(frozen=True)
@@ -229,6 +234,15 @@ class LoopBlock(ServoView):
         place = ffi.from_buffer("sc_sample[]", samples, require_writable=True)
         count = lib.sc_block_read(self.pointer, self._cursor, place, len(samples), self._lost)
         return samples[:count]
+
+    @property
+    def rights(self) -> tuple[bool, bool]:
+        """Whether the loop has real-time priority, and whether its memory is locked."""
+        return bool(self.pointer.realtime), bool(self.pointer.memory_locked)
+
+    @rights.setter
+    def rights(self, granted: tuple[bool, bool]) -> None:
+        self.pointer.realtime, self.pointer.memory_locked = (int(each) for each in granted)
 
     @property
     def running(self) -> bool:
