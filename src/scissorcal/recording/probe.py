@@ -23,7 +23,7 @@ class Estimate:
     """Mean and standard deviation of a posterior that is close to normal.
 
     >>> Estimate(0.02, 0.001).interval
-    (0.0183551463730485, 0.0216448536269515)
+    (0.01835514637304853, 0.021644853626951472)
     """
 
     mean: float
@@ -84,7 +84,8 @@ def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
 def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
     """Read what `ProbeResult.as_dict` gave. ValueError where it is something else."""
     if plain.get("format") != FORMAT:
-        raise ValueError(f"its format is {plain.get('format')!r}, and this version reads {FORMAT!r}")
+        stated = plain.get("format")
+        raise ValueError(f"its format is {stated!r}, and this version reads {FORMAT!r}")
     known = {item.name for item in fields(ProbeResult)}
     values = {name: value for name, value in plain.items() if name in known}
     try:
