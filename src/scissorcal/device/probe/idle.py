@@ -105,18 +105,22 @@ def mean_of(values: Array) -> Estimate:
     n = len(values)
     if n < 20:
         return Estimate(math.nan, math.nan)
-    mean = float(values.mean())
-    rest = values - mean
-    spectrum = np.fft.rfft(rest, 2 * n)
-    covariance = np.fft.irfft(spectrum * np.conj(spectrum))[: n // 4]
+    mean, sd = float(values.mean()), _sd(values)
+    independent = max(4.0, n / (2.0 * correlation_time(values)))
+    widened = math.sqrt((independent - 1.0) / (independent - 3.0))
+    return Estimate(mean, sd / math.sqrt(independent) * widened)
+
+
+def correlation_time(values: Array) -> float:
+    """Integrated autocorrelation time of a series in samples, at least a half (white noise)."""
+    n = len(values)
+    spectrum = np.fft.rfft(values - values.mean(), 2 * n)
+    covariance = np.fft.irfft(spectrum * np.conj(spectrum))[: max(2, n // 4)]
     if not covariance[0] > 0.0:
-        return Estimate(mean, 0.0)
+        return 0.5
     times = 0.5 + np.cumsum(covariance[1:] / covariance[0])
     inside = np.arange(1, len(times) + 1) >= 6.0 * times
-    time = max(0.5, float(times[int(np.argmax(inside))] if inside.any() else times[-1]))
-    independent = max(4.0, n / (2.0 * time))
-    error = _sd(values) / math.sqrt(independent)
-    return Estimate(mean, error * math.sqrt((independent - 1.0) / (independent - 3.0)))
+    return max(0.5, float(times[int(np.argmax(inside))] if inside.any() else times[-1]))
 
 
 def host_ratio(host_s: Array, device_us: NDArray[np.int64]) -> tuple[float, float]:
@@ -151,7 +155,7 @@ def observed_step(openings: Array) -> float:
     near = np.abs(gaps - counts * smallest) < 0.1 * smallest
     if near.mean() < 0.9:
         return math.nan
-    return float((gaps[near] / 1.0).sum() / counts[near].sum())
+    return float(gaps[near].sum() / counts[near].sum())
 
 
 def _cleared(talk: Talk) -> Stage[tuple[bool, bool]]:
