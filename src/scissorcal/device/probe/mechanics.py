@@ -3,10 +3,10 @@
 Both are linear regressions at a given delay, and the delay is found by trying many. While the
 blades move one way, m theta'' = u(t - d) - c - b theta' integrates twice to
 
-    theta = theta_0 + w_0 t + (1/m) I[u](t - d) - (c/m) t^2 / 2 - (b/m) integral of (theta - theta_0)
+    theta = theta_0 + w_0 t + (1/m) I[u](t - d) - (c/m) t^2 / 2 - (b/m) J[theta - theta_0]
 
-whose right side is linear in theta_0, w_0 (per swing), 1/m, c/m (per direction) and b/m, with I the
-twofold integral of the steps that the commands are. The opening is not differentiated, so its
+whose right side is linear in theta_0, w_0 (per swing), 1/m, c/m (per direction) and b/m, with J the
+integral and I the twofold integral of the steps that the commands are. The opening is not differentiated, so its
 noise is the encoder's alone. Errors are those of a jackknife over swings, which also sees what the
 law leaves out, where they exceed the regression's.
 """
@@ -235,7 +235,8 @@ def _commanded(part: NDArray[np.void], lag: float) -> Array:
     """The commanded torque ``lag`` (s) before each state, a line between the answers."""
     answered = part["answer_flags"] >= 0
     t = part["device_us"] * 1e-6
-    return np.interp(t - lag, t[answered], part["torque"][answered])
+    command = np.interp(t - lag, t[answered], part["torque"][answered])
+    return np.asarray(command, dtype=np.float64)
 
 
 def _held(part: NDArray[np.void]) -> NDArray[np.bool_]:

@@ -24,10 +24,10 @@ FIRST_SHARE = 0.04
 MOVED_STEPS = 5
 MOVED_JITTERS = 8.0
 CUT_SHARE = 0.4
-"""A pulse ends at this share of the largest way or rate: what delay and coasting add stays below."""
+"""A pulse ends at this share of the largest way or rate; delay and coasting add the rest."""
 ATTEMPTS = 3
 VARIED = (1.0, 0.88, 1.12, 0.94)
-"""Efforts of the swings, as shares: swings that repeat each other would hide the encoder's steps."""
+"""Shares of the swings' effort: swings that repeat each other would hide the encoder's steps."""
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ state back, so that it reads from top to bottom. Limits are kept here, whatever 
 import math
 import select
 import time
-from collections.abc import Generator
-from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -133,6 +133,16 @@ class Talk(AbstractContextManager["Talk"]):
                 self._answer(state, answer)
         except StopIteration as over:
             return over.value  # type: ignore[no-any-return]
+
+    @contextmanager
+    def allowing(self, torque_Nm: float) -> Iterator[None]:
+        """Allow a larger torque for a stage that has bounded its effect otherwise."""
+        before = self.bounds
+        self.bounds = replace(before, torque_Nm=torque_Nm)
+        try:
+            yield
+        finally:
+            self.bounds = before
 
     def release(self) -> None:
         """Switch the motors off, three times, in case a command is lost."""
