@@ -52,6 +52,7 @@ class Sign:
     plus: str
     minus: str
     remedy: str
+    more: str
 
 
 OPENING = Sign(
@@ -60,6 +61,7 @@ OPENING = Sign(
     "closes",
     "the motor or the encoder is reversed. Set rig.motor_sign = {sign} in the recipe or swap the "
     "motor's wires (or the encoder's channels, if the opening shrinks while the blades open)",
+    "Clear the blades, check the encoder's cable, or raise rig.probe.largest_torque_Nm.",
 )
 SLEDGE = Sign(
     "sledge",
@@ -67,6 +69,7 @@ SLEDGE = Sign(
     "retracts",
     "its motor or its encoder is reversed. Swap the motor's wires, or the encoder's channels if "
     "the advance shrinks while the sledge moves along the cut",
+    "Clear its way, check its encoder's cable and its motor.",
 )
 
 
@@ -115,29 +118,26 @@ def judge_signs(
     pushed, pulled = found.pushed, found.pulled
     if pushed is None or pulled is None:
         what = (
-            "did not move, whichever way they were pushed with"
+            "did not move either way"
             if pushed is None and pulled is None
-            else "moved one way only, with"
+            else f"moved only by {'negative' if pushed is None else 'positive'} efforts"
         )
         why = (
-            f"The {sign.name} {what} up to {most}: something blocks them, the encoder is stuck, or "
-            "their friction is larger. Clear them, check the encoder's cable, or raise "
-            "rig.probe.largest_torque_Nm."
+            f"The {sign.name} {what}, up to {most}: an obstacle, a brake, a stuck or unplugged "
+            f"encoder, or more friction than that. {sign.more}"
         )
         return [Verdict(MOTORS, f"{sign.name} move", "fail", scale * axis.effort, None, why)]
     share = 0.5 * (float(pushed.moved > 0.0) + float(pulled.moved < 0.0))
     effort = "torque" if unit == "mN m" else "force"
     good = f"Positive {effort} {sign.plus} the {sign.name}, from {scale * pushed.effort:.3g} {unit}"
-    good += (
-        f" on; negative {effort} {sign.minus} them, from {-scale * pulled.effort:.3g} {unit} on."
-    )
+    good += f" on; negative {effort} {sign.minus} it, from {-scale * pulled.effort:.3g} {unit} on."
     bad = f"Positive {effort} {sign.minus} the {sign.name}: "
     bad += sign.remedy.format(sign=-motor_sign) + "."
     if 0.0 < share < 1.0:
         bad = (
-            f"The {sign.name} go the same way whichever way they are pushed: something else moves "
-            "them (a hand, a spring, gravity), or the encoder counts one way only. Let go of the "
-            "handles and start again."
+            f"Pushes both ways move the {sign.name} the same way: something else does it (a hand, "
+            "a spring, gravity), or the encoder counts one way only. Let go of the handles and "
+            "start again."
         )
     return [judge(MOTORS, f"{sign.name} direction", share, 1.0, good, bad)]
 
@@ -155,6 +155,12 @@ def judge_follow(found: Follow) -> Verdict:
     if not math.isfinite(gain):
         return not_evaluated(MOTORS, check, "Too few samples with a steady torque.", limit)
     off = abs(gain - 1.0)
+    if abs(gain) < limit:
+        why = (
+            f"motor_torque does not follow the command (gain {gain:.2f} +- {sd:.2f}) although the "
+            "blades move: check the current sensor and that the firmware sends its reading."
+        )
+        return Verdict(MOTORS, check, "fail", off, limit, why)
     if gain < -3.0 * sd and abs(gain) > limit:
         why = (
             f"motor_torque has the opposite sign of the command (gain {gain:.2f}): turn its sign "
@@ -247,8 +253,8 @@ def _clock(found: Idle, identity: Identity) -> list[Verdict]:
     off = max(abs(host - 1.0) - 3.0 * error, 0.0) if math.isfinite(host) else math.inf
     bad = (
         f"The device's clock runs {100 * (host - 1.0):+.2f} % fast by this computer's, or its "
-        "ticks are longer or shorter than it states: rates and inertia err with it. Check its timer's "
-        "frequency."
+        "ticks are longer or shorter than it states: rates and inertia err with it. Check its "
+        "timer's frequency."
     )
     return [*verdicts, judge(LINE, "clock by host", off, CLOCK_LIMIT, good, bad)]
 
@@ -343,8 +349,8 @@ def _brakes(found: Watchdog, tick_ms: float) -> list[Verdict]:
     if found.braked_ms is None:
         why = (
             f"The device did not brake although commands were withheld for {asked + 50:.3g} ms "
-            "with ENABLE in force: its watchdog is deaf. Without it a computer that hangs leaves the "
-            "last torque on; correct the firmware (docs/protocol.md, Watchdog)."
+            "with ENABLE in force: its watchdog is deaf. Without it a computer that hangs leaves "
+            "the last torque on; correct the firmware (docs/protocol.md, Watchdog)."
         )
         return [Verdict(MOTORS, "watchdog", "fail", None, most, why)]
     said = f"Without commands the device brakes after {found.braked_ms:.3g} ms"

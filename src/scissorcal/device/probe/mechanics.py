@@ -6,9 +6,9 @@ blades move one way, m theta'' = u(t - d) - c - b theta' integrates twice to
     theta = theta_0 + w_0 t + (1/m) I[u](t - d) - (c/m) t^2 / 2 - (b/m) J[theta - theta_0]
 
 whose right side is linear in theta_0, w_0 (per swing), 1/m, c/m (per direction) and b/m, with J the
-integral and I the twofold integral of the steps that the commands are. The opening is not differentiated, so its
-noise is the encoder's alone. Errors are those of a jackknife over swings, which also sees what the
-law leaves out, where they exceed the regression's.
+integral and I the twofold integral of the steps that the commands are. The opening is not
+differentiated, so its noise is the encoder's alone. Errors are those of a jackknife over swings,
+which also sees what the law leaves out, where they exceed the regression's.
 """
 
 import math
@@ -26,7 +26,7 @@ DELAYS = np.linspace(-2e-3, 20e-3, 56)
 """Delays that are tried (s). Beyond 20 ms the watchdog of a device brakes; below 0 as a device may
 measure late in its tick."""
 LAGS = np.linspace(0.0, 20e-3, 101)
-HELD_S = 0.015
+HELD_S = 0.01
 LEAST_SAMPLES = 6
 LEAST_SWINGS = 3
 VISCOUS_SD = 0.01
@@ -119,7 +119,7 @@ def mechanics(swings: list[Swing], noise_rad: float) -> Mechanics | None:
 def follow(parts: list[NDArray[np.void]], zero: float) -> Follow:
     """Compare the measured torque with the commanded one: gain where it is held, lag everywhere.
 
-    The gain takes only states before which the command stood for 15 ms, so that no lag of the motor
+    The gain takes only states before which the command stood for 10 ms, so that no lag of the motor
     bends it.
     """
     measured = np.concatenate([part["motor_torque"] for part in parts]) - zero

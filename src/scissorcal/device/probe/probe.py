@@ -23,7 +23,7 @@ from scissorcal.device.probe.judge import (
 from scissorcal.device.probe.mechanics import follow, mechanics, swing_of
 from scissorcal.device.probe.pulses import Axis, Stairs, axis_of, joined, make_room, stairs, swings
 from scissorcal.device.probe.result import Estimate, ProbeResult
-from scissorcal.device.probe.talk import Bounds, Talk
+from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
 from scissorcal.device.probe.watchdog import lag_ticks, watchdog
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
@@ -87,44 +87,53 @@ def probe(
     that finds something wrong, before the next one moves anything; InputError where nobody can be
     asked; DeviceError where the link fails. The motors are off afterwards in every case.
     """
-    identity, limits = link.identity, recipe.rig.probe
+    identity = link.identity
     tell = progress or (lambda done, sentence: None)
-    _clear(link, confirm, limits.largest_angle_deg)
+    _clear(link, confirm, recipe.rig.probe.largest_angle_deg)
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
         ProbeResult(rig_name(identity), identity_digest(identity), made, recipe.rig.motor_sign)
     )
     with Talk(link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
-        tell(0.0, "listening with the motors off")
-        quiet = idle(talk)
-        finding.add(
-            judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
-        )
-        tell(0.4, "watchdog, at zero torque")
-        watched = watchdog(talk)
-        finding.add(
-            judge_watchdog(watched, identity.tick_us * 1e-3),
-            facts={"command_lag_ticks": lag_ticks(watched.lags)} if watched.lags else {},
-        )
-        tell(0.5, "small pulses of torque")
-        _push(talk, finding, quiet, recipe)
-        if identity.capabilities & Capability.ADVANCE_MOTOR and identity.force_limit > 0.0:
-            tell(0.85, "small pulses of force on the sledge")
-            _push_sledge(talk, finding, recipe)
-        finding.add([clipping(talk, finding.result.inertia_kg_m2)])
-        if limits.creep:
-            tell(0.9, "creeping to the stops")
-            verdicts, facts = creep(talk, finding.result.facts["breakaway_Nm"], tell)
-            finding.add(verdicts, facts=facts)
-        finding.add(
-            [],
-            facts={
-                "largest_torque_Nm": talk.largest_torque,
-                "largest_rate_rad_per_s": talk.largest_rate,
-            },
-        )
+        try:
+            _stages(talk, finding, recipe, tell)
+        except RunawayError as error:
+            raise ProbeRefusedError(str(error), finding.result) from error
     tell(1.0, "done")
     return finding.result
+
+
+def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> None:
+    """Everything from listening to the last motion; ends at the first verdict that fails."""
+    identity, limits = talk.identity, recipe.rig.probe
+    tell(0.0, "listening with the motors off")
+    quiet = idle(talk)
+    finding.add(
+        judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
+    )
+    tell(0.4, "watchdog, at zero torque")
+    watched = watchdog(talk)
+    finding.add(
+        judge_watchdog(watched, identity.tick_us * 1e-3),
+        facts={"command_lag_ticks": lag_ticks(watched.lags)} if watched.lags else {},
+    )
+    tell(0.5, "small pulses of torque")
+    _push(talk, finding, quiet, recipe)
+    if identity.capabilities & Capability.ADVANCE_MOTOR and identity.force_limit > 0.0:
+        tell(0.85, "small pulses of force on the sledge")
+        _push_sledge(talk, finding, recipe)
+    finding.add([clipping(talk, finding.result.inertia_kg_m2)])
+    if limits.creep:
+        tell(0.9, "creeping to the stops")
+        verdicts, facts = creep(talk, finding.result.facts["breakaway_Nm"], tell)
+        finding.add(verdicts, facts=facts)
+    finding.add(
+        [],
+        facts={
+            "largest_torque_Nm": talk.largest_torque,
+            "largest_rate_rad_per_s": talk.largest_rate,
+        },
+    )
 
 
 def bounds_of(recipe: Recipe, identity: Identity) -> Bounds:

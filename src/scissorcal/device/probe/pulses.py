@@ -6,13 +6,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
+from scissorcal.device.probe.idle import CLEARINGS
+from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, Stage, Talk
 from scissorcal.kernel import State, StateFlag
 
 AxisName = Literal["opening", "advance"]
 
 RAMP_S = 0.01
-HOLD_S = 0.03
+HOLD_S = 0.02
 LONG_HOLD_S = 0.08
 REST_S = 0.02
 """Blades that stay within a step for so long are at rest."""
@@ -149,6 +150,15 @@ def _pulse(
     state = yield Answer()
     for _ in range(talk.ticks(REST_S)):
         state = yield Answer(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
+    for _ in range(CLEARINGS):
+        if not state.flags & StateFlag.FAULT_LATCHED:
+            break
+        state = yield Answer(clear=True)
+    else:
+        raise RunawayError(
+            f"{talk.name} latched a fault that does not clear: remove its cause (emergency stop, "
+            "motor supply, temperature) or restart the device."
+        )
     start, place = axis.place(state), axis.place(state)
     ramp, hold = talk.ticks(RAMP_S), talk.ticks(hold_s)
     span = talk.ticks(4e-3)

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging
+from scissorcal.device.motion import STOP_MARGIN_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag, decode, encode
+from scissorcal.kernel.servo import OPENING_RATE_LIMIT
 
 Done = TypeVar("Done")
 
@@ -27,6 +29,8 @@ SILENCE_S = 1.0
 RELEASE_COMMANDS = 3
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
+STUCK_FRAMES = 20
+"""As in the servo."""
 U32 = 2**32
 
 HEARD = np.dtype(
@@ -96,6 +100,7 @@ class Talk(AbstractContextManager["Talk"]):
         self._rows: list[tuple[float, ...]] = []
         self._origin: tuple[float, float] | None = None
         self._frame: bytes | None = None
+        self._restarted = False
         link.configure(ConfigKey.STREAM, 1.0)
 
     @property
@@ -194,6 +199,7 @@ class Talk(AbstractContextManager["Talk"]):
                 return False
             sequence = int(last[0]) + passed
             device_us = int(last[1]) + (device_us - int(last[1])) % U32
+            self._restarted = self._restarted or passed > U32 // 2
         torque = self._sign * state.motor_torque
         self._rows.append(
             (
@@ -236,12 +242,10 @@ class Talk(AbstractContextManager["Talk"]):
     def _guard(self, state: State, free: bool) -> None:
         """Raise where the blades or the sledge move more than the probe may move them."""
         place = (state.opening, state.advance)
-        if not (math.isfinite(place[0]) and math.isfinite(place[1])):
+        wrong = self._what_is_wrong(state)
+        if wrong:
             self.release()
-            raise RunawayError(
-                f"{self.name} sent an opening or advance that is no number while its motors were "
-                "on: check its encoders. The motors are off."
-            )
+            raise RunawayError(f"{self.name}: {wrong} The motors are off.")
         if self._origin is None:
             self._origin = place
         if state.flags & StateFlag.FAULT_LATCHED:
@@ -265,6 +269,33 @@ class Talk(AbstractContextManager["Talk"]):
                 "more than rig.probe allows. Check that nothing else moves them (a hand, a spring, "
                 "gravity) and that the encoder's counts are right; the motors are off."
             )
+
+    def _what_is_wrong(self, state: State) -> str:
+        """What no motor may run with, as a sentence; empty where nothing is."""
+        numbers = (state.opening, state.advance, state.motor_torque)
+        if not all(math.isfinite(number) for number in numbers):
+            return "it sent an opening, advance or torque that is no number; check its sensors."
+        if state.flags & StateFlag.ENCODER_FAULT:
+            return "it reports a fault of its encoder; check the encoder and its cable."
+        low, high = self.identity.opening_min, self.identity.opening_max
+        if not low - STOP_MARGIN_RAD <= state.opening <= high + STOP_MARGIN_RAD:
+            return (
+                f"its opening is {state.opening:.3g} rad, beyond the stops that it states "
+                f"({low:.3g} to {high:.3g}); home the encoder, or correct its scale."
+            )
+        recent = self._rows[-STUCK_FRAMES:]
+        if len(recent) == STUCK_FRAMES and recent[0][1] == recent[-1][1]:
+            return f"its clock (device_us) stood still for {STUCK_FRAMES} frames; restart it."
+        if self._restarted:
+            return "its sequence began again: it restarted. Check its supply."
+        if len(recent) > 1:
+            leap = abs(recent[-1][2] - recent[-2][2])
+            if leap > OPENING_RATE_LIMIT * (recent[-1][0] - recent[-2][0]) * self.tick_s:
+                return (
+                    f"the opening leapt by {leap:.2g} rad within a frame; check the encoder and "
+                    "its cable."
+                )
+        return ""
 
     def _rates(self) -> tuple[float, float]:
         """Magnitudes of the rates (rad/s, m/s) over the last few ticks."""
