@@ -1,4 +1,4 @@
-"""Write docs/api, and the table of docs/verdicts.md, from the code.
+"""Write docs/api, and the tables of docs/verdicts.md and docs/loop.md, from the code.
 
     python docs/make_api.py --write     # after a change of public docstrings
     python docs/make_api.py --check     # exit code 1 if a page is not up to date
@@ -18,6 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from scissorcal.kernel import StopReason
 from scissorcal.verdicts import MEANINGS, TORQUE
 
 DOCS = Path(__file__).parent
@@ -33,6 +34,7 @@ ROOMS = (
     "scissorcal.errors",
     "scissorcal.verdicts",
 )
+STOPS_HEAD = "| stop | number | message |"
 TABLE_HEAD = "| scope | check | limit | bounds | what the value is, and what it guards |"
 
 
@@ -62,7 +64,15 @@ def pages() -> dict[Path, str]:
     verdicts = DOCS / "verdicts.md"
     head = verdicts.read_text(encoding="utf-8").partition(TABLE_HEAD)[0]
     found[verdicts] = head + _verdict_table()
+    loop = DOCS / "loop.md"
+    found[loop] = loop.read_text(encoding="utf-8").partition(STOPS_HEAD)[0] + _stops_table()
     return found
+
+
+def _stops_table() -> str:
+    """Each reason for a stop of the servo, at the end of docs/loop.md."""
+    rows = [f"| {r.name} | {r.value} | {r.sentence} |" for r in StopReason if r.value]
+    return "\n".join([STOPS_HEAD, "|---|---|---|", *rows, ""])
 
 
 def stale_pages(wanted: dict[Path, str]) -> list[Path]:

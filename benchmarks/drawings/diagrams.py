@@ -178,7 +178,8 @@ def loop() -> Drawing:
     drawing.arrow([(460, 142), (520, 268)], INK)
     drawing.arrow([(700, 142), (640, 268)], INK)
     drawing.text((694, 214), "supervisor silent for", INK, 14)
-    drawing.text((694, 232), "supervisor_ms", INK, 14)
+    drawing.text((694, 232), "supervisor_ms; when it beats", INK, 14)
+    drawing.text((694, 250), "again, RENDER ramps up", INK, 14)
     drawing.arrow([(580, 352), (580, 448)], INK)
     drawing.text((594, 396), "supervisor silent five times as long", INK, 14)
     drawing.text((594, 414), "(from every mode)", INK, 14)
@@ -201,11 +202,13 @@ def loop() -> Drawing:
             "no frame for 1 s",
             "line error, hang-up",
             "unsound orders",
+            "a watch of the list",
+            "in docs/loop.md",
             "From TRACK:",
             "error beyond its limit",
         )
     ):
-        drawing.text((970, 200 + 19 * number), words, INK, 14 if words.endswith(":") else 13)
+        drawing.text((970, 160 + 19 * number), words, INK, 14 if words.endswith(":") else 13)
     drawing.text(
         (40, 548),
         "Every command passes the same limits: torque, force and their slew "

@@ -149,7 +149,9 @@ def test_a_gap_fills_no_integral() -> None:
 
 FRAMES = st.lists(
     st.tuples(
-        st.sampled_from(["next", "next", "next", "repeat", "lost", "leap", "nan", "fault", "stuck"]),
+        st.sampled_from(
+            ["next", "next", "next", "repeat", "lost", "leap", "nan", "fault", "stuck"]
+        ),
         st.booleans(),  # heartbeat
         st.booleans(),  # answered
         st.floats(-3e-3, 3e-3),

@@ -23,8 +23,9 @@ WIDEST_OPENING = 3.125
 """rad; just within half a turn, and the same number in 32 bits."""
 
 OPENING_RATE_LIMIT = 30.0
-"""Chosen: three times the rate of a hand that closes 1 rad in 0.1 s. A place that is off by 0.25 rad
-then stops the servo before the time since the last usable one makes it plausible (4.2 ms)."""
+"""Chosen: three times the rate of a hand that closes 1 rad in 0.1 s. A place that is off by
+0.25 rad then stops the servo before the time since the last usable one makes it plausible
+(4.2 ms)."""
 ADVANCE_RATE_LIMIT = 5.0
 """Chosen: 5 mm in a tick of 1 ms, far beyond any sledge."""
 
