@@ -104,6 +104,7 @@ def _capture(
                 seed=seed,
                 progress=view.show,
                 confirm=view.confirm,
+                say=note,
             )
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)

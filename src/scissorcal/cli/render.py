@@ -65,6 +65,7 @@ def render(
             seed=seed,
             progress=view.show,
             confirm=view.confirm,
+            say=note,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts

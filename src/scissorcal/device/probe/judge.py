@@ -7,6 +7,8 @@ interval refuses nothing. Every limit has its reason beside it.
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from scissorcal.device.motion import STOP_MARGIN_RAD
 from scissorcal.device.probe.idle import Idle
 from scissorcal.device.probe.mechanics import Follow
@@ -90,15 +92,15 @@ def judge_watchdog(found: Watchdog, tick_ms: float) -> list[Verdict]:
             "Check its receive line, its emergency stop and its firmware."
         )
         return [Verdict(MOTORS, "enable", "fail", None, None, why)]
-    lag = max(found.lags) * tick_ms
+    lag = float(np.median(found.lags)) * tick_ms
     verdicts = [
         judge(
             MOTORS,
             "lag",
             lag,
             LAG_LIMIT_MS,
-            f"Commands take effect after {lag:.3g} ms at most.",
-            f"Commands take effect only after {lag:.3g} ms: the device would brake by its "
+            f"Commands take effect after {lag:.3g} ms (median).",
+            f"Commands take effect only after {lag:.3g} ms (median): the device would brake by its "
             "watchdog. Shorten the way (no hub or network adapter; 'scissorcal device doctor' "
             "measures the port).",
         )
@@ -129,8 +131,10 @@ def judge_signs(
         return [Verdict(MOTORS, f"{sign.name} move", "fail", scale * axis.effort, None, why)]
     share = 0.5 * (float(pushed.moved > 0.0) + float(pulled.moved < 0.0))
     effort = "torque" if unit == "mN m" else "force"
-    good = f"Positive {effort} {sign.plus} the {sign.name}, from {scale * pushed.effort:.3g} {unit}"
-    good += f" on; negative {effort} {sign.minus} it, from {-scale * pulled.effort:.3g} {unit} on."
+    good = (
+        f"Positive {effort} {sign.plus}, negative {effort} {sign.minus} the {sign.name}, from "
+        f"{scale * pushed.effort:.3g} and {-scale * pulled.effort:.3g} {unit} on."
+    )
     bad = f"Positive {effort} {sign.minus} the {sign.name}: "
     bad += sign.remedy.format(sign=-motor_sign) + "."
     if 0.0 < share < 1.0:
@@ -345,7 +349,7 @@ def _warned(check: str, value: float, limit: float, good: str, warn: str) -> Ver
 def _brakes(found: Watchdog, tick_ms: float) -> list[Verdict]:
     asked = found.brake_after_ms or 0.0
     late = max(found.lags) * tick_ms
-    most = asked + late + 2.0 * tick_ms
+    most = 2.0 * asked + late
     if found.braked_ms is None:
         why = (
             f"The device did not brake although commands were withheld for {asked + 50:.3g} ms "

@@ -183,6 +183,7 @@ class _Regression:
             )
             matrix[:, 0] = [np.interp(self.delay, delays, line) for line in pushed]
             self._solution, _ = _solve(matrix, target)
+            self._solution[3] = 0.0
         rest = target - matrix @ self._solution
         freedom = max(1, len(target) - matrix.shape[1] - 1)
         self.variance = max(float(rest @ rest) / freedom, noise_rad**2)

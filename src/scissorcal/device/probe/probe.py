@@ -38,7 +38,7 @@ REQUEST = (
     "move the blades by up to {degrees:.2g} degrees each way."
 )
 ROOM_PULSES = 40
-SWING_SHARE, SWING_MORE_NM = 1.6, 4e-3
+SWING_SHARE, SWING_MORE_NM = 1.35, 4e-3
 """A swing's torque: so many times breakaway and a little more, which accelerates well."""
 SLEDGE_FORCE_SHARE = 0.2
 """Of the recipe's and the device's force limit, for the sledge."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import CLEARINGS
-from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, Stage, Talk
+from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, StalledError, Stage, Talk
 from scissorcal.kernel import State, StateFlag
 
 AxisName = Literal["opening", "advance"]
@@ -129,11 +129,16 @@ def swings(talk: Talk, axis: Axis, push: float, pull: float) -> tuple[Pulse, ...
 def pulse_of(talk: Talk, axis: Axis, effort: float, cut: float, hold_s: float) -> Pulse:
     """Ramp to an effort, hold it until the axis has gone as far as ``cut``, and let it rest.
 
-    Repeated where a fault or lost frames disturbed it.
+    Repeated where a fault, lost frames or a stall of this computer disturbed it.
     """
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         begin = talk.mark()
-        moved, at_effort = talk.play(_pulse(talk, axis, effort, cut, hold_s))
+        try:
+            moved, at_effort = talk.play(_pulse(talk, axis, effort, cut, hold_s))
+        except StalledError:
+            if attempt == ATTEMPTS - 1:
+                raise
+            continue
         heard = talk.heard(begin)
         faulty = bool(np.any(heard["flags"] & int(StateFlag.FAULT_LATCHED)))
         gaps = bool(np.any(np.diff(heard["sequence"]) > 3))

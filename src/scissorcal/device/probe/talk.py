@@ -29,6 +29,8 @@ SILENCE_S = 1.0
 RELEASE_COMMANDS = 3
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
+STALL_TICKS = 5
+"""As in the loop: a longer pause between two states by the host's clock is a stall."""
 STUCK_FRAMES = 20
 """As in the servo."""
 U32 = 2**32
@@ -68,6 +70,10 @@ Stage = Generator[Answer | None, State, Done]
 
 class RunawayError(DeviceError):
     """The blades or the sledge moved faster or farther than the probe may move them."""
+
+
+class StalledError(RunawayError):
+    """The same, after this computer answered late: it held a torque for too long."""
 
 
 @dataclass(frozen=True)
@@ -264,7 +270,9 @@ class Talk(AbstractContextManager["Talk"]):
                 else f"the sledge moved by {1e3 * abs(place[1] - origin[1]):.3g} mm at "
                 f"{speed:.2g} m/s"
             )
-            raise RunawayError(
+            late = np.diff([row[7] for row in self._rows[-STUCK_FRAMES:]])
+            stalled = bool(np.any(late > STALL_TICKS * self.tick_s))
+            raise (StalledError if stalled else RunawayError)(
                 f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, which is "
                 "more than rig.probe allows. Check that nothing else moves them (a hand, a spring, "
                 "gravity) and that the encoder's counts are right; the motors are off."

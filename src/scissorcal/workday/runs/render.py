@@ -9,6 +9,7 @@ from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.runs.probe import Say, ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -37,11 +38,13 @@ def render_workspace(
     seed: int = 0,
     progress: "Progress | None" = None,
     confirm: "Confirm | None" = None,
+    say: "Say | None" = None,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
     ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``. The
-    samples go to captures/render-<stamp>.mcap unless ``record`` is False. Raises MissingError
+    samples go to captures/render-<stamp>.mcap unless ``record`` is False. A rig without a probe
+    that counts is probed first (`ensure_probed`), and ``say`` tells so. Raises MissingError
     where there is no package, and what opening it, the rig and the rendering raise.
     """
     from scissorcal.package import open_package
@@ -51,15 +54,22 @@ def render_workspace(
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
     with open_rig(device, recipe.specimen, seed) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
+        probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording("render") if record else None
         text = read_text(workspace.recipe_path)
-        recording = open_writer(path, link, package, text) if path else nullcontext()
+        sign = recipe.rig.motor_sign
+        recording = (
+            open_writer(path, link, package, text, motor_sign=sign, probe=probe)
+            if path
+            else nullcontext()
+        )
         with recording as writer:
             done = render(
                 link,
                 package,
                 seconds=seconds,
                 limits=recipe.limits,
+                motor_sign=sign,
                 strokes=strokes,
                 writer=writer,
                 progress=progress,
