@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import CLEARINGS
-from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, StalledError, Stage, Talk
+from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, Stage, StalledError, Talk
 from scissorcal.kernel import State, StateFlag
 
 AxisName = Literal["opening", "advance"]
