@@ -18,6 +18,7 @@ IDLE_S = 1.0
 CLEARINGS = 100
 """As in the protocol: a fault that remains after so many commands with CLEAR_FAULT stays."""
 CHUNKS = 16
+WINDOW = 10.0
 LEAST_STEPS = 4
 """Differences between readings that tell the encoder's step."""
 
@@ -95,9 +96,8 @@ def idle(talk: Talk) -> Idle:
 def mean_of(values: Array) -> Estimate:
     """Mean of a series and the standard error that its autocorrelation leaves.
 
-    The error is sd sqrt(2 t / n), with the integrated autocorrelation time t summed up to where
-    the window is six times as long (Sokal 1997, doi:10.1007/978-1-4899-0319-8_6), and is widened
-    as Student's t for the independent values n / 2t that it rests on.
+    The error is sd sqrt(2 t / n), with the integrated autocorrelation time t of `correlation_time`,
+    and is widened as Student's t for the independent values n / 2t that it rests on.
 
     >>> mean_of(np.array([1.0, 3.0] * 500)).mean
     2.0
@@ -112,15 +112,21 @@ def mean_of(values: Array) -> Estimate:
 
 
 def correlation_time(values: Array) -> float:
-    """Integrated autocorrelation time of a series in samples, at least a half (white noise)."""
+    """Integrated autocorrelation time of a series in samples, at least a half (white noise).
+
+    Summed up to where the window is ten times as long (Sokal 1997,
+    doi:10.1007/978-1-4899-0319-8_6), and corrected for the mean that was taken off (Wolff 2004,
+    doi:10.1016/S0010-4655(03)00467-3, equation 49).
+    """
     n = len(values)
     spectrum = np.fft.rfft(values - values.mean(), 2 * n)
     covariance = np.fft.irfft(spectrum * np.conj(spectrum))[: max(2, n // 4)]
     if not covariance[0] > 0.0:
         return 0.5
     times = 0.5 + np.cumsum(covariance[1:] / covariance[0])
-    inside = np.arange(1, len(times) + 1) >= 6.0 * times
-    return max(0.5, float(times[int(np.argmax(inside))] if inside.any() else times[-1]))
+    inside = np.arange(1, len(times) + 1) >= WINDOW * times
+    window = int(np.argmax(inside)) if inside.any() else len(times) - 1
+    return max(0.5, float(times[window]) * (1.0 + (2.0 * window + 1.0) / n))
 
 
 def host_ratio(host_s: Array, device_us: NDArray[np.int64]) -> tuple[float, float]:

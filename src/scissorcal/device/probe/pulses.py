@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import CLEARINGS
-from scissorcal.device.probe.talk import RELEASE, Answer, RunawayError, Stage, StalledError, Talk
+from scissorcal.device.probe.talk import (
+    RATE_OVER_S,
+    RELEASE,
+    Answer,
+    RunawayError,
+    Stage,
+    StalledError,
+    Talk,
+)
 from scissorcal.kernel import State, StateFlag
 
 AxisName = Literal["opening", "advance"]
@@ -15,15 +23,20 @@ AxisName = Literal["opening", "advance"]
 RAMP_S = 0.01
 HOLD_S = 0.02
 LONG_HOLD_S = 0.08
+BEFORE_S = 5e-3
 REST_S = 0.02
 """Blades that stay within a step for so long are at rest."""
 LONGEST_REST_S = 0.3
-GROWTH = 1.3
+GROWTH = 1.4
 """From one pulse to the next: breakaway is known to this factor."""
 FIRST_SHARE = 0.04
 """The first pulse, as a share of the largest."""
 MOVED_STEPS = 5
 MOVED_JITTERS = 8.0
+FIRST_CUT, FIRST_RATE = 0.08, 0.15
+"""Shares of the largest way and rate at which the first swing each way is cut."""
+REACH = 0.5
+"""Share of the largest way or rate that a swing shall reach, coasting included."""
 CUT_SHARE = 0.4
 """A pulse ends at this share of the largest way or rate; delay and coasting add the rest."""
 ATTEMPTS = 3
@@ -47,6 +60,15 @@ class Axis:
 
     def place(self, state: State) -> float:
         return float(state.opening if self.name == "opening" else state.advance)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Where a pulse ends: at this way or rate of the axis, or after this time."""
+
+    way: float
+    rate: float
+    hold_s: float
 
 
 @dataclass(frozen=True)
@@ -93,10 +115,11 @@ def stairs(talk: Talk, axis: Axis, first_sign: int) -> Stairs:
     found: dict[int, Pulse | None] = {1: None, -1: None}
     pulses: list[Pulse] = []
     effort = FIRST_SHARE * axis.effort
+    cut = Cut(axis.moved, CUT_SHARE * axis.rate, HOLD_S)
     while True:
         for sign in (first_sign, -first_sign):
             if found[sign] is None:
-                pulse = pulse_of(talk, axis, sign * effort, axis.moved, HOLD_S)
+                pulse = pulse_of(talk, axis, sign * effort, cut)
                 pulses.append(pulse)
                 found[sign] = pulse if pulse.moved else None
         if effort >= axis.effort or all(found.values()):
@@ -106,35 +129,53 @@ def stairs(talk: Talk, axis: Axis, first_sign: int) -> Stairs:
 
 def make_room(talk: Talk, axis: Axis, effort: float, pulses: int) -> None:
     """Push the same way until the axis is one largest way from where it was, or so many times."""
-    talk_from = talk.heard(talk.mark() - 1)[axis.name][0]
+    start = talk.heard(talk.mark() - 1)[axis.name][0]
+    cut = Cut(FIRST_CUT * axis.way, FIRST_RATE * axis.rate, HOLD_S)
     for _ in range(pulses):
-        pulse_of(talk, axis, effort, CUT_SHARE * axis.way, HOLD_S)
-        if abs(talk.heard(talk.mark() - 1)[axis.name][0] - talk_from) > axis.way:
+        pulse_of(talk, axis, effort, cut)
+        if abs(talk.heard(talk.mark() - 1)[axis.name][0] - start) > axis.way:
             return
 
 
 def swings(talk: Talk, axis: Axis, push: float, pull: float) -> tuple[Pulse, ...]:
     """Move both ways by turns with the efforts ``push`` > 0 > ``pull``, as far as the bounds let.
 
-    These motions tell inertia, friction and delay.
+    These motions tell inertia, friction and delay. How far the axis goes on after a pulse is not
+    known beforehand (it may be heavy, or the line slow), so each way begins with a small pulse, and
+    the next ones grow or shrink by what the last one reached.
     """
-    cut = CUT_SHARE * axis.way
-    return tuple(
-        pulse_of(talk, axis, share * effort, cut, LONG_HOLD_S)
-        for share in VARIED
-        for effort in (push, pull)
-    )
+    ways = {1: FIRST_CUT * axis.way, -1: FIRST_CUT * axis.way}
+    rates = {1: FIRST_RATE * axis.rate, -1: FIRST_RATE * axis.rate}
+    found = []
+    for share in VARIED:
+        for effort in (push, pull):
+            sign = 1 if effort > 0.0 else -1
+            cut = Cut(ways[sign], rates[sign], LONG_HOLD_S)
+            pulse = pulse_of(talk, axis, share * effort, cut)
+            found.append(pulse)
+            heard = talk.heard(pulse.begin)[axis.name]
+            reached = max(float(np.ptp(heard)) / axis.way, _fastest(talk, heard) / axis.rate)
+            grow = min(max(REACH / max(reached, 1e-3), 0.5), 3.0)
+            ways[sign] = min(grow * ways[sign], CUT_SHARE * axis.way)
+            rates[sign] = min(grow * rates[sign], CUT_SHARE * axis.rate)
+    return tuple(found)
 
 
-def pulse_of(talk: Talk, axis: Axis, effort: float, cut: float, hold_s: float) -> Pulse:
-    """Ramp to an effort, hold it until the axis has gone as far as ``cut``, and let it rest.
+def _fastest(talk: Talk, places: NDArray[np.float64]) -> float:
+    """The largest rate over a few ticks."""
+    span = min(talk.ticks(RATE_OVER_S), len(places) - 1)
+    return float(np.abs(places[span:] - places[:-span]).max()) / (span * talk.tick_s)
+
+
+def pulse_of(talk: Talk, axis: Axis, effort: float, cut: Cut) -> Pulse:
+    """Ramp to an effort, hold it until the cut, and let the axis come to rest.
 
     Repeated where a fault, lost frames or a stall of this computer disturbed it.
     """
     for attempt in range(ATTEMPTS):
         begin = talk.mark()
         try:
-            moved, at_effort = talk.play(_pulse(talk, axis, effort, cut, hold_s))
+            moved, at_effort = talk.play(_pulse(talk, axis, effort, cut))
         except StalledError:
             if attempt == ATTEMPTS - 1:
                 raise
@@ -148,12 +189,10 @@ def pulse_of(talk: Talk, axis: Axis, effort: float, cut: float, hold_s: float) -
     return found
 
 
-def _pulse(
-    talk: Talk, axis: Axis, effort: float, cut: float, hold_s: float
-) -> Stage[tuple[float, float]]:
+def _pulse(talk: Talk, axis: Axis, effort: float, cut: Cut) -> Stage[tuple[float, float]]:
     """One pulse; returns how far the axis went and the effort when it first moved."""
     state = yield Answer()
-    for _ in range(talk.ticks(REST_S)):
+    for _ in range(talk.ticks(BEFORE_S)):
         state = yield Answer(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
     for _ in range(CLEARINGS):
         if not state.flags & StateFlag.FAULT_LATCHED:
@@ -165,8 +204,8 @@ def _pulse(
             "motor supply, temperature) or restart the device."
         )
     start, place = axis.place(state), axis.place(state)
-    ramp, hold = talk.ticks(RAMP_S), talk.ticks(hold_s)
-    span = talk.ticks(4e-3)
+    ramp, hold = talk.ticks(RAMP_S), talk.ticks(cut.hold_s)
+    span = talk.ticks(RATE_OVER_S)
     places = [start] * (span + 1)
     first = 0.0
     for tick in range(ramp + hold):
@@ -177,7 +216,7 @@ def _pulse(
         rate = abs(place - places[-1 - span]) / (span * talk.tick_s)
         if not first and abs(place - start) >= axis.moved:
             first = asked
-        if abs(place - start) >= cut or rate >= CUT_SHARE * axis.rate:
+        if abs(place - start) >= cut.way or rate >= cut.rate:
             break
         if state.flags & StateFlag.FAULT_LATCHED:
             break
