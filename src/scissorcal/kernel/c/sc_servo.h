@@ -71,6 +71,8 @@ typedef struct {
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
     sc_watch_config watch;
+    float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
+                                  measured; everything else here is of corrected signs */
 } sc_servo_config;
 
 typedef struct {
