@@ -1,7 +1,7 @@
 """Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
     CaptureGains,
+    Probed,
     capture_gains,
 )
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
@@ -93,17 +94,21 @@ def capture_friction(
     progress: CaptureProgress | None = None,
     *,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
-    recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
-    faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. Gains follow from
+    ``probe`` (`capture_gains`). What was recorded stays in the writer, whatever happens. Raises
+    DeviceError where the rig fails (limits, faults that do not clear, an unplugged cable) or no
+    gains can control it, InputError where the recipe does not fit it.
     """
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    with _motion_for(link, recipe, plan) as motion:
+    gains = capture_gains(recipe, link.identity, "friction", Probed.of(probe))
+    with _motion_for(link, recipe, plan, gains) as motion:
+        _note_margin(writer, gains)
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
@@ -120,6 +125,7 @@ def capture_cut(
     hand: bool = False,
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive strokes through sheets (or presses), or record those of a hand.
 
@@ -131,8 +137,9 @@ def capture_cut(
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
+    gains = capture_gains(recipe, identity, "cut", Probed.of(probe))
     if hand:
-        with _motion_for(link, recipe, None) as motion:
+        with _motion_for(link, recipe, None, gains) as motion:
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
@@ -140,7 +147,8 @@ def capture_cut(
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan) as motion:
+    with _motion_for(link, recipe, plan, gains) as motion:
+        _note_margin(writer, gains)
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
@@ -190,7 +198,9 @@ def servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
-        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
+        watch=replace(
+            watches_of(identity, torque_limit, limits.held_at_limit_s), still_rad=control.still_rad
+        ),
         motor_sign=recipe.rig.motor_sign,
     )
 
@@ -269,10 +279,17 @@ class _Drive:
         return f"{stroke.kind}{speed} ({of})"
 
 
-def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0)
+def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
+
+
+def _note_margin(writer: RecordingWriter, gains: CaptureGains) -> None:
+    """Note in the recording what the controller's margin is, where it is not that of a design."""
+    for verdict in gains.verdicts:
+        if verdict.status != "pass":
+            writer.note(f"The {verdict.check} is not what it should be: {verdict.why}")
 
 
 def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
