@@ -20,7 +20,7 @@ def doctor(
 ) -> Answer:
     """Measure the port, the timer and the scheduler, and name the remedy for what is wrong.
 
-    No motor is enabled.
+    No motor is enabled. The virtual rig is served on a pseudo-terminal, in real time.
 
     \b
     Example:
@@ -30,10 +30,10 @@ def doctor(
     """
     from scissorcal.device.doctor import examine
     from scissorcal.recipe.schema import Line
-    from scissorcal.workday.rigs import open_rig
+    from scissorcal.workday.rigs import open_port
 
     line = Line(baud=baud) if baud else Line()
-    with open_rig(device, "office-paper", seed, line=line) as link:
+    with open_port(device, "office-paper", seed, line=line) as link:
         identity = link.identity
         with progress() as tell:
             found = examine(link, seconds, tell)

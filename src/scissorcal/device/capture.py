@@ -16,6 +16,7 @@ from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samp
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
@@ -146,8 +147,9 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
     samples only, so the fault is cleared, unless there are more than one per second.
     """
     limits, control = recipe.limits, recipe.rig.control
+    torque_limit = min(limits.torque_Nm, identity.torque_limit)
     return ServoConfig(
-        torque_limit=min(limits.torque_Nm, identity.torque_limit),
+        torque_limit=torque_limit,
         torque_slew=limits.torque_slew_Nm_per_s,
         force_limit=min(limits.force_N, identity.force_limit),
         force_slew=limits.force_slew_N_per_s,
@@ -166,6 +168,7 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
+        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
     )
 
 

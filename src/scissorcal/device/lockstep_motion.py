@@ -107,6 +107,7 @@ class LockstepMotion(Motion):
             interval=None,
             lag=FeltLag.of(self._servo.lag, self.tick_s, self._round_trip_s),
             rights=None,
+            watched=self._servo.watched,
         )
 
     def close(self) -> None:

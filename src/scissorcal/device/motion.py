@@ -5,9 +5,9 @@ in blocks, as they arrive.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,8 @@ class MotionReport:
     overwritten before they were read. ``latency`` (arrival of a frame to departure of its
     command) and ``interval`` (between frames) are in microseconds, None in virtual time. ``lag`` is
     what a hand feels of all delays; ``rights`` are what the system granted the loop, None in
-    virtual time.
+    virtual time. ``watched`` is the largest value that each watch has seen, as a share of what
+    stops.
     """
 
     counters: ServoCounters
@@ -54,6 +55,7 @@ class MotionReport:
     interval: Percentiles | None
     lag: FeltLag
     rights: LoopRights | None
+    watched: Mapping[str, float] = field(default_factory=dict)
 
 
 class Motion(AbstractContextManager["Motion"], ABC):

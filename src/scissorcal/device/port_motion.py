@@ -125,6 +125,7 @@ class PortMotion(Motion):
             interval=Percentiles.counted(block.interval),
             lag=FeltLag.of(block.lag, self.tick_s, self._process.round_trip_s),
             rights=LoopRights(*block.rights),
+            watched=block.watched,
         )
 
     def close(self) -> None:

@@ -41,11 +41,12 @@ from scissorcal.kernel.servo import (
     Servo,
     ServoConfig,
     ServoCounters,
-    StopReason,
 )
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
+from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table
+from scissorcal.kernel.watching import WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [
@@ -87,6 +88,7 @@ __all__ = [
     "StepOutput",
     "StopReason",
     "Table",
+    "WatchConfig",
     "ask_for_short_slice",
     "c_sources",
     "crc16",

@@ -17,6 +17,7 @@ HEADERS = (
     "sc_model.h",
     "sc_motion.h",
     "sc_lag.h",
+    "sc_watch.h",
     "sc_servo.h",
     "sc_block.h",
     "sc_loop.h",

@@ -22,11 +22,11 @@ from scissorcal.kernel.servo import (
     Mode,
     ServoConfig,
     ServoView,
-    StopReason,
     reference_arrays,
     refuse_change,
     refuse_mode,
 )
+from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
 
 RING_SAMPLES = int(lib.SC_RING_SAMPLES)

@@ -191,13 +191,17 @@ class Plate(Section):
 
 
 class Limits(Section):
-    """What the loop never exceeds, whatever the model says."""
+    """What the loop never exceeds, whatever the model says.
+
+    It stops where the torque has been at its limit for ``held_at_limit_s``, less the time below it.
+    """
 
     torque_Nm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)] = 1.0
     torque_slew_Nm_per_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)] = 200.0
     force_N: Annotated[float, Field(gt=0, le=1e5, allow_inf_nan=False)] = 30.0
     force_slew_N_per_s: Annotated[float, Field(gt=0, le=1e8, allow_inf_nan=False)] = 5000.0
     engagement_ramp_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] = 0.5
+    held_at_limit_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 2.0
 
 
 class CaptureFriction(Section):

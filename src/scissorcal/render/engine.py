@@ -10,6 +10,7 @@ from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
+from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
@@ -162,6 +163,7 @@ def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -
         force_N=min(recipe.force_N, own.force_N, identity.force_limit) if translates else 0.0,
         force_slew_N_per_s=min(recipe.force_slew_N_per_s, own.force_slew_N_per_s),
         engagement_ramp_s=max(recipe.engagement_ramp_s, own.engagement_ramp_s),
+        held_at_limit_s=(limits or Limits()).held_at_limit_s,
     )
 
 
@@ -179,6 +181,7 @@ def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) ->
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
+        watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s),
     )
 
 

@@ -30,6 +30,7 @@ class AppliedLimits:
     force_N: float
     force_slew_N_per_s: float
     engagement_ramp_s: float
+    held_at_limit_s: float
 
 
 @dataclass(frozen=True)
