@@ -36,7 +36,7 @@ SUPERVISOR_S = 0.3
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
+"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
 
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they open, and the sledge "
@@ -107,7 +107,9 @@ def capture_friction(
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         drive.follow(plan.segments[0])
+        drive.idle()
         return _finish(recorder, motion)
 
 
@@ -142,6 +144,7 @@ def capture_cut(
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)

@@ -245,6 +245,7 @@ def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
         if not fit.structure["symmetric"]:
             sides["coulomb_pos"] += sides["offset"]
             sides["coulomb_neg"] -= sides["offset"]
+            sides["offset"] = 0.0
             return sides
         truth = true_parameters(specimen, angle_center=center, symmetric=True)
         truth["offset"] += 0.5 * (sides["coulomb_pos"] - sides["coulomb_neg"])
