@@ -11,6 +11,7 @@ from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
     CaptureGains,
+    Probed,
     capture_gains,
 )
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
@@ -93,17 +94,20 @@ def capture_friction(
     progress: CaptureProgress | None = None,
     *,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. The gains follow
+    from ``probe`` where there is one; DeviceError where none could follow the plan. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
     faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
     """
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    with _motion_for(link, recipe, plan) as motion:
+    gains = _gains(link, recipe, "friction", probe, writer)
+    with _motion_for(link, recipe, plan, gains) as motion:
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
@@ -120,6 +124,7 @@ def capture_cut(
     hand: bool = False,
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive strokes through sheets (or presses), or record those of a hand.
 
@@ -131,8 +136,9 @@ def capture_cut(
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
+    gains = _gains(link, recipe, "cut", probe, writer)
     if hand:
-        with _motion_for(link, recipe, None) as motion:
+        with _motion_for(link, recipe, None, gains) as motion:
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
@@ -140,7 +146,7 @@ def capture_cut(
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan) as motion:
+    with _motion_for(link, recipe, plan, gains) as motion:
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
@@ -190,8 +196,8 @@ def servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
-        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
         motor_sign=recipe.rig.motor_sign,
+        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
     )
 
 
@@ -269,8 +275,29 @@ class _Drive:
         return f"{stroke.kind}{speed} ({of})"
 
 
-def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0)
+def _gains(
+    link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
+) -> CaptureGains:
+    """Gains by what the probe found; what is said of them is noted."""
+    probed = None
+    if probe and probe.inertia_kg_m2 and probe.delay_s and probe.coulomb_Nm:
+        viscous = probe.viscous_Nm_s_per_rad
+        probed = Probed(
+            inertia_kg_m2=probe.inertia_kg_m2.mean,
+            inertia_sd_kg_m2=probe.inertia_kg_m2.sd,
+            viscous_Nm_s_per_rad=viscous.mean if viscous else 0.0,
+            coulomb_Nm=probe.coulomb_Nm.mean,
+            delay_s=max(probe.delay_s.mean, 0.0),
+            delay_sd_s=probe.delay_s.sd,
+        )
+    gains = capture_gains(recipe, link.identity, kind, probed)
+    for verdict in gains.verdicts if probe else ():
+        writer.note(verdict.why)
+    return gains
+
+
+def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
 

@@ -70,9 +70,9 @@ typedef struct {
                                   the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
-    sc_watch_config watch;
     float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
                                   measured; everything else here is of corrected signs */
+    sc_watch_config watch;
 } sc_servo_config;
 
 typedef struct {

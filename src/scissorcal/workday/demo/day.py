@@ -229,10 +229,10 @@ def _capture(root: Path, seed: int) -> None:
     probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("friction")
     with open_writer(path, "friction", link, recipe, text, probe=probe) as writer:
-        capture_friction(link, recipe, writer)
+        capture_friction(link, recipe, writer, probe=probe)
     path = workspace.new_recording("cut")
     with open_writer(path, "cut", link, recipe, text, probe=probe) as writer:
-        capture_cut(link, recipe, writer)
+        capture_cut(link, recipe, writer, probe=probe)
     link.close()
 
 
