@@ -19,6 +19,7 @@ class StopReason(IntEnum):
     IMPLAUSIBLE = 10
     DEVICE_CLOCK = 11
     OVERSPEED = 12
+    RESTARTED = 13
     TORQUE_HELD = 32
     OSCILLATION = 33
     RUNAWAY = 34
@@ -76,14 +77,19 @@ _STOP_SENTENCES = {
         "The blades moved faster than any capture or hand moves them; check that the motor and "
         "its encoder have the same sense, and that nothing is loose."
     ),
+    StopReason.RESTARTED: (
+        "The device restarted: its sequence numbers fell back. Check its power supply and cable, "
+        "then start again."
+    ),
     StopReason.TORQUE_HELD: (
         "The motor's torque stayed at its limit. Check for an obstacle, or material that is too "
         "stiff for limits.torque_Nm; if the torque is meant, raise limits.held_at_limit_s."
     ),
     StopReason.OSCILLATION: (
         "The blades swung to and fro, driven by the loop itself: commands act too late, or the "
-        "gains or the rendered stiffness are too high for it, or the encoder is noisy. Run 'scissorcal device doctor' to "
-        "find what is late, or lower the gains in the recipe's rig.control."
+        "gains or the rendered stiffness are too high for it, or the encoder is noisy. Run "
+        "'scissorcal device doctor' to find what is late, or lower the gains in the recipe's "
+        "rig.control."
     ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "
