@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.recorder import unloaded_sentence
 from scissorcal.errors import ScissorcalError
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.library import builtin_recipe
@@ -77,8 +78,10 @@ def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = No
             else:
                 report = capture_friction(link, recipe, writer, confirm=confirm)
         tally = report.tally
-        lost = f"{tally.lost} frames lost, {tally.faults} faults"
-        return "done" if tally.lost + tally.faults == 0 else f"done; {lost}"
+        found = [f"{tally.lost} frames lost"] if tally.lost else []
+        found += [f"{tally.faults} faults"] if tally.faults else []
+        found += [unloaded_sentence(stroke) for stroke in report.empty[:1]]
+        return "; ".join(["done", *found])
 
     return _outcome(run, device, path)
 
