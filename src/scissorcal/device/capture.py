@@ -21,8 +21,9 @@ from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.recorder import Recorder, Tally, unloaded_sentence
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.unloaded import LoadWatch
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
@@ -47,12 +48,16 @@ CLEAR_REQUEST = (
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran.
+
+    ``empty`` are the closing strokes in which nothing was cut.
+    """
 
     sample_count: int
     coverage: CoverageGrid
     tally: Tally
     motion: MotionReport
+    empty: tuple[Stroke, ...] = ()
 
 
 def open_writer(
@@ -154,7 +159,7 @@ def capture_cut(
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)
-            loader.load(segment.request)
+            loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
         return _finish(recorder, motion)
@@ -240,6 +245,14 @@ class _Drive:
         self._tell = progress or _silent
         self._total = sum(len(segment.reference) for segment in plan.segments)
         self._done = 0
+        identity, cuts = motion.identity, any(stroke.sheet >= 0 for stroke in plan.strokes)
+        self._load = LoadWatch(plan.strokes, identity.handle_radius) if cuts else None
+        self._warned = 0
+
+    def warning(self) -> str:
+        """What to tell whoever loads the next piece about the last one; empty if it was cut."""
+        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
+        return f"{unloaded_sentence(empty[-1])} " if empty else ""
 
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
@@ -262,6 +275,9 @@ class _Drive:
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
+        for stroke in self._load.take(samples) if self._load and len(samples) else ():
+            self._recorder.unloaded(stroke)
+            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
         self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
@@ -308,7 +324,9 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     if report.rights:
         recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
-    return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
+    return CaptureReport(
+        recorder.sample_count, recorder.coverage, recorder.tally, report, tuple(recorder.empty)
+    )
 
 
 def _silent(done: float, sentence: str, recorder: Recorder) -> None:

@@ -37,6 +37,7 @@ enum {
     SC_STOP_IMPLAUSIBLE = 10,
     SC_STOP_DEVICE_CLOCK = 11,
     SC_STOP_OVERSPEED = 12,
+    SC_STOP_RESTARTED = 13,
     SC_STOP_WATCHED = 32 /* and above: by what a watch saw, SC_WATCH_... */
 };
 
