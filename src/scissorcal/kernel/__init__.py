@@ -24,10 +24,10 @@ from scissorcal.kernel.messages import (
     State,
     StateFlag,
 )
+from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    EnergyLedger,
     Mode,
     SampleFlag,
     Servo,
@@ -68,6 +68,7 @@ __all__ = [
     "Message",
     "Mode",
     "ModelTables",
+    "PassivityConfig",
     "SampleFlag",
     "Servo",
     "ServoConfig",

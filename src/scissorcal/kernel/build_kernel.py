@@ -16,6 +16,7 @@ HEADERS = (
     "sc_edge.h",
     "sc_model.h",
     "sc_motion.h",
+    "sc_passivity.h",
     "sc_servo.h",
     "sc_block.h",
     "sc_loop.h",

@@ -1,7 +1,7 @@
 """The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, field, fields
 from enum import IntEnum, IntFlag
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
+from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.wire import encode_frame
 
@@ -138,7 +139,8 @@ class ServoConfig:
     usable, nor are places that would need twice as fast a motion.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
-    more stops. Raises ValueError for a number that is not finite or below 0.
+    more stops. ``passivity`` watches the energy of RENDER. Raises ValueError for a number that is
+    not finite or below 0.
     """
 
     torque_limit: float
@@ -163,9 +165,10 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
+    passivity: PassivityConfig = field(default_factory=PassivityConfig)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
+        for field in _numbers(self):
             value = getattr(self, field.name)
             least = -WIDEST_OPENING if field.name in ("opening_low", "opening_high") else 0
             if not least <= value <= U32:  # NaN and infinity fail this too
@@ -180,32 +183,13 @@ class ServoConfig:
 
     def fill(self, struct: Any) -> None:
         """Copy every number into the C struct of the same field names."""
-        for field in fields(self):
+        for field in _numbers(self):
             setattr(struct, field.name, getattr(self, field.name))
+        self.passivity.fill(struct.passivity)
 
 
-@dataclass(frozen=True)
-class EnergyLedger:
-    """Joules since the start.
-
-    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest is the
-    model's energy while rendering: stored in the material now, taken by the cut
-    (kappa J_c h dX), lost by arresting cracks, taken by rendered friction.
-    """
-
-    delivered_J: float
-    stored_J: float
-    fracture_J: float
-    arrest_J: float
-    friction_J: float
-
-    @property
-    def created_J(self) -> float:  # noqa: N802  (J is the unit)
-        """Energy delivered beyond what the model absorbed; above 0 the rendering was not passive.
-
-        For runs that only rendered: tracking a reference delivers work as well.
-        """
-        return self.delivered_J + self.stored_J + self.fracture_J + self.arrest_J + self.friction_J
+def _numbers(config: ServoConfig) -> list[Field[Any]]:
+    return [field for field in fields(config) if field.name != "passivity"]
 
 
 @dataclass(frozen=True)

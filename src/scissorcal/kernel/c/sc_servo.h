@@ -16,6 +16,7 @@
 
 #include "sc_model.h"
 #include "sc_motion.h"
+#include "sc_passivity.h"
 #include "sc_wire.h"
 
 enum { SC_MODE_IDLE = 0, SC_MODE_TRACK = 1, SC_MODE_RENDER = 2, SC_MODE_DAMP = 3 };
@@ -67,6 +68,7 @@ typedef struct {
                                   the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
+    sc_passivity_config passivity;
 } sc_servo_config;
 
 typedef struct {
@@ -104,22 +106,11 @@ typedef struct {
     uint32_t latency_ns;
 } sc_sample;
 
-/* Joules since the start. delivered: work of the commanded torque and force on the mechanism. The
- * model's energies: stored in the material now, taken by cutting, lost by arrests, taken by
- * rendered friction. A passive rendering has delivered + stored + fracture + arrest + friction
- * <= 0, up to what sampling adds. */
-typedef struct {
-    double delivered_J;
-    double stored_J;
-    double fracture_J;
-    double arrest_J;
-    double friction_J;
-} sc_ledger;
-
 typedef struct {
     sc_motion motion;
     sc_crack crack;
-    sc_ledger ledger;
+    sc_ledger ledger; /* delivered in every mode; the rest while rendering */
+    sc_port port;
     sc_sample sample; /* of the last frame; host time and latency are the loop's to fill */
     sc_step_output step;
     uint32_t started;
