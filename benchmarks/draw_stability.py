@@ -2,7 +2,7 @@
 
     python -m benchmarks.draw_stability [--out docs/pictures]
 
-A grid of loops (`benchmarks/stability.py`): stiffness x delay x encoder x loop rate, for a rig alone
+Loops of `benchmarks/stability.py`: stiffness x delay x encoder x loop rate, for a rig alone
 and in a hand. Filled markers are the smallest stiffness at which the simulation oscillates or
 chatters; lines are what the rule admits. The same code gives the same file; it takes two minutes.
 """
@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
 from benchmarks.stability import COUNTS, Loops, simulate
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

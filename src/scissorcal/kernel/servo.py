@@ -1,7 +1,8 @@
 """The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
 
+import dataclasses
 import math
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
 from typing import Any
 
@@ -165,7 +166,7 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
-    passivity: PassivityConfig = field(default_factory=PassivityConfig)
+    passivity: PassivityConfig = dataclasses.field(default_factory=PassivityConfig)
 
     def __post_init__(self) -> None:
         for field in _numbers(self):
@@ -188,7 +189,7 @@ class ServoConfig:
         self.passivity.fill(struct.passivity)
 
 
-def _numbers(config: ServoConfig) -> list[Field[Any]]:
+def _numbers(config: ServoConfig) -> list[dataclasses.Field[Any]]:
     return [field for field in fields(config) if field.name != "passivity"]
 
 
