@@ -22,19 +22,15 @@ from scissorcal.render.admission_rule import (
     dissipation,
 )
 from scissorcal.render.derating import Needs, felt_change, needs_of, softened
+from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
-LATE_TICKS = 2.0
-"""Where no probe measured the delay: one tick for line and host, one for the motor."""
 LEAST_FACTOR = 0.05
 """A response twenty times as soft as the material's is another material: refused."""
 COUNTS_NEAR_REST = 4
 """Rendered friction builds up over at least so many counts: one count moves it by a quarter."""
-FAST_INERTIA_kg_m2 = 5e-5
-"""Where neither fit nor probe has the inertia: of small scissors, which damping disturbs first."""
 ENERGY_RATE = 0.75
 """The passivity controller waits for the energy that the rig has at this share of the
 oscillation's rate."""
-QUANTILE_SDS = 1.645
 
 
 @dataclass(frozen=True)
@@ -43,10 +39,10 @@ class Admission:
 
     ``allowed_alone`` and ``allowed_in_hand`` are the rule's stiffness without and with the hand's
     damping ``hand_damping_Nm_s_per_rad``; ``needed`` the package's largest over the scene, at
-    ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``factor`` is by how much the elastic slope was
-    multiplied (1: not derated), ``felt_share`` the relative rms change of mean torque that this
-    costs. ``friction_width_rad`` is over which opening rendered friction builds up. ``facts`` are
-    the rig's, None where its friction is not known: then nothing was checked. ``sources`` say where
+    ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``steepest_N_per_m``
+    is to what the response was limited (None: not derated), ``felt_share`` the relative rms change
+    of mean torque that this costs. ``friction_width_rad`` is over which opening rendered friction
+    builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was checked. ``sources`` say where
     each comes from, ``reasons`` what was done and why, ``cures`` what would make it unnecessary.
     """
 
@@ -58,7 +54,7 @@ class Admission:
     needed_at: tuple[float, float]
     rendered: float
     drop_Nm: float
-    factor: float
+    steepest_N_per_m: float | None
     felt_share: float
     friction_width_rad: float
     sources: tuple[str, ...]
@@ -73,22 +69,12 @@ class Admission:
     @property
     def derated(self) -> bool:
         """Whether the package is rendered softer than it is."""
-        return self.factor < 1.0
+        return self.steepest_N_per_m is not None
 
-
-@dataclass(frozen=True)
-class RigFacts:
-    """What is known of the rig itself, None where nobody measured it; see LoopFacts.
-
-    ``source`` says where friction and inertia come from, ``late_source`` the delay.
-    """
-
-    coulomb_Nm: float | None = None
-    damping_Nm_s_per_rad: float | None = None
-    inertia_kg_m2: float | None = None
-    late_s: float | None = None
-    source: str = ""
-    late_source: str = ""
+    @property
+    def factor(self) -> float:
+        """Rendered over needed stiffness."""
+        return self.rendered / self.needed if self.needed > 0.0 else 1.0
 
 
 def admit(
@@ -104,17 +90,15 @@ def admit(
         return _unchecked(needs, hand)
     rate = max(rate, OSCILLATION_RATE)
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
-    width = _friction_width(needs, facts, held)
-    factor, left = _soften(tables, needs.stiffness, held, limit)
+    steepest, left = _soften(tables, needs.stiffness, held, limit)
     cures = _cures(facts, hand, rate, needs)
-    if factor < LEAST_FACTOR:
+    if left > held or left < LEAST_FACTOR * needs.stiffness:
         raise InputError(
             f"This rig cannot render the package stably: {needs.stiffness:.3g} N m/rad are needed "
             f"and {held:.2g} N m/rad allowed in a hand, which would leave less than "
-            f"{LEAST_FACTOR:.0%} of the elastic slope. {' '.join(cures)}"
+            f"{LEAST_FACTOR:.0%} of the elastic slope. What would cure it: {' '.join(cures)}"
         )
-    felt = felt_change(tables, softened(tables, factor)) if factor < 1.0 else 0.0
-    reasons = _reasons(needs, facts, alone, held, factor, felt)
+    felt = 0.0 if steepest is None else felt_change(tables, softened(tables, steepest), limit)
     return Admission(
         facts=facts,
         hand_damping_Nm_s_per_rad=hand,
@@ -124,12 +108,12 @@ def admit(
         needed_at=(needs.opening, needs.contact),
         rendered=left,
         drop_Nm=needs.drop_Nm,
-        factor=factor,
+        steepest_N_per_m=steepest,
         felt_share=felt,
-        friction_width_rad=width,
+        friction_width_rad=_friction_width(needs, facts, held),
         sources=(),
-        reasons=reasons,
-        cures=cures if factor < 1.0 else (),
+        reasons=_reasons(needs, facts, (alone, held), left, felt),
+        cures=() if steepest is None else cures,
     )
 
 
@@ -150,7 +134,8 @@ def admit_package(
 
 def rendered_tables(tables: ModelTables, admission: Admission) -> ModelTables:
     """What the loop renders of ``tables`` under an admission."""
-    return softened(tables, admission.factor) if admission.derated else tables
+    steepest = admission.steepest_N_per_m
+    return tables if steepest is None else softened(tables, steepest)
 
 
 def passivity_config(admission: Admission, cutoff_Hz: float) -> PassivityConfig:
@@ -174,63 +159,12 @@ def passivity_config(admission: Admission, cutoff_Hz: float) -> PassivityConfig:
     )
 
 
-def rig_facts(package: ModelPackage) -> RigFacts:
-    """Friction and inertia of the rig, from the friction fit in a package.
-
-    Levels are the lower ends of the 90 % intervals, of the weaker direction and the opening where
-    friction is least.
-    """
-    record = package.manifest.provenance.friction
-    if record is None:
-        return RigFacts()
-    lower = {parameter.name: parameter.q05 for parameter in record.parameters}
-    middle = {parameter.name: parameter.value for parameter in record.parameters}
-    least = float(package.tables.friction_angle.y.min())
-    return RigFacts(
-        coulomb_Nm=least * _weakest(lower, "coulomb"),
-        damping_Nm_s_per_rad=least * _weakest(lower, "viscous"),
-        inertia_kg_m2=middle.get("inertia"),
-        source="the package's friction fit",
-    )
-
-
-def loop_facts(identity: Identity, rig: RigFacts) -> tuple[LoopFacts | None, tuple[str, ...]]:
-    """Join what the device states and what is known of the rig; None without its friction."""
-    if rig.coulomb_Nm is None:
-        return None, ()
-    tick_s = identity.tick_us * 1e-6
-    late_s = LATE_TICKS * tick_s if rig.late_s is None else rig.late_s
-    inertia = rig.inertia_kg_m2 or FAST_INERTIA_kg_m2
-    late = rig.late_source or f"assumed, {LATE_TICKS:g} ticks: no probe measured it"
-    known = rig.source if rig.inertia_kg_m2 else "assumed, of small scissors"
-    sources = (
-        f"friction: {rig.coulomb_Nm * 1e3:.3g} mN m dry and "
-        f"{(rig.damping_Nm_s_per_rad or 0.0) * 1e3:.3g} mN m s/rad viscous ({rig.source})",
-        f"delay: {late_s * 1e3:.3g} ms ({late})",
-        f"inertia: {inertia:.2g} kg m^2 ({known})",
-        f"encoder step: {identity.opening_resolution:.2g} rad (device)",
-    )
-    return LoopFacts(
-        tick_s=tick_s,
-        late_s=late_s,
-        inertia_kg_m2=inertia,
-        damping_Nm_s_per_rad=rig.damping_Nm_s_per_rad or 0.0,
-        coulomb_Nm=rig.coulomb_Nm,
-        encoder_step_rad=identity.opening_resolution,
-    ), sources
-
-
 def _hand_damping(package: ModelPackage) -> float:
     """The hand's damping of the opening, as the recipe in the package states it, N m s/rad."""
     rig = json.loads(package.manifest.provenance.recipe)["rig"]
     mechanics = package.manifest.mechanics
     damping = float(rig.get("hand_damping_N_s_per_m", 0.0))
     return damping * mechanics.handle_radius_m**2 / mechanics.moving_blades
-
-
-def _weakest(levels: dict[str, float], term: str) -> float:
-    found = [value for name, value in levels.items() if name.startswith(term)]
-    return max(0.0, min(found, default=0.0))
 
 
 def _unchecked(needs: Needs, hand: float) -> Admission:
@@ -243,7 +177,7 @@ def _unchecked(needs: Needs, hand: float) -> Admission:
         needed_at=(needs.opening, needs.contact),
         rendered=needs.stiffness,
         drop_Nm=needs.drop_Nm,
-        factor=1.0,
+        steepest_N_per_m=None,
         felt_share=0.0,
         friction_width_rad=0.0,
         sources=(),
@@ -264,33 +198,36 @@ def _friction_width(needs: Needs, facts: LoopFacts, allowed: float) -> float:
 
 def _soften(
     tables: ModelTables, needed: float, allowed: float, limit: float
-) -> tuple[float, float]:
-    """By how much to soften, and the stiffness that is left.
+) -> tuple[float | None, float]:
+    """The steepest response that is allowed (N/m, None for all) and the stiffness that is left.
 
-    Levers change with depth, so that the slope does not fall by the factor alone.
+    In steps, as levers change with the depth.
     """
-    factor = 1.0
-    while needed > allowed and factor >= LEAST_FACTOR:
-        factor *= max(0.999 * allowed / needed, 0.5)
-        needed = needs_of(softened(tables, factor), limit).stiffness
-    return factor, needed
+    steepest, left = float(tables.response.slope.max()), needed
+    if needed <= allowed:
+        return None, needed
+    while left > allowed and left > LEAST_FACTOR * needed:
+        steepest *= max(0.999 * allowed / left, 0.5)
+        left = needs_of(softened(tables, steepest), limit).stiffness
+    return steepest, left
 
 
 def _reasons(
-    needs: Needs, facts: LoopFacts, alone: float, held: float, factor: float, felt: float
+    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], left: float, felt: float
 ) -> tuple[str, ...]:
     place = f"{math.degrees(needs.opening):.0f} deg, contact {needs.contact * 1e3:.0f} mm"
     found = (
         f"The package needs up to {needs.stiffness:.3g} N m/rad (at {place}); this rig renders "
-        f"{alone:.2g} N m/rad stably alone and {held:.2g} N m/rad in a hand, at "
+        f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "
         f"{facts.delay_s * 1e3:.2g} ms of delay."
     )
-    if factor == 1.0:
+    if left == needs.stiffness:
         return (found,)
+    share = left / needs.stiffness
     return (
         found,
-        f"The elastic slope is rendered at {factor:.0%} of the material's, which changes the mean "
-        f"torque of a stroke by {felt:.1%}; the fracture energy is unchanged.",
+        f"The steepest elastic slope is rendered at {share:.0%}, which changes the "
+        f"mean torque of a stroke by {felt:.1%}; the fracture energy is unchanged.",
     )
 
 

@@ -71,27 +71,31 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
     return found
 
 
-def softened(tables: ModelTables, factor: float) -> ModelTables:
-    """The same model with every elastic slope at ``factor`` (0 to 1) of its value.
+def softened(tables: ModelTables, steepest: float) -> ModelTables:
+    """The same model with a response that is nowhere steeper than ``steepest`` (N/m).
 
-    The response is stretched along the indentation: each force is reached at an indentation 1 /
-    ``factor`` times as deep. Fracture energy and arrest ratio stay, and with them the forces at
-    which cracks start and stop, and the work of a cut.
+    Where it was steeper it becomes straight, so that a force is reached at a greater indentation.
+    Gentle parts stay as they are, and so do fracture energy and arrest ratio: with them the forces
+    at which cracks start and stop, and the work of a cut. Raises ValueError unless steepest > 0.
     """
-    if not 0.0 < factor <= 1.0:
-        raise ValueError(f"A factor of derating lies above 0 and at most at 1, not at {factor}.")
+    if not steepest > 0.0:
+        raise ValueError(f"The steepest slope of a response is above 0, not {steepest}.")
     response = tables.response
-    stretched = Table(response.x / factor, response.y, response.slope * factor)
-    return replace(tables, response=stretched)
+    x, y = response.x.astype(np.float64), response.y.astype(np.float64)
+    width = np.maximum(np.diff(x), np.diff(y) / steepest)
+    place = np.concatenate([[0.0], np.cumsum(width)]).astype(np.float32)
+    slope = np.minimum(response.slope, np.float32(steepest))
+    return replace(tables, response=Table(place, response.y, slope))
 
 
-def felt_change(tables: ModelTables, other: ModelTables) -> float:
+def felt_change(tables: ModelTables, other: ModelTables, torque_limit: float) -> float:
     """Relative rms difference of torque, averaged over its ripple, in one closing stroke.
 
-    The blades close over the scene's openings on a sheet whose near edge is at the scene's
-    nearest contact; torque is averaged in 25 bins of opening. Zero where no torque is felt.
+    Torque is held to its limit, as it is rendered, and averaged in 25 bins of opening. The blades
+    close over the scene's openings: on a sheet whose near edge is at the scene's nearest contact,
+    or, where nothing is cut, at the middle of its contacts. Zero where no torque is felt.
     """
-    one, two = (_stroke(each) for each in (tables, other))
+    one, two = (np.minimum(_stroke(each), torque_limit) for each in (tables, other))
     felt = one > LEAST_SHARE * one.max()
     if not felt.any() or one.max() <= 0.0:
         return 0.0
@@ -101,7 +105,8 @@ def felt_change(tables: ModelTables, other: ModelTables) -> float:
 def _stroke(tables: ModelTables) -> Array:
     quiet = replace(tables, render_friction=False)
     kernel = Kernel(quiet)
-    kernel.reset(tables.contact_min)
+    pressed = 0.5 * (tables.contact_min + tables.contact_max)
+    kernel.reset(tables.contact_min if tables.fracture_energy > 0.0 else pressed)
     opening = np.linspace(tables.opening_max, tables.opening_min, STROKE_TICKS)
     torque = kernel.step_many(opening, 0.0, 0.0)["torque"].astype(np.float64)
     return np.asarray(torque.reshape(BINS, -1).mean(axis=1))

@@ -20,12 +20,12 @@ from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter, label_strokes
 from scissorcal.render.admission import (
     Admission,
-    RigFacts,
     admit_package,
     passivity_config,
     rendered_tables,
 )
 from scissorcal.render.result import AppliedLimits, RenderResult, latency_of, render_verdicts
+from scissorcal.render.rig_facts import RigFacts
 
 Progress = Callable[[float, str], None]
 
