@@ -88,7 +88,7 @@ class Rig(Section):
     ``opening_zero_sd_deg`` says how well the zero of the opening (where the centrelines of the
     blades meet) is known, as by a homing switch; half a millimetre at each tip where not given.
     ``hand_damping_N_s_per_m`` is what a hand adds to each handle at least, and what a rendering
-    counts on; 0 asks for stability without a hand. The default is chosen: half of what an arm shows
+    counts on; 0 asks for stability without a hand. The default is chosen: below what an arm showed
     (6.5 N s/m, doi:10.1038/srep18004).
     """
 
@@ -96,7 +96,7 @@ class Rig(Section):
     moving: Literal["both", "upper"] = "both"
     handle_radius_mm: Length_mm = 60.0
     opening_zero_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] | None = None
-    hand_damping_N_s_per_m: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 3.0
+    hand_damping_N_s_per_m: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 4.0
     edge: Edge
     control: Control = Control()
 

@@ -42,8 +42,9 @@ class Admission:
     ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``steepest_N_per_m``
     is to what the response was limited (None: not derated), ``felt_share`` the relative rms change
     of mean torque that this costs. ``friction_width_rad`` is over which opening rendered friction
-    builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was checked. ``sources`` say where
-    each comes from, ``reasons`` what was done and why, ``cures`` what would make it unnecessary.
+    builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was
+    checked. ``sources`` say where each comes from, ``reasons`` what was done and why, ``cures``
+    what would make it unnecessary.
     """
 
     facts: LoopFacts | None

@@ -102,10 +102,12 @@ static float injected(const sc_passivity_config *config, const sc_port *port,
 float sc_port_render(const sc_passivity_config *config, sc_port *port, sc_ledger *ledger,
                      const sc_port_tick *tick, const sc_step_output *step)
 {
-    if (!port->started) { /* nothing was rendered over the way to here */
+    if (!port->started) { /* nothing was rendered over the way to here: no motion paid for it */
         port->share = tick->share;
         port->model_J = step->stored_J;
-        ledger->engaged_J += (double)tick->share * (double)step->stored_J;
+        ledger->engaged_J += (double)tick->share * ((double)step->stored_J +
+                                                    (double)step->fracture_J +
+                                                    (double)step->arrest_J);
         port->given_torque = port->given_force = port->friction = 0.0f;
         port->limited_torque = port->limited_force = port->injected = 0.0f;
         port->started = 1;

@@ -6,7 +6,8 @@
  *   delivered + stored + fracture + arrest + friction = engaged + limited + late + injected
  *
  * up to what sampling of the model leaves. delivered: work of the motors' torque, as measured where
- * the device measures one; engaged: what raising the ramp puts into material that is pressed;
+ * the device measures one; engaged: what engaging in pressed material and raising the ramp there
+ * put into it;
  * limited: work that torque and force limits keep back (negative where they do); injected: work of
  * the controller's damping (negative); late: work that the motors did beyond what was commanded at
  * each sample, by holding, delay, lag, slews and errors of gain and sign. A loop whose late work is
