@@ -190,7 +190,7 @@ def test_a_soft_rendering_is_stated_and_the_cut_keeps_its_energy(
     assert not any("elastic slope" in sentence for sentence in quick.warnings)
     assert slow.ledger.injected_J == quick.ledger.injected_J == 0.0
     assert abs(slow.ledger.unbooked_J) < 1e-3 * slow.ledger.absorbed_J
-    assert slow.ledger.fracture_J == pytest.approx(quick.ledger.fracture_J, rel=0.05)
+    assert slow.ledger.fracture_J == pytest.approx(quick.ledger.fracture_J, rel=0.1)
 
 
 def test_a_rig_that_cannot_render_a_package_is_refused_before_anything_moves(
