@@ -6,15 +6,11 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scissorcal.cli.root import run
-from scissorcal.device.lockstep import LockstepLink
 from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
@@ -172,27 +168,7 @@ def simulated(line: str) -> list[str]:
     return [str(EMPS) if word == EMPS.name else word for word in words]
 
 
-class SimInVirtualTime:
-    """A virtual rig whose port is a link in virtual time: no test waits for the clock."""
-
-    def __init__(self, specimen: str, seed: int = 0) -> None:
-        self.port = LockstepLink(specimen, np.random.default_rng(seed))
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self.port.close()
-
-
-@contextmanager
-def given_link(port: LockstepLink) -> Iterator[LockstepLink]:
-    yield port
-
-
 def run_block(lines: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("scissorcal.device.sim.process.SimProcess", SimInVirtualTime)
-    monkeypatch.setattr("scissorcal.device.link.open_link", given_link)
     monkeypatch.chdir(folder)
     for line in lines:
         words = simulated(line)

@@ -109,6 +109,11 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),
     "device lost frames": ("at most", f"{_LOOP}: frames lost, %"),
     "device latency timer": ("at most", f"{_LOOP}: ms that the adapter holds data back"),
+    "device control margin": (
+        "at least",
+        "whether the rig follows a capture without swinging: phase margin of its controller, "
+        "degrees",
+    ),
     "device drift": (
         "at most",
         "rates and accelerations: error of the device's clock beyond two standard errors, ppm",

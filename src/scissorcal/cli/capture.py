@@ -1,5 +1,6 @@
 """``scissorcal capture``"""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -7,7 +8,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Seed, Yes
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import ScissorcalError
 
@@ -47,7 +48,14 @@ def capture() -> None:
 
 
 @command
-def friction(device: Device, yes: Yes = False, seed: Seed = 0, folder: Folder = None) -> Answer:
+def friction(
+    device: Device,
+    realtime: Realtime = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    baud: Baud = None,
+    folder: Folder = None,
+) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
     Keep the space between the blades empty: the motors move them.
@@ -59,7 +67,8 @@ def friction(device: Device, yes: Yes = False, seed: Seed = 0, folder: Folder = 
       80 of 80 cells filled
       ...
     """
-    return _capture("friction", device, hand=False, yes=yes, seed=seed, folder=folder)
+    rig = _Rig(device, seed, realtime, baud)
+    return _capture("friction", rig, hand=False, yes=yes, folder=folder)
 
 
 @command
@@ -68,8 +77,10 @@ def cut(
     hand: Annotated[
         bool, typer.Option("--hand", help="Motor off: a person (or the virtual hand) cuts.")
     ] = False,
+    realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
@@ -83,11 +94,20 @@ def cut(
       24 of 24 cells filled
       ...
     """
-    return _capture("cut", device, hand=hand, yes=yes, seed=seed, folder=folder)
+    rig = _Rig(device, seed, realtime, baud)
+    return _capture("cut", rig, hand=hand, yes=yes, folder=folder)
+
+
+@dataclass(frozen=True)
+class _Rig:
+    device: str
+    seed: int
+    realtime: bool
+    baud: int | None
 
 
 def _capture(
-    kind: "CaptureKind", device: str, *, hand: bool, yes: bool, seed: int, folder: Path | None
+    kind: "CaptureKind", rig: _Rig, *, hand: bool, yes: bool, folder: Path | None
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
     from scissorcal.workday.runs.capture import capture_into
@@ -99,9 +119,11 @@ def _capture(
             captured = capture_into(
                 workspace,
                 kind,
-                device,
+                rig.device,
                 hand=hand,
-                seed=seed,
+                seed=rig.seed,
+                baud=rig.baud,
+                realtime=rig.realtime,
                 progress=view.show,
                 confirm=view.confirm,
             )
@@ -135,6 +157,9 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
             f"reply to a frame: {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
             f"{latency.worst:.0f} us (worst)"
         )
+    lines.append(report.motion.lag.sentence)
+    if report.motion.rights is not None:
+        lines.append(report.motion.rights.sentence)
     return "\n".join(lines)
 
 

@@ -28,6 +28,20 @@ Device = Annotated[
     ),
 ]
 
+Baud = Annotated[
+    int | None,
+    typer.Option("--baud", min=9600, max=12_000_000, help="Baud rate, if not the recipe's."),
+]
+
+Realtime = Annotated[
+    bool,
+    typer.Option(
+        "--realtime",
+        help="Serve the virtual rig on a pseudo-terminal, in real time; otherwise --device sim "
+        "runs in virtual time.",
+    ),
+]
+
 Yes = Annotated[
     bool,
     typer.Option("--yes", help="Ask no questions: the blades are clear, or material is loaded."),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Seed, Yes, positive
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
@@ -30,21 +30,23 @@ def render(
         float, typer.Option(callback=positive, help="Speed of the virtual hand.")
     ] = 0.3,
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
+    realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
 
     The loop runs in C, in a separate process, within the recipe's limits. With --device sim a
-    virtual hand makes the strokes.
+    virtual hand makes the strokes, in virtual time unless --realtime is given.
 
     \b
     Example:
       $ scissorcal render --device sim
       rendered 4 strokes in 15.9 s on scissorcal-sim office-paper
       ...
-      0 frames missed, 0 garbled, 20 stalls, 0 faults; 0.0 % of the frames at a limit
+      0 frames missed, 0 garbled, 0 stalls, 0 faults; 0.0 % of the frames at a limit
       ...
     """
     from scissorcal.cli.live_view import LiveView
@@ -63,6 +65,8 @@ def render(
             strokes=VirtualStrokes(strokes, rate_rad_per_s),
             record=not no_record,
             seed=seed,
+            baud=baud,
+            realtime=realtime,
             progress=view.show,
             confirm=view.confirm,
         )
@@ -81,6 +85,9 @@ def _text(rendered: "Rendered") -> str:
         rows = [["latency (us)", "p50", "p99", "p99.9", "worst"]]
         rows.append(["", *(f"{value:.0f}" for value in (at.p50, at.p99, at.p999, at.worst))])
         lines += ["", table(rows, right=[1, 2, 3, 4])]
+    lines += ["", result.lag.sentence]
+    if result.rights is not None:
+        lines.append(result.rights.sentence)
     lines += [
         "",
         f"{result.misses} frames missed, {result.garbled} garbled, {result.stalls} stalls, "

@@ -7,6 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from scissorcal.device.capture_gains import (
+    ADVANCE_ERROR_M,
+    OPENING_ERROR_RAD,
+    CaptureGains,
+    capture_gains,
+)
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_strokes, hand_travel
@@ -16,6 +22,7 @@ from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samp
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
@@ -23,12 +30,10 @@ from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
 CaptureProgress = Callable[[float, str, Recorder], None]
 """Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
-SUPERVISOR_S = 1.0
-RATE_CUTOFF_HZ = 120.0
+SUPERVISOR_S = 0.3
+"""Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
-OPENING_ERROR_RAD = 0.3
-ADVANCE_ERROR_M = 0.02
 IDLE_S = 1.5
 """Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
 
@@ -138,26 +143,35 @@ def capture_cut(
         return _finish(recorder, motion)
 
 
-def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) -> ServoConfig:
+def servo_config(
+    recipe: Recipe,
+    identity: Identity,
+    duration_s: float = 0.0,
+    gains: CaptureGains | None = None,
+) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
+
+    ``gains`` are those of `capture_gains`, by default those of a rig that nobody probed.
 
     A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
     samples only, so the fault is cleared, unless there are more than one per second.
     """
-    limits, control = recipe.limits, recipe.rig.control
+    limits = recipe.limits
+    torque_limit = min(limits.torque_Nm, identity.torque_limit)
+    control = gains or capture_gains(recipe, identity, "cut", None)
     return ServoConfig(
-        torque_limit=min(limits.torque_Nm, identity.torque_limit),
+        torque_limit=torque_limit,
         torque_slew=limits.torque_slew_Nm_per_s,
         force_limit=min(limits.force_N, identity.force_limit),
         force_slew=limits.force_slew_N_per_s,
         ramp_s=limits.engagement_ramp_s,
-        rate_cutoff_Hz=RATE_CUTOFF_HZ,
-        opening_kp=control.opening_kp_Nm_per_rad,
-        opening_kd=control.opening_kd_Nm_s_per_rad,
-        opening_ki=control.opening_ki_Nm_per_rad_s,
-        advance_kp=control.advance_kp_N_per_m,
-        advance_kd=control.advance_kd_N_s_per_m,
-        advance_ki=control.advance_ki_N_per_m_s,
+        rate_cutoff_Hz=control.rate_cutoff_Hz,
+        opening_kp=control.opening.kp,
+        opening_kd=control.opening.kd,
+        opening_ki=control.opening.ki,
+        advance_kp=control.advance.kp,
+        advance_kd=control.advance.kd,
+        advance_ki=control.advance.ki,
         opening_error_limit=OPENING_ERROR_RAD,
         advance_error_limit=ADVANCE_ERROR_M,
         opening_low=identity.opening_min - STOP_MARGIN_RAD,
@@ -165,6 +179,7 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
+        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
     )
 
 
@@ -237,6 +252,9 @@ def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
 
 def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     report = motion.report()
+    recorder.writer.note(report.lag.sentence)
+    if report.rights:
+        recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
     return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
 

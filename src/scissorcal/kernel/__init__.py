@@ -7,7 +7,15 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihood,
     cut_log_likelihoods,
 )
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.lag import LagCounts
+from scissorcal.kernel.loop import (
+    Histogram,
+    LoopBlock,
+    LoopCounters,
+    ask_for_short_slice,
+    lock_memory,
+    run_loop,
+)
 from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -33,11 +41,12 @@ from scissorcal.kernel.servo import (
     Servo,
     ServoConfig,
     ServoCounters,
-    StopReason,
 )
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
+from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table
+from scissorcal.kernel.watching import WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [
@@ -63,6 +72,7 @@ __all__ = [
     "Histogram",
     "Identity",
     "Kernel",
+    "LagCounts",
     "LoopBlock",
     "LoopCounters",
     "Message",
@@ -79,6 +89,8 @@ __all__ = [
     "StepOutput",
     "StopReason",
     "Table",
+    "WatchConfig",
+    "ask_for_short_slice",
     "c_sources",
     "crc16",
     "cut_log_likelihood",
@@ -86,6 +98,7 @@ __all__ = [
     "decode",
     "encode",
     "encode_frame",
+    "lock_memory",
     "presliding_path",
     "run_loop",
     "walk_crack",

@@ -35,6 +35,10 @@ class PassivityConfig:
             setattr(struct, field.name, getattr(self, field.name))
 
 
+UNWATCHED_ENERGY = PassivityConfig()
+"""Books alone, with the commanded torque."""
+
+
 @dataclass(frozen=True)
 class EnergyLedger:
     """Joules since the start; all but ``delivered_J`` while rendering.

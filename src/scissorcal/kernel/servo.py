@@ -1,8 +1,7 @@
 """The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
 
-import dataclasses
 import math
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from enum import IntEnum, IntFlag
 from typing import Any
 
@@ -10,10 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
-from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
+from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
+from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
+from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")
@@ -49,71 +51,6 @@ class Mode(IntEnum):
     DAMP = 3
 
 
-class StopReason(IntEnum):
-    """Why a servo or a loop stopped; ``sentence`` states it with the remedy."""
-
-    NONE = 0
-    ASKED = 1
-    SUPERVISOR_LOST = 2
-    DEVICE_FAULT = 3
-    ENCODER_FAULT = 4
-    TRACKING_LOST = 5
-    HANGUP = 6
-    SILENCE = 7
-    LINE_ERROR = 8
-    BAD_BLOCK = 9
-    IMPLAUSIBLE = 10
-    DEVICE_CLOCK = 11
-    OVERSPEED = 12
-
-    @property
-    def sentence(self) -> str:
-        """What happened and what to look at, as a whole sentence."""
-        return _STOP_SENTENCES[self]
-
-
-_STOP_SENTENCES = {
-    StopReason.NONE: "The loop has not stopped.",
-    StopReason.ASKED: "The loop stopped because it was asked to.",
-    StopReason.SUPERVISOR_LOST: (
-        "The loop stopped because the heartbeat of its supervising process was missing. Check why "
-        "that process hung or died, then start again."
-    ),
-    StopReason.DEVICE_FAULT: (
-        "The device latched a fault that did not clear, or latched faults too often. Remove the "
-        "cause; if the computer answers late, close programs that load it or raise BRAKE_AFTER_MS; "
-        "then start again."
-    ),
-    StopReason.ENCODER_FAULT: (
-        "The device reports a fault of its encoder; check the encoder and its cable."
-    ),
-    StopReason.TRACKING_LOST: (
-        "The blades did not follow the commanded motion; check for an obstacle, a stuck "
-        "encoder or gains that are too weak."
-    ),
-    StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
-    StopReason.SILENCE: (
-        "The device stopped sending STATE frames; check its power and the cable, then start again."
-    ),
-    StopReason.LINE_ERROR: "Reading or writing the port failed; check the port and start again.",
-    StopReason.BAD_BLOCK: (
-        "The loop refused its parameters: a limit, gain or table is not a finite number. Check the "
-        "recipe's limits and rig.control."
-    ),
-    StopReason.IMPLAUSIBLE: (
-        "The device reported openings or advances beyond its stops, not finite, or too far apart "
-        "for any motion, four frames in a row; check the encoders and their cables."
-    ),
-    StopReason.DEVICE_CLOCK: (
-        "The device's clock (device_us) stood still for 20 frames; restart the device."
-    ),
-    StopReason.OVERSPEED: (
-        "The blades moved faster than any capture or hand moves them; check that the motor and "
-        "its encoder have the same sense, and that nothing is loose."
-    ),
-}
-
-
 class SampleFlag(IntFlag):
     """A sample's ``flags`` above bit 15; below are the device's own (StateFlag).
 
@@ -140,8 +77,8 @@ class ServoConfig:
     usable, nor are places that would need twice as fast a motion.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
-    more stops. ``passivity`` watches the energy of RENDER. Raises ValueError for a number that is
-    not finite or below 0.
+    more stops. ``watch`` has the thresholds of the watches, by default none; ``passivity`` watches
+    the energy of RENDER. Raises ValueError for a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -166,10 +103,11 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
-    passivity: PassivityConfig = dataclasses.field(default_factory=PassivityConfig)
+    watch: WatchConfig = NO_WATCHES
+    passivity: PassivityConfig = UNWATCHED_ENERGY
 
     def __post_init__(self) -> None:
-        for field in _numbers(self):
+        for field in self._numbers():
             value = getattr(self, field.name)
             least = -WIDEST_OPENING if field.name in ("opening_low", "opening_high") else 0
             if not least <= value <= U32:  # NaN and infinity fail this too
@@ -184,13 +122,13 @@ class ServoConfig:
 
     def fill(self, struct: Any) -> None:
         """Copy every number into the C struct of the same field names."""
-        for field in _numbers(self):
+        for field in self._numbers():
             setattr(struct, field.name, getattr(self, field.name))
+        self.watch.fill(struct.watch)
         self.passivity.fill(struct.passivity)
 
-
-def _numbers(config: ServoConfig) -> list[dataclasses.Field[Any]]:
-    return [field for field in fields(config) if field.name != "passivity"]
+    def _numbers(self) -> list[Field[Any]]:
+        return [field for field in fields(self) if field.name not in ("watch", "passivity")]
 
 
 @dataclass(frozen=True)
@@ -247,6 +185,16 @@ class ServoView:
     def ledger(self) -> EnergyLedger:
         ledger = self._servo.ledger
         return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
+
+    @property
+    def lag(self) -> LagCounts:
+        """Lags so far, by the mode in force."""
+        return LagCounts.of(self._servo.lag)
+
+    @property
+    def watched(self) -> dict[str, float]:
+        """The largest value that each watch has seen, as a share of its threshold; 1 stops."""
+        return largest_seen(self._servo.watch)
 
     @property
     def counters(self) -> ServoCounters:

@@ -111,7 +111,9 @@ def build_package(
             name=recipe.name,
             units=units_of(compiled.mechanics),
             ranges=ranges,
-            limits=Limits.model_validate(recipe.limits.model_dump()),
+            limits=Limits.model_validate(
+                recipe.limits.model_dump(include=set(Limits.model_fields))
+            ),
             mechanics=compiled.mechanics,
             bound=bound,
             provenance=record,

@@ -72,14 +72,32 @@ class Edge(Section):
 
 
 class Control(Section):
-    """Gains by which a motor-driven capture tracks its trajectory."""
+    """Gains by which a motor-driven capture tracks its trajectory.
 
-    opening_kp_Nm_per_rad: Positive = 6.0
-    opening_kd_Nm_s_per_rad: NonNegative = 0.06
-    opening_ki_Nm_per_rad_s: NonNegative = 20.0
-    advance_kp_N_per_m: Positive = 3000.0
-    advance_kd_N_s_per_m: NonNegative = 40.0
-    advance_ki_N_per_m_s: NonNegative = 10000.0
+    "auto" takes them from the inertia, the friction and the delay that the probe of the rig found.
+    Numbers are used as they are, and refused where the loop would be unstable.
+    """
+
+    opening_kp_Nm_per_rad: Positive | Literal["auto"] = "auto"
+    opening_kd_Nm_s_per_rad: NonNegative | Literal["auto"] = "auto"
+    opening_ki_Nm_per_rad_s: NonNegative | Literal["auto"] = "auto"
+    advance_kp_N_per_m: Positive | Literal["auto"] = "auto"
+    advance_kd_N_s_per_m: NonNegative | Literal["auto"] = "auto"
+    advance_ki_N_per_m_s: NonNegative | Literal["auto"] = "auto"
+
+
+class Line(Section):
+    """The serial line to the device, and how long it waits for this computer.
+
+    ``baud`` is the rate that the device is built for (USB devices ignore it). ``brake_after_ms``:
+    without a command for so long the device brakes and latches a fault. Blades that nobody holds
+    gain torque x time / inertia meanwhile, so the shortest that this computer keeps is the best:
+    10 ms where the loop has real-time priority; elsewhere 'scissorcal device doctor' recommends
+    one from what it measures (a computer that is late by 20 ms when it is busy needs 25 to 50).
+    """
+
+    baud: Annotated[int, Field(ge=9600, le=12_000_000)] = 921600
+    brake_after_ms: Annotated[float, Field(ge=1, le=1000, allow_inf_nan=False)] = 10.0
 
 
 class Rig(Section):
@@ -99,6 +117,7 @@ class Rig(Section):
     hand_damping_N_s_per_m: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 4.0
     edge: Edge
     control: Control = Control()
+    line: Line = Line()
 
     @property
     def moving_blades(self) -> int:
@@ -186,13 +205,17 @@ class Plate(Section):
 
 
 class Limits(Section):
-    """What the loop never exceeds, whatever the model says."""
+    """What the loop never exceeds, whatever the model says.
+
+    It stops where the torque has been at its limit for ``held_at_limit_s``, less the time below it.
+    """
 
     torque_Nm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)] = 1.0
     torque_slew_Nm_per_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)] = 200.0
     force_N: Annotated[float, Field(gt=0, le=1e5, allow_inf_nan=False)] = 30.0
     force_slew_N_per_s: Annotated[float, Field(gt=0, le=1e8, allow_inf_nan=False)] = 5000.0
     engagement_ramp_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] = 0.5
+    held_at_limit_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 2.0
 
 
 class CaptureFriction(Section):

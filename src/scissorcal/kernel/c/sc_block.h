@@ -12,7 +12,7 @@
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 2, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 3, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
     SC_HISTOGRAM_BINS = 192,
     SC_BINS_PER_OCTAVE = 8
@@ -56,6 +56,8 @@ typedef struct {
     uint32_t exit_reason; /* SC_STOP_... once the loop has ended */
     int32_t exit_errno;
     uint32_t garbled;
+    uint32_t realtime;      /* 1 if the loop has real-time priority ... */
+    uint32_t memory_locked; /* ... and its memory is never paged out */
     uint64_t bytes_received;
     uint64_t other_frames; /* valid, but no STATE */
     uint64_t answers;      /* commands written */

@@ -41,7 +41,8 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->advance_error_limit > 0.0f && config->tick_us > 0 &&
            isfinite(config->opening_low) && isfinite(config->opening_high) &&
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
-           config->advance_rate_limit > 0.0f && sc_passivity_is_sound(&config->passivity);
+           config->advance_rate_limit > 0.0f && sc_passivity_is_sound(&config->passivity) &&
+           sc_watch_config_is_sound(&config->watch);
 }
 
 /* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
@@ -94,6 +95,9 @@ static effort track(const sc_servo_config *config, const sc_reference *reference
     } else {
         opening_rate = 0.0f;
     }
+    servo->aim_opening = reference->opening[at];
+    servo->aim_rate = opening_rate;
+    servo->aim_advance = reference->advance[at];
     const float opening_error = reference->opening[at] - motion->opening;
     const float advance_error = reference->advance[at] - motion->advance;
     if (fabsf(opening_error) > config->opening_error_limit ||
@@ -309,6 +313,7 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     begin_sample(servo, state);
     count_frame(servo, state);
     servo->stale_us = 0;
+    sc_lag_state(&servo->lag, servo->mode, state->sequence);
     const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
     way since = {0.0, 0.0, 0.0, 0.0f};
     if (valid) {
@@ -335,6 +340,12 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     } else {
         sc_port_rest(&servo->port, &servo->ledger);
     }
+    sc_servo_watch_state(config, servo, state, since.dt, valid);
+    if (servo->ending) {
+        const effort none = {0.0f, 0.0f};
+        wanted = none;
+        sc_servo_finish_ending(servo, valid && !faulty && servo->mode != SC_MODE_IDLE);
+    }
     answer(config, servo, valid, faulty, wanted, command);
     return 1;
 }
@@ -344,6 +355,7 @@ void sc_servo_sent(sc_servo *servo)
     servo->sent_torque = servo->torque;
     servo->sent_force = servo->force;
     servo->slew_us = 0;
+    sc_lag_sent(&servo->lag, servo->sequence);
 }
 
 void sc_servo_not_sent(sc_servo *servo)

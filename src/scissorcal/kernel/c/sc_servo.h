@@ -14,9 +14,11 @@
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
 
+#include "sc_lag.h"
 #include "sc_model.h"
 #include "sc_motion.h"
 #include "sc_passivity.h"
+#include "sc_watch.h"
 #include "sc_wire.h"
 
 enum { SC_MODE_IDLE = 0, SC_MODE_TRACK = 1, SC_MODE_RENDER = 2, SC_MODE_DAMP = 3 };
@@ -35,7 +37,8 @@ enum {
     SC_STOP_BAD_BLOCK = 9,
     SC_STOP_IMPLAUSIBLE = 10,
     SC_STOP_DEVICE_CLOCK = 11,
-    SC_STOP_OVERSPEED = 12
+    SC_STOP_OVERSPEED = 12,
+    SC_STOP_WATCHED = 32 /* and above: by what a watch saw, SC_WATCH_... */
 };
 
 /* A sample's flags above the 16 bits of the device. */
@@ -69,6 +72,7 @@ typedef struct {
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
     sc_passivity_config passivity;
+    sc_watch_config watch;
 } sc_servo_config;
 
 typedef struct {
@@ -108,6 +112,8 @@ typedef struct {
 
 typedef struct {
     sc_motion motion;
+    sc_watch watch;
+    float aim_opening, aim_rate, aim_advance; /* of the reference at the last state */
     sc_crack crack;
     sc_ledger ledger; /* delivered in every mode; the rest while rendering */
     sc_port port;
@@ -126,6 +132,8 @@ typedef struct {
     uint32_t fallback;
     uint32_t fallback_from; /* mode that the missing heartbeat ended */
     uint32_t stop_reason;
+    uint32_t ending;     /* reason for which torque and force fall to zero before it stops, or 0 */
+    uint32_t ending_us;
     uint32_t sequence;
     uint32_t begins;     /* the next frame is the first of its mode */
     uint32_t engaged_at; /* sequence at which the mode engaged, less the time in faults */
@@ -152,6 +160,7 @@ typedef struct {
     uint64_t device_saturated;
     uint64_t fallback_frames;
     uint64_t faults;
+    sc_lag lag;
 } sc_servo;
 
 /* Let time pass, by the host's clock: call it before the states that arrived then, also when none
@@ -184,8 +193,12 @@ void sc_servo_not_sent(sc_servo *servo);
  * latched counts as one that does not clear by these calls alone. */
 void sc_servo_answered(sc_servo *servo);
 
-/* Latch the stop; the first reason stands. */
+/* Latch the stop; the first reason stands. The motors are released at once. */
 void sc_servo_stop(sc_servo *servo, uint32_t reason);
+
+/* Latch the end: torque and force fall to zero as fast as the slews let them, within 0.1 s; then it
+ * stops. The first reason stands. */
+void sc_servo_end(sc_servo *servo, uint32_t reason);
 
 /* 1 if every limit and gain is a finite number >= 0 and the mode of the orders exists. */
 int sc_servo_config_is_sound(const sc_servo_config *config);

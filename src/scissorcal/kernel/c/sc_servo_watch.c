@@ -10,13 +10,22 @@ enum {
     SILENCE_UNTIL_STOP = 5,
     LONGEST_US = 0x40000000,
     IMPLAUSIBLE_UNTIL_STOP = 4,
-    STUCK_UNTIL_STOP = 20
+    STUCK_UNTIL_STOP = 20,
+    LONGEST_END_US = 100000
 };
 
 void sc_servo_stop(sc_servo *servo, uint32_t reason)
 {
     if (servo->stop_reason == SC_STOP_NONE) {
         servo->stop_reason = reason;
+    }
+}
+
+void sc_servo_end(sc_servo *servo, uint32_t reason)
+{
+    if (servo->stop_reason == SC_STOP_NONE && servo->ending == SC_STOP_NONE) {
+        servo->ending = reason;
+        servo->ending_us = 0;
     }
 }
 
@@ -90,6 +99,8 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
     if (config->supervisor_ms > 0) {
         watch_supervisor(config, orders, servo, elapsed_us);
     }
+    sc_watch_pass(&servo->watch, elapsed_us);
+    servo->ending_us = longer(servo->ending_us, elapsed_us);
     servo->stale_us = longer(servo->stale_us, elapsed_us);
     servo->slew_us = longer(servo->slew_us, elapsed_us);
     if (servo->slew_us > config->tick_us) {
@@ -142,5 +153,55 @@ void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo)
                      fabsf(motion->advance_rate) > config->advance_rate_limit;
     if (fast && servo->mode != SC_MODE_IDLE) {
         sc_servo_stop(servo, SC_STOP_OVERSPEED);
+    }
+}
+
+static sc_watch_input watched(const sc_servo_config *config, const sc_servo *servo,
+                              const sc_state *state, float time_s, int usable)
+{
+    const sc_motion *motion = &servo->motion;
+    const uint32_t not_driven = SC_STATE_FAULT_LATCHED | SC_STATE_ENCODER_FAULT;
+    const int enabled = (state->flags & SC_STATE_MOTOR_ENABLED) != 0;
+    const sc_watch_input input = {
+        time_s,
+        usable,
+        enabled && !(state->flags & not_driven) && servo->mode != SC_MODE_IDLE &&
+            (servo->command_flags & SC_COMMAND_ENABLE),
+        !enabled && !(state->flags & not_driven),
+        servo->mode == SC_MODE_TRACK,
+        (state->flags & SC_STATE_OPENING_AT_STOP) != 0,
+        servo->sent_torque,
+        config->torque_limit,
+        state->motor_torque,
+        state->handle_force,
+        motion->opening,
+        motion->opening_rate,
+        motion->advance,
+        servo->aim_opening,
+        servo->aim_rate,
+        servo->aim_advance,
+        state->sequence,
+        state->device_us,
+        config->tick_us};
+    return input;
+}
+
+void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
+                          float time_s, int usable)
+{
+    const sc_watch_input input = watched(config, servo, state, time_s, usable);
+    const int seen = sc_watch_take(&config->watch, &servo->watch, &input);
+    if (seen == SC_WATCH_RUNAWAY) {
+        sc_servo_stop(servo, SC_STOP_WATCHED + (uint32_t)seen);
+    } else if (seen != SC_WATCH_NOTHING) {
+        sc_servo_end(servo, SC_STOP_WATCHED + (uint32_t)seen);
+    }
+}
+
+void sc_servo_finish_ending(sc_servo *servo, int driven)
+{
+    const int let_go = servo->sent_torque == 0.0f && servo->sent_force == 0.0f;
+    if (servo->ending && (!driven || let_go || servo->ending_us >= LONGEST_END_US)) {
+        sc_servo_stop(servo, servo->ending);
     }
 }

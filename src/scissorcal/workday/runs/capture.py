@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.requirements import CaptureKind, requirements
-from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -31,12 +31,16 @@ def capture_into(
     *,
     hand: bool = False,
     seed: int = 0,
+    baud: int | None = None,
+    realtime: bool = False,
     progress: "CaptureProgress | None" = None,
     confirm: "Confirm | None" = None,
 ) -> Captured:
     """Record friction or cuts from ``device`` into captures/<kind>-<stamp>.mcap.
 
-    ``device`` is a port, or "sim" for a virtual rig with the recipe's specimen. ``hand`` (cuts
+    ``device`` is a port, or "sim" for a virtual rig with the recipe's specimen, in virtual time
+    unless ``realtime``; each of its recordings of one ``seed`` has another noise. ``baud`` takes
+    the place of the recipe's rate. ``hand`` (cuts
     only): motors off, a person or the virtual hand moves the handles. ``confirm`` asks a person to
     load material; a virtual rig loads by itself. Whatever was recorded before an error stays in
     the file.
@@ -49,7 +53,9 @@ def capture_into(
     if not requirements(recipe).needs_capture(kind):
         raise InputError(f"{workspace.recipe_path}: this scene needs no capture of {kind}.")
     text = read_text(workspace.recipe_path)
-    with open_rig(device, recipe.specimen, seed) as link:
+    line = line_of(recipe, baud)
+    run = len(workspace.recordings(kind))
+    with open_rig(device, recipe.specimen, seed, run=run, realtime=realtime, line=line) as link:
         path = workspace.new_recording(kind)
         with open_writer(path, kind, link, recipe, text, hand=hand) as writer:
             if kind == "friction":

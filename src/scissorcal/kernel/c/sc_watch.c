@@ -1,0 +1,324 @@
+#include "sc_watch.h"
+
+#include <math.h>
+
+/* A limit cycle has repeated itself three times over; a jolt has not. One that grows to ten times the
+ * amplitude has shown itself after two halves. */
+static const uint32_t SWINGS_UNTIL_STOP = 6;
+static const float WIDE = 4.0f;  /* times the amplitude: such a half of a swing counts as two ... */
+static const float WILD = 10.0f; /* ... and such a one as three */
+static const float NOISE_SHARE = 0.25f; /* of a swing's amplitude, within which it has no sign */
+/* A torque acts on the rate after wire, motor and filter: in less than this at delays that can be
+ * controlled. Blades that speed up against it from then on are driven the wrong way. */
+static const float TORQUE_ACTS_S = 0.008f;
+static const float STILL_S = 0.5f;
+/* Delays of 10 ms move a mean over 30 ms little; the ratio is taken over half a second. */
+static const float SMOOTH_S = 0.03f;
+static const float SETTLED_S = 0.12f;
+static const float FORGET_S = 0.5f;
+static const float EXCITED_S = 0.1f;
+static const float DIFFERS_S = 0.1f;
+static const float ZERO_S = 0.2f;
+static const float REVERSED_BELOW = -0.3f; /* a ratio between it ... */
+static const float REVERSED_ABOVE = -3.0f; /* ... and this has the wrong sign and about its size */
+static const float AT_LIMIT = 0.999f;
+static const float BRIEFLY = 0.99f;
+static const float RESTS = 0.05f; /* rad/s; motors that are off and turn give a torque */
+static const uint32_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
+static const uint32_t HOST_US = 2000000;  /* by this computer's clock: 20 ms of jitter are 1 % */
+static const uint32_t OFF_UNTIL_STOP = 3; /* windows in a row */
+static const uint32_t UNREADABLE_UNTIL_STOP = 20;
+
+enum { LONGEST_US = 0x40000000 };
+
+int sc_watch_config_is_sound(const sc_watch_config *config)
+{
+    const float levels[] = {
+        config->held_s,       config->swing_rate,   config->swing_torque,     config->swing_Hz,
+        config->runaway_rate, config->still_rad,    config->still_m,          config->still_torque,
+        config->least_ratio,  config->most_ratio,   config->ratio_torque,     config->clock_share,
+        config->host_clock_share, config->handle_radius};
+    for (unsigned i = 0; i < sizeof levels / sizeof levels[0]; i++) {
+        if (!isfinite(levels[i]) || levels[i] < 0.0f) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+void sc_watch_pass(sc_watch *watch, uint32_t elapsed_us)
+{
+    if (watch->host_us < LONGEST_US && elapsed_us < LONGEST_US) {
+        watch->host_us += elapsed_us;
+    }
+}
+
+static void keep(sc_watch *watch, int which, float share)
+{
+    if (share > watch->worst[which]) {
+        watch->worst[which] = share;
+    }
+}
+
+/* Keep the largest share of a threshold, and say whether it is reached. */
+static int over(sc_watch *watch, int which, float value, float threshold)
+{
+    if (!(threshold > 0.0f)) {
+        return 0;
+    }
+    keep(watch, which, value / threshold);
+    return value >= threshold;
+}
+
+/* The same for what has to stay beyond its threshold to count: until then it is below. */
+static int over_for_long(sc_watch *watch, int which, float share, int long_enough)
+{
+    keep(watch, which, long_enough ? share : fminf(share, BRIEFLY));
+    return long_enough && share >= 1.0f;
+}
+
+static int held(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const int at_limit = fabsf(in->torque) >= AT_LIMIT * in->torque_limit;
+    watch->held_s = fmaxf(watch->held_s + (at_limit ? in->time_s : -in->time_s), 0.0f);
+    return over(watch, SC_WATCH_HELD, watch->held_s, config->held_s);
+}
+
+static void begin_half_swing(sc_watch *watch, int32_t sign, float torque)
+{
+    watch->swing_sign = sign;
+    watch->swing_s = 0.0f;
+    watch->swing_peak = 0.0f;
+    watch->swing_low = watch->swing_high = torque;
+}
+
+static uint32_t weight(float amplitude)
+{
+    return amplitude >= WILD ? 3 : amplitude >= WIDE ? 2 : 1;
+}
+
+/* Halves of swings in a row that are fast, wide and change the torque. The rate is taken from the
+ * reference's, where there is one. */
+static int swings(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const float rate = in->opening_rate - (in->tracking ? in->aim_rate : 0.0f);
+    const float noise = NOISE_SHARE * config->swing_rate;
+    if (!(config->swing_rate > 0.0f && config->swing_Hz > 0.0f)) {
+        return 0;
+    }
+    if (watch->swing_sign == 0 || (float)watch->swing_sign * rate < -noise) {
+        const int counts = watch->swing_sign != 0 &&
+                           watch->swing_s * 2.0f * config->swing_Hz <= 1.0f &&
+                           watch->swing_peak >= config->swing_rate &&
+                           watch->swing_high - watch->swing_low >= config->swing_torque;
+        watch->swings = counts ? watch->swings + weight(watch->swing_peak / config->swing_rate) : 0;
+        begin_half_swing(watch, fabsf(rate) <= noise ? 0 : rate > 0.0f ? 1 : -1, in->torque);
+    }
+    watch->swing_s += in->time_s;
+    watch->swing_peak = fmaxf(watch->swing_peak, fabsf(rate));
+    watch->swing_low = fminf(watch->swing_low, in->torque);
+    watch->swing_high = fmaxf(watch->swing_high, in->torque);
+    if (watch->swing_s * 2.0f * config->swing_Hz > 1.0f) {
+        watch->swings = 0;
+    }
+    return over(watch, SC_WATCH_SWING, (float)watch->swings, (float)SWINGS_UNTIL_STOP);
+}
+
+/* Blades that speed up against a torque of one sign; a hand may do that, a reference does not. */
+static int runs_away(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const int32_t sign = in->torque > 0.0f ? 1 : in->torque < 0.0f ? -1 : 0;
+    if (!in->tracking || sign != watch->torque_sign || sign == 0) {
+        watch->torque_sign = sign;
+        watch->torque_sign_s = 0.0f;
+        watch->rate_at_sign = in->opening_rate;
+        return 0;
+    }
+    watch->torque_sign_s += in->time_s;
+    if (watch->torque_sign_s < TORQUE_ACTS_S) {
+        watch->rate_at_sign = in->opening_rate;
+        return 0;
+    }
+    const float against = -(float)sign * in->opening_rate;
+    const float gained = -(float)sign * (in->opening_rate - watch->rate_at_sign);
+    return over(watch, SC_WATCH_RUNAWAY, fminf(against, gained), config->runaway_rate);
+}
+
+static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    if (!watch->has_still || in->opening != watch->still_opening) {
+        watch->still_opening = in->opening;
+        watch->still_aim = in->aim_opening;
+        watch->still_s = 0.0f;
+        watch->imbalance = 0.0f;
+    }
+    if (!watch->has_still || in->advance != watch->still_advance) {
+        watch->still_advance = in->advance;
+        watch->still_aim_advance = in->aim_advance;
+    }
+    watch->has_still = 1;
+    if (in->tracking) {
+        return over(watch, SC_WATCH_STILL, fabsf(in->aim_opening - watch->still_aim),
+                    config->still_rad);
+    }
+    const float drive = in->measured - config->handle_radius * in->handle_force;
+    const float share = in->time_s / (SMOOTH_S + in->time_s);
+    watch->still_aim = in->aim_opening;
+    watch->still_aim_advance = in->aim_advance;
+    watch->still_s += in->time_s;
+    watch->imbalance += share * ((isfinite(drive) ? drive : 0.0f) - watch->imbalance);
+    if (in->at_stop || !(config->handle_radius > 0.0f) || watch->still_s < STILL_S) {
+        return 0;
+    }
+    return over(watch, SC_WATCH_STILL, fabsf(watch->imbalance), config->still_torque);
+}
+
+static int advance_stands(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    return in->tracking && over(watch, SC_WATCH_STILL_ADVANCE,
+                                fabsf(in->aim_advance - watch->still_aim_advance), config->still_m);
+}
+
+/* Mean of the measured torque while the motors are off and the blades rest. */
+static void take_zero(sc_watch *watch, const sc_watch_input *in)
+{
+    if (isfinite(in->measured) && in->released && fabsf(in->opening_rate) < RESTS &&
+        in->time_s > 0.0f) {
+        const float age = fminf(watch->zero_s, ZERO_S);
+        watch->zero_s += in->time_s;
+        watch->zero += (in->measured - watch->zero) * in->time_s / (age + in->time_s);
+    }
+}
+
+/* The measured over the commanded torque, in half a second in which there was enough of it: which
+ * watch stops, if any. */
+static int compare_torques(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const float share = in->time_s / (SMOOTH_S + in->time_s);
+    if (!(config->ratio_torque > 0.0f) || !isfinite(in->measured)) {
+        return SC_WATCH_NOTHING;
+    }
+    watch->smooth_torque += share * (in->torque - watch->smooth_torque);
+    watch->smooth_measured += share * (in->measured - watch->zero - watch->smooth_measured);
+    watch->driven_s += in->time_s;
+    if (watch->driven_s < SETTLED_S) {
+        return SC_WATCH_NOTHING;
+    }
+    const float kept = FORGET_S / (FORGET_S + in->time_s);
+    watch->sum_cc = kept * watch->sum_cc + in->time_s * watch->smooth_torque * watch->smooth_torque;
+    watch->sum_cm =
+        kept * watch->sum_cm + in->time_s * watch->smooth_torque * watch->smooth_measured;
+    if (watch->sum_cc < EXCITED_S * config->ratio_torque * config->ratio_torque) {
+        watch->differs_s = 0.0f;
+        return SC_WATCH_NOTHING;
+    }
+    const float ratio = watch->sum_cm / watch->sum_cc;
+    const float off = ratio < 1.0f ? (1.0f - ratio) / (1.0f - config->least_ratio)
+                                   : (ratio - 1.0f) / (config->most_ratio - 1.0f);
+    const int which = ratio < REVERSED_BELOW && ratio > REVERSED_ABOVE ? SC_WATCH_REVERSED
+                                                                       : SC_WATCH_DIFFERS;
+    watch->differs_s = off >= 1.0f ? watch->differs_s + in->time_s : 0.0f;
+    return over_for_long(watch, which, off, watch->differs_s >= DIFFERS_S) ? which
+                                                                           : SC_WATCH_NOTHING;
+}
+
+static void begin_clock(sc_watch *watch, const sc_watch_input *in)
+{
+    watch->has_clock = 1;
+    watch->clock_sequence = in->sequence;
+    watch->clock_us = watch->host_from_us = in->device_us;
+    watch->host_us = watch->off_ticks = watch->off_host = 0;
+}
+
+/* Count the windows in a row in which a clock is off by more than allowed. */
+static int is_off(sc_watch *watch, uint32_t clock_us, uint32_t passed_us, float allowed,
+                  uint32_t *windows)
+{
+    if (!(allowed > 0.0f)) {
+        return 0;
+    }
+    const float share = fabsf((float)clock_us / (float)passed_us - 1.0f) / allowed;
+    *windows = share >= 1.0f ? *windows + 1 : 0;
+    return over_for_long(watch, SC_WATCH_CLOCK, share, *windows >= OFF_UNTIL_STOP);
+}
+
+/* Time by the device's clock against what its sequence numbers, or this computer, say passed. */
+static int clock_is_off(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const uint32_t ticks = in->sequence - watch->clock_sequence;
+    const uint32_t clock_us = in->device_us - watch->clock_us;
+    if (!watch->has_clock || ticks >= LONGEST_US / in->tick_us || clock_us >= LONGEST_US) {
+        begin_clock(watch, in);
+        return 0;
+    }
+    int off = 0;
+    if (ticks * in->tick_us >= CLOCK_US) {
+        off = is_off(watch, clock_us, ticks * in->tick_us, config->clock_share, &watch->off_ticks);
+        watch->clock_sequence = in->sequence;
+        watch->clock_us = in->device_us;
+    }
+    if (watch->host_us >= HOST_US) {
+        off |= is_off(watch, in->device_us - watch->host_from_us, watch->host_us,
+                      config->host_clock_share, &watch->off_host);
+        watch->host_from_us = in->device_us;
+        watch->host_us = 0;
+    }
+    return off;
+}
+
+static int unreadable(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const int readable = isfinite(in->measured) &&
+                         (isfinite(in->handle_force) || !(config->handle_radius > 0.0f));
+    watch->unreadable = readable ? 0 : watch->unreadable + 1;
+    return config->ratio_torque > 0.0f && over(watch, SC_WATCH_UNREADABLE, (float)watch->unreadable,
+                                               (float)UNREADABLE_UNTIL_STOP);
+}
+
+/* Begin again what counts over a time in which motors drive. */
+static void rest(sc_watch *watch)
+{
+    watch->held_s = 0.0f;
+    watch->swing_sign = 0;
+    watch->swings = 0;
+    watch->torque_sign = 0;
+    watch->has_still = 0;
+    watch->smooth_torque = watch->smooth_measured = 0.0f;
+    watch->driven_s = 0.0f;
+    watch->sum_cc = watch->sum_cm = 0.0f;
+    watch->differs_s = 0.0f;
+}
+
+int sc_watch_take(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    if (clock_is_off(config, watch, in)) {
+        return SC_WATCH_CLOCK;
+    }
+    if (unreadable(config, watch, in)) {
+        return SC_WATCH_UNREADABLE;
+    }
+    if (!in->driven || !in->usable) {
+        if (!in->driven) {
+            rest(watch);
+            take_zero(watch, in);
+        }
+        return SC_WATCH_NOTHING;
+    }
+    if (runs_away(config, watch, in)) {
+        return SC_WATCH_RUNAWAY;
+    }
+    if (swings(config, watch, in)) {
+        return SC_WATCH_SWING;
+    }
+    const int differing = compare_torques(config, watch, in);
+    if (differing != SC_WATCH_NOTHING) {
+        return differing;
+    }
+    if (stands(config, watch, in)) {
+        return SC_WATCH_STILL;
+    }
+    if (advance_stands(config, watch, in)) {
+        return SC_WATCH_STILL_ADVANCE;
+    }
+    return held(config, watch, in) ? SC_WATCH_HELD : SC_WATCH_NOTHING;
+}

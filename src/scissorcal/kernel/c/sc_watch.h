@@ -1,0 +1,106 @@
+/* What goes wrong while motors drive the blades, told from commands and measurements alone.
+ *
+ * Every watch is a few numbers that are brought up to date once a state. Thresholds of 0 switch a
+ * watch off. The largest value that each has seen is kept as a share of its threshold.
+ */
+#ifndef SC_WATCH_H
+#define SC_WATCH_H
+
+#include <stdint.h>
+
+enum {
+    SC_WATCH_NOTHING = -1,
+    SC_WATCH_HELD = 0,          /* torque at its limit for too long */
+    SC_WATCH_SWING = 1,         /* blades and torque swing to and fro faster than any hand */
+    SC_WATCH_RUNAWAY = 2,       /* blades speed up against the torque */
+    SC_WATCH_STILL = 3,         /* the opening stands while the reference, or a torque, moves on */
+    SC_WATCH_STILL_ADVANCE = 4, /* so does the advance */
+    SC_WATCH_REVERSED = 5,      /* measured torque has the sign opposite to the commanded one */
+    SC_WATCH_DIFFERS = 6,       /* measured torque is another one than commanded */
+    SC_WATCH_CLOCK = 7,         /* the device's clock, against its ticks or this computer's clock */
+    SC_WATCH_UNREADABLE = 8,    /* motor torque or handle force is no number */
+    SC_WATCHES = 9
+};
+
+typedef struct {
+    float held_s;            /* at the limit so long, less the time below it since */
+    float swing_rate;        /* amplitude of a swing [rad/s] ... */
+    float swing_torque;      /* ... and the change of torque within it [N m] that count */
+    float swing_Hz;          /* slower swings are a hand's, or planned */
+    float runaway_rate;      /* [rad/s] */
+    float still_rad;         /* motion of the reference while the opening stands */
+    float still_m;           /* motion of the reference while the advance stands */
+    float still_torque;      /* imbalance of motor and hand under which blades cannot rest [N m] */
+    float least_ratio;       /* of measured to commanded torque ... */
+    float most_ratio;        /* ... outside of which they differ */
+    float ratio_torque;      /* torques below it say nothing about that [N m]; 0: nothing that is
+                                measured beside the places is watched */
+    float clock_share;       /* of the device's clock against its ticks */
+    float host_clock_share;  /* of the device's clock against this computer's */
+    float handle_radius;     /* of a rig that measures the force of the hand [m]; else 0 */
+} sc_watch_config;
+
+/* What a state says, and what was in force until it came. */
+typedef struct {
+    float time_s;        /* since the last usable state, by the device's clock */
+    int32_t usable;      /* whether its place is */
+    int32_t driven;      /* whether motors follow commands, in this state and by this servo's */
+    int32_t released;    /* whether motors are off, and do not brake either */
+    int32_t tracking;    /* whether there is a reference */
+    int32_t at_stop;
+    float torque;        /* the command in force [N m] */
+    float torque_limit;
+    float measured;      /* torque [N m] */
+    float handle_force;  /* [N] */
+    float opening;
+    float opening_rate;
+    float advance;
+    float aim_opening;   /* of the reference, as its rate and the advance */
+    float aim_rate;
+    float aim_advance;
+    uint32_t sequence;
+    uint32_t device_us;
+    uint32_t tick_us;
+} sc_watch_input;
+
+typedef struct {
+    float worst[SC_WATCHES]; /* largest value over threshold; 1 stops */
+    float held_s;
+    int32_t swing_sign;
+    float swing_s;
+    float swing_peak;
+    float swing_low, swing_high; /* torque within this half of a swing */
+    uint32_t swings;
+    int32_t torque_sign;
+    float torque_sign_s;
+    float rate_at_sign;
+    int32_t has_still;
+    float still_opening, still_aim;
+    float still_advance, still_aim_advance;
+    float still_s;
+    float imbalance;
+    float zero, zero_s;     /* of the measured torque, while the motors were off */
+    float smooth_torque, smooth_measured;
+    float driven_s;
+    float sum_cc, sum_cm;   /* of smooth torques, forgetting */
+    float differs_s;
+    int32_t has_clock;
+    uint32_t clock_sequence;
+    uint32_t clock_us;
+    uint32_t off_ticks;     /* windows in a row in which the clock was off its ticks */
+    uint32_t host_from_us;
+    uint32_t host_us;       /* this computer's time since */
+    uint32_t off_host;      /* windows in a row in which it was off this computer's */
+    uint32_t unreadable;    /* states in a row */
+} sc_watch;
+
+/* 1 if every threshold is a finite number >= 0. */
+int sc_watch_config_is_sound(const sc_watch_config *config);
+
+/* Tell it of time that passed by this computer's clock. */
+void sc_watch_pass(sc_watch *watch, uint32_t elapsed_us);
+
+/* Take a state; returns which watch stops, or SC_WATCH_NOTHING. */
+int sc_watch_take(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *input);
+
+#endif

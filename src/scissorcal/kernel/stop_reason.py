@@ -1,0 +1,115 @@
+"""Why the servo stops, each with a sentence that states the cause and the remedy."""
+
+from enum import IntEnum
+
+
+class StopReason(IntEnum):
+    """Why a servo or a loop stopped; ``sentence`` states it with the remedy."""
+
+    NONE = 0
+    ASKED = 1
+    SUPERVISOR_LOST = 2
+    DEVICE_FAULT = 3
+    ENCODER_FAULT = 4
+    TRACKING_LOST = 5
+    HANGUP = 6
+    SILENCE = 7
+    LINE_ERROR = 8
+    BAD_BLOCK = 9
+    IMPLAUSIBLE = 10
+    DEVICE_CLOCK = 11
+    OVERSPEED = 12
+    TORQUE_HELD = 32
+    OSCILLATION = 33
+    RUNAWAY = 34
+    OPENING_STANDS = 35
+    ADVANCE_STANDS = 36
+    MEASURED_REVERSED = 37
+    MEASURED_DIFFERS = 38
+    CLOCK_RATE = 39
+    UNREADABLE = 40
+
+    @property
+    def sentence(self) -> str:
+        """What happened and what to look at, as a whole sentence."""
+        return _STOP_SENTENCES[self]
+
+
+_STOP_SENTENCES = {
+    StopReason.NONE: "The loop has not stopped.",
+    StopReason.ASKED: "The loop stopped because it was asked to.",
+    StopReason.SUPERVISOR_LOST: (
+        "The loop stopped because the heartbeat of its supervising process was missing. Check why "
+        "that process hung or died, then start again."
+    ),
+    StopReason.DEVICE_FAULT: (
+        "The device latched a fault that did not clear, or latched faults too often. Remove the "
+        "cause; if the computer answers late, close programs that load it or raise BRAKE_AFTER_MS; "
+        "then start again."
+    ),
+    StopReason.ENCODER_FAULT: (
+        "The device reports a fault of its encoder; check the encoder and its cable."
+    ),
+    StopReason.TRACKING_LOST: (
+        "The blades did not follow the commanded motion; check for an obstacle, a stuck "
+        "encoder or gains that are too weak."
+    ),
+    StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
+    StopReason.SILENCE: (
+        "The device stopped sending STATE frames; check its power and the cable, then start again."
+    ),
+    StopReason.LINE_ERROR: "Reading or writing the port failed; check the port and start again.",
+    StopReason.BAD_BLOCK: (
+        "The loop refused its parameters: a limit, gain or table is not a finite number. Check the "
+        "recipe's limits and rig.control."
+    ),
+    StopReason.IMPLAUSIBLE: (
+        "The device reported openings or advances beyond its stops, not finite, or too far apart "
+        "for any motion, four frames in a row; check the encoders and their cables."
+    ),
+    StopReason.DEVICE_CLOCK: (
+        "The device's clock (device_us) stood still for 20 frames; restart the device."
+    ),
+    StopReason.OVERSPEED: (
+        "The blades moved faster than any capture or hand moves them; check that the motor and "
+        "its encoder have the same sense, and that nothing is loose."
+    ),
+    StopReason.TORQUE_HELD: (
+        "The motor's torque stayed at its limit. Check for an obstacle, or material that is too "
+        "stiff for limits.torque_Nm; if the torque is meant, raise limits.held_at_limit_s."
+    ),
+    StopReason.OSCILLATION: (
+        "The blades swung to and fro, driven by the loop itself: commands act too late, or the "
+        "gains or the rendered stiffness are too high for it. Run 'scissorcal device doctor' to "
+        "find what is late, or lower the gains in the recipe's rig.control."
+    ),
+    StopReason.RUNAWAY: (
+        "The blades sped up against the torque of their motor: motor or encoder has the wrong "
+        "sense. Positive torque must open the blades and a wider opening count up; swap two wires "
+        "of one of the two."
+    ),
+    StopReason.OPENING_STANDS: (
+        "The opening did not change at all while the blades were driven. Check the encoder and its "
+        "cable, that the motor is connected, and that nothing blocks the blades."
+    ),
+    StopReason.ADVANCE_STANDS: (
+        "The advance did not change at all while the sledge was driven. Check its encoder, its "
+        "motor and their cables, and that nothing blocks the sledge."
+    ),
+    StopReason.MEASURED_REVERSED: (
+        "The measured motor torque has the opposite sign of the commanded one. motor_torque must "
+        "be positive when it opens the blades: change its sign in the device."
+    ),
+    StopReason.MEASURED_DIFFERS: (
+        "The measured motor torque differs from the commanded one by more than a sensor's error. "
+        "Check the scale of motor_torque, the motor's torque constant and its supply."
+    ),
+    StopReason.CLOCK_RATE: (
+        "The device's clock (device_us) does not keep time with its ticks (tick_us) or with this "
+        "computer; rates would be wrong by as much. Correct the timer or tick_us of the device."
+    ),
+    StopReason.UNREADABLE: (
+        "The device sent no number as motor torque or handle force, 20 frames in a row. Check the "
+        "sensors and their cables."
+    ),
+}

@@ -1,0 +1,67 @@
+"""Thresholds of what the servo watches while motors drive the blades."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+from scissorcal.kernel._kernel import lib
+from scissorcal.kernel.stop_reason import StopReason
+
+_FIRST = int(lib.SC_STOP_WATCHED)
+_COUNT = int(lib.SC_WATCHES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WatchConfig:
+    """Thresholds of the watches, SI units and radians; 0 switches one off, and is the default.
+
+    ``held_s``: torque at its limit for so long, less the time below it since. ``swing_rate``,
+    ``swing_torque``, ``swing_Hz``: three swings in a row of at least this amplitude (rad/s), change
+    of torque (N m) and frequency; of a tracked reference, its own rate is subtracted.
+    ``runaway_rate``: blades speed up by so much (rad/s) against a torque. ``still_rad``,
+    ``still_m``: the reference moves so far while the measured place stays exactly the same.
+    ``still_torque``: torques of motor and hand differ by so much (N m) for half a second, and the
+    opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a force sensor.
+    ``least_ratio``, ``most_ratio``: measured over commanded torque, where torques of at least
+    ``ratio_torque`` (N m) act. ``clock_share``, ``host_clock_share``: device clock against its
+    ticks, and against this computer. Raises ValueError for a number that is not finite or below 0.
+    """
+
+    held_s: float = 0.0
+    swing_rate: float = 0.0
+    swing_torque: float = 0.0
+    swing_Hz: float = 0.0
+    runaway_rate: float = 0.0
+    still_rad: float = 0.0
+    still_m: float = 0.0
+    still_torque: float = 0.0
+    least_ratio: float = 0.0
+    most_ratio: float = 0.0
+    ratio_torque: float = 0.0
+    clock_share: float = 0.0
+    host_clock_share: float = 0.0
+    handle_radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"watch.{field.name} = {value}: give a finite number from 0 on.")
+        if self.ratio_torque > 0 and not self.least_ratio < 1 < self.most_ratio:
+            raise ValueError("least_ratio must be below 1 and most_ratio above 1.")
+
+    def fill(self, struct: Any) -> None:
+        """Copy every number into the C struct of the same field names."""
+        for field in fields(self):
+            setattr(struct, field.name, getattr(self, field.name))
+
+
+NO_WATCHES = WatchConfig()
+
+
+def largest_seen(watch: Any) -> dict[str, float]:
+    """The largest value that each watch has seen as a share of its threshold, by its stop."""
+    return {
+        StopReason(_FIRST + index).name.lower(): float(watch.worst[index])
+        for index in range(_COUNT)
+    }

@@ -1,0 +1,277 @@
+"""What the servo watches while it drives: each fault is noticed, named and stopped gently."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from scissorcal.kernel import Mode, Servo, ServoConfig, State, StateFlag, StopReason, WatchConfig
+from tests.kernel.zoo import make_tables
+
+WATCH = WatchConfig(
+    held_s=0.5,
+    swing_rate=0.5,
+    swing_torque=0.05,
+    swing_Hz=8.0,
+    runaway_rate=1.0,
+    still_rad=0.03,
+    still_m=0.005,
+    still_torque=0.05,
+    least_ratio=0.7,
+    most_ratio=1.4,
+    ratio_torque=0.005,
+    clock_share=0.02,
+    host_clock_share=0.05,
+    handle_radius=0.06,
+)
+CONFIG = ServoConfig(
+    torque_limit=0.5,
+    torque_slew=100.0,
+    force_limit=10.0,
+    force_slew=5000.0,
+    ramp_s=0.1,
+    rate_cutoff_Hz=120.0,
+    opening_kp=6.0,
+    opening_kd=0.06,
+    opening_ki=20.0,
+    opening_error_limit=0.3,
+    watch=WATCH,
+)
+INERTIA = 2e-4
+FRICTION = 0.012
+NO_TORQUE = 1e-12
+
+
+@dataclass
+class Joint:
+    """A joint with dry friction, and a device that measures it in its own way."""
+
+    sense: float = 1.0  # of the motor
+    late: int = 1  # ticks until a command acts
+    measured: Callable[[float], float] = lambda torque: torque
+    push: Callable[[int, float], float] = lambda tick, rate: 0.0  # of a hand [N m]
+    seen: Callable[[int, float], float] = lambda tick, opening: opening
+    clock: Callable[[int], int] = lambda tick: 1000 * tick
+    host_us: int = 1000
+    opening: float = 0.6
+    rate: float = 0.0
+    commands: list[float] = field(default_factory=list)
+    flags: list[int] = field(default_factory=list)
+    fastest: float = 0.0
+
+    def run(self, servo: Servo, ticks: int) -> StopReason:
+        enabled = False
+        for tick in range(1, ticks + 1):
+            due = len(self.commands) - self.late
+            torque = self.commands[due] if due >= 0 and enabled else 0.0
+            push = self.push(tick, self.rate)
+            self._turn(self.sense * torque + push)
+            state = State(
+                int(StateFlag.MOTOR_ENABLED) * enabled,
+                tick,
+                self.clock(tick) % 2**32,
+                self.seen(tick, self.opening),
+                -0.02,
+                self.measured(torque),
+                -push / 0.06,
+            )
+            command = servo.step(state)
+            enabled = bool(command.flags & 1)
+            self.commands.append(command.torque)
+            self.flags.append(command.flags)
+            if servo.stop_reason is not StopReason.NONE:
+                break
+        return servo.stop_reason
+
+    def _turn(self, torque: float) -> None:
+        for _ in range(10):
+            step = 1e-4
+            free = self.rate + torque / INERTIA * step
+            grip = FRICTION / INERTIA * step
+            self.rate = math.copysign(max(abs(free) - grip, 0.0), free)
+            self.opening += self.rate * step
+        self.fastest = max(self.fastest, abs(self.rate))
+
+
+def tracking(config: ServoConfig = CONFIG, seconds: float = 4.0) -> Servo:
+    """A servo that closes from 0.6 to 0.3 rad and opens again, at up to 0.6 rad/s."""
+    time = np.arange(round(seconds * 1000)) * 1e-3
+    opening = 0.45 + 0.15 * np.cos(4.0 * time)
+    servo = Servo(None, config)
+    servo.set_reference(
+        opening, -0.6 * np.sin(4.0 * time), np.full(len(time), -0.02), np.zeros(len(time))
+    )
+    servo.engage(Mode.TRACK)
+    return servo
+
+
+def ends_gently(commands: Sequence[float]) -> bool:
+    steps = np.abs(np.diff(commands[-40:]))
+    return bool(abs(commands[-1]) < NO_TORQUE and steps.max() <= 0.1 * (1 + 1e-4))
+
+
+def test_nothing_is_wrong_with_a_good_rig() -> None:
+    joint, servo = Joint(), tracking()
+    assert joint.run(servo, 4000) is StopReason.NONE
+    assert max(servo.watched.values()) < 0.7, servo.watched
+
+
+@pytest.mark.parametrize("late", [1, 2, 3, 5, 8])
+def test_a_measured_torque_may_be_late_or_be_the_commanded_one(late: int) -> None:
+    config = replace(CONFIG, opening_kp=1.0, opening_kd=0.01, opening_ki=2.0)
+    joint, servo = Joint(late=late), tracking(config)
+    joint.run(servo, 4000)
+    assert servo.watched["measured_differs"] < 0.5
+
+
+@pytest.mark.parametrize("late", [4, 5, 6, 8])
+def test_a_late_loop_that_swings_is_stopped_before_it_is_wild(late: int) -> None:
+    joint, servo = Joint(late=late), tracking()
+    assert joint.run(servo, 4000) is StopReason.OSCILLATION
+    assert len(joint.commands) < 450
+    assert joint.fastest < 20.0
+    assert ends_gently(joint.commands)
+    assert "doctor" in servo.stop_reason.sentence
+
+
+def test_a_motor_of_the_wrong_sense_is_stopped_before_it_is_fast() -> None:
+    joint, servo = Joint(sense=-1.0), tracking()
+    assert joint.run(servo, 1000) is StopReason.RUNAWAY
+    assert joint.fastest < 8.0
+    assert max(map(abs, joint.commands)) < 0.5
+    assert joint.commands[-1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("measured", "reason"),
+    [
+        (lambda torque: -torque, StopReason.MEASURED_REVERSED),
+        (lambda torque: 0.5 * torque, StopReason.MEASURED_DIFFERS),
+        (lambda torque: 2.0 * torque, StopReason.MEASURED_DIFFERS),
+        (lambda torque: 0.0, StopReason.MEASURED_DIFFERS),
+        (lambda torque: 0.2, StopReason.MEASURED_DIFFERS),
+    ],
+)
+def test_a_measured_torque_that_is_wrong_is_told_at_capture(
+    measured: Callable[[float], float], reason: StopReason
+) -> None:
+    joint, servo = Joint(measured=measured), tracking()
+    assert joint.run(servo, 4000) is reason
+    assert len(joint.commands) < 2000
+    assert ends_gently(joint.commands)
+
+
+def test_a_zero_of_the_measured_torque_is_taken_off_while_the_motors_are_off() -> None:
+    joint = Joint(measured=lambda torque: torque + 0.05)
+    servo = tracking()
+    servo.engage(Mode.IDLE)
+    joint.run(servo, 300)
+    servo.engage(Mode.TRACK)
+    joint = replace(joint, clock=lambda tick: 1000 * (tick + 300))
+    joint.commands.clear()
+    second = _later(joint, 300)
+    assert second.run(servo, 3500) is StopReason.NONE
+    assert servo.watched["measured_differs"] < 0.5
+
+
+class _Later:
+    """States whose sequence goes on from an earlier run."""
+
+    def __init__(self, servo: Servo, ticks: int) -> None:
+        self._servo, self._ticks = servo, ticks
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._servo, name)
+
+    def step(self, state: State) -> object:
+        return self._servo.step(state._replace(sequence=state.sequence + self._ticks))
+
+
+def _later(joint: Joint, ticks: int) -> Joint:
+    run = joint.run
+    joint.run = lambda servo, count: run(_Later(servo, ticks), count)  # type: ignore[method-assign,assignment,arg-type,return-value]
+    return joint
+
+
+@pytest.mark.parametrize("since", [1, 700])
+def test_an_encoder_that_stands_is_told_before_the_torque_is_large(since: int) -> None:
+    stuck: list[float] = []
+
+    def seen(tick: int, opening: float) -> float:
+        if tick >= since:
+            stuck.append(opening)
+            return stuck[0]
+        return opening
+
+    joint, servo = Joint(seen=seen), tracking()
+    assert joint.run(servo, 4000) is StopReason.OPENING_STANDS
+    assert max(map(abs, joint.commands)) < 0.3
+    assert ends_gently(joint.commands)
+
+
+def test_blades_that_rest_under_unequal_torques_are_told() -> None:
+    """An encoder that is stuck while a hand pushes against a rendering."""
+    joint = Joint(seen=lambda tick, opening: 0.5, push=lambda tick, rate: -0.2)
+    servo = Servo(make_tables(), CONFIG)
+    servo.engage(Mode.RENDER)
+    assert joint.run(servo, 3000) is StopReason.OPENING_STANDS
+    assert len(joint.commands) < 800
+
+
+def test_a_hand_that_rests_is_no_fault() -> None:
+    joint = Joint(push=lambda tick, rate: -0.008)
+    servo = Servo(make_tables(), CONFIG)
+    servo.engage(Mode.RENDER)
+    assert joint.run(servo, 3000) is StopReason.NONE
+
+
+@pytest.mark.parametrize("ratio", [0.9, 1.05])
+def test_a_clock_that_is_wrong_is_told_at_rest_already(ratio: float) -> None:
+    joint = Joint(clock=lambda tick: round(1000 * ratio * tick))
+    servo = Servo(None, CONFIG)
+    assert joint.run(servo, 2000) is StopReason.CLOCK_RATE
+    assert len(joint.commands) < 1000
+
+
+def test_ticks_that_are_not_tick_us_long_are_told_by_this_computer() -> None:
+    """The device counts 1000 us a tick, and a tick is 1100 us."""
+    servo = Servo(None, replace(CONFIG, tick_us=1100))
+    joint = Joint(clock=lambda tick: 1100 * tick)
+    assert joint.run(servo, 4000) is StopReason.NONE
+    off = replace(CONFIG, watch=replace(WATCH, clock_share=0.0), tick_us=1100)
+    assert Joint(clock=lambda tick: 1000 * tick).run(Servo(None, off), 9000) is (
+        StopReason.CLOCK_RATE
+    )
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_torque_that_is_no_number_stops(bad: float) -> None:
+    joint = Joint(measured=lambda torque: bad)
+    assert joint.run(tracking(), 1000) is StopReason.UNREADABLE
+    assert len(joint.commands) < 40
+
+
+def test_a_torque_at_its_limit_for_too_long_stops() -> None:
+    """Blades that are blocked by something springy: they move a little, and the torque is full."""
+    config = replace(CONFIG, opening_kp=60.0, watch=replace(WATCH, still_rad=0.0))
+    joint = Joint(seen=lambda tick, opening: 0.6 - 1e-5 * (tick % 2))
+    assert joint.run(tracking(config), 4000) is StopReason.TORQUE_HELD
+    assert ends_gently(joint.commands)
+
+
+def test_an_end_cannot_be_ordered_away() -> None:
+    joint, servo = Joint(measured=lambda torque: -torque), tracking()
+    joint.run(servo, 4000)
+    assert servo.stop_reason is StopReason.MEASURED_REVERSED
+    servo.engage(Mode.TRACK)
+    command = servo.step(State(1, 5000, 5_000_000, 0.5, -0.02, 0.0, 0.0))
+    assert (command.flags, command.torque) == (0, 0.0)
+
+
+def test_a_watch_needs_sound_thresholds() -> None:
+    with pytest.raises(ValueError, match="swing_rate"):
+        WatchConfig(swing_rate=-1.0)
+    with pytest.raises(ValueError, match="below 1"):
+        WatchConfig(ratio_torque=0.01, least_ratio=1.2, most_ratio=1.4)
