@@ -1,6 +1,8 @@
 """What is known of a rig before it renders: friction, inertia, delay, and where each comes from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from scissorcal.kernel import Identity
 from scissorcal.package import ModelPackage
@@ -10,6 +12,17 @@ LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
 SMALL_INERTIA_kg_m2 = 5e-5
 """Where neither fit nor probe has the inertia: of small scissors, which damping disturbs first."""
+
+
+class Fitted(Protocol):
+    """A fitted parameter, of a fit or of a package's record of one."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def q05(self) -> float: ...
+    @property
+    def q50(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -28,22 +41,27 @@ class RigFacts:
 
 
 def rig_facts(package: ModelPackage) -> RigFacts:
-    """Friction and inertia of the rig, from the friction fit in a package.
-
-    Levels are the lower ends of the 90 % intervals, of the weaker direction and the opening where
-    friction is least.
-    """
+    """Friction and inertia of the rig from the friction fit in a package; empty without one."""
     record = package.manifest.provenance.friction
     if record is None:
         return RigFacts()
-    lower = {parameter.name: parameter.q05 for parameter in record.parameters}
-    middle = {parameter.name: parameter.value for parameter in record.parameters}
     least = float(package.tables.friction_angle.y.min())
+    return fitted_facts(record.parameters, least, "the package's friction fit")
+
+
+def fitted_facts(parameters: Sequence[Fitted], least: float, source: str) -> RigFacts:
+    """Friction and inertia from a friction fit's parameters.
+
+    Levels are the lower ends of the 90 % intervals, of the weaker direction, times ``least``, the
+    least factor of friction over the scene's openings.
+    """
+    lower = {parameter.name: parameter.q05 for parameter in parameters}
+    inertia = [parameter.q50 for parameter in parameters if parameter.name == "inertia"]
     return RigFacts(
         coulomb_Nm=least * _weakest(lower, "coulomb"),
         damping_Nm_s_per_rad=least * _weakest(lower, "viscous"),
-        inertia_kg_m2=middle.get("inertia"),
-        source="the package's friction fit",
+        inertia_kg_m2=inertia[0] if inertia and inertia[0] > 0.0 else None,
+        source=source,
     )
 
 
