@@ -88,9 +88,7 @@ def main() -> None:
             panel.set_ylabel("stiffness (N m/rad)")
         axes[0, 1].legend(frameon=False, title="line: admitted\ndot: oscillates", fontsize=8)
         figure.tight_layout()
-        for kind in ("svg", "png"):
-            options: Any = {"metadata": {"Date": None}} if kind == "svg" else {"dpi": 110}
-            figure.savefig(arguments.out / f"stability.{kind}", **options)
+        figure.savefig(arguments.out / "stability.svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":
