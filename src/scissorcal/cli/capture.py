@@ -126,6 +126,7 @@ def _capture(
                 realtime=rig.realtime,
                 progress=view.show,
                 confirm=view.confirm,
+                say=note,
             )
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)

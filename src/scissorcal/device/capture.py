@@ -26,6 +26,7 @@ from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
+from scissorcal.recording.probe import PROBE_KEY, ProbeResult
 
 CaptureProgress = Callable[[float, str, Recorder], None]
 """Called with the share done (0 to 1), a sentence, and what was recorded so far."""
@@ -54,12 +55,19 @@ class CaptureReport:
 
 
 def open_writer(
-    path: Path, kind: Kind, link: Link, recipe: Recipe, recipe_toml: str, *, hand: bool = False
+    path: Path,
+    kind: Kind,
+    link: Link,
+    recipe: Recipe,
+    recipe_toml: str,
+    *,
+    hand: bool = False,
+    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a capture and write all that is known before it starts.
 
-    ``recipe_toml`` is the recipe's text, as it stands in its file. Raises as RecordingWriter
-    does, and as the plan of the capture does.
+    ``recipe_toml`` is the recipe's text, as it stands in its file; ``probe`` what a probe of this
+    rig found. Raises as RecordingWriter does, and as the plan of the capture does.
     """
     identity = link.identity
     strokes: tuple[Stroke, ...] = ()
@@ -71,7 +79,7 @@ def open_writer(
         kind,
         Joint(recipe.rig.joint),
         recipe_toml,
-        identity_facts(identity),
+        rig_facts(identity, recipe.rig.motor_sign, probe),
         identity.handle_radius,
         strokes,
         min_travel=hand_travel(recipe, identity) if hand else None,
@@ -180,6 +188,7 @@ def servo_config(
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
         watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
+        motor_sign=recipe.rig.motor_sign,
     )
 
 
@@ -188,6 +197,19 @@ def identity_facts(identity: Identity) -> dict[str, Any]:
     facts = identity._asdict()
     del facts["nonce_echo"]
     return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
+
+
+def rig_facts(identity: Identity, motor_sign: int, probe: ProbeResult | None) -> dict[str, Any]:
+    """What a recording holds of its rig: the identity, a motor sign of -1, and the probe.
+
+    Torques in the recording are of the corrected sign.
+    """
+    facts = identity_facts(identity)
+    if motor_sign != 1:
+        facts["motor_sign"] = motor_sign
+    if probe is not None:
+        facts[PROBE_KEY] = probe.as_dict()
+    return facts
 
 
 def identity_of(facts: Mapping[str, Any]) -> Identity:

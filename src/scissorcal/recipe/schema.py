@@ -100,9 +100,27 @@ class Line(Section):
     brake_after_ms: Annotated[float, Field(ge=1, le=1000, allow_inf_nan=False)] = 10.0
 
 
+class Probe(Section):
+    """How far the probe may go before the first motor run, and how long it counts.
+
+    The blades are pushed by growing torques up to ``largest_torque_Nm`` until they move, never
+    farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. ``creep`` lets it
+    move slowly to both stops, which shows whether the encoder counts the whole range. A probe of
+    the same rig counts for ``max_age_h``.
+    """
+
+    largest_torque_Nm: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.05
+    largest_angle_deg: Annotated[float, Field(gt=0, le=30, allow_inf_nan=False)] = 2.0
+    largest_rate_rad_per_s: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 1.5
+    creep: bool = False
+    max_age_h: Annotated[float, Field(ge=0, le=168, allow_inf_nan=False)] = 4.0
+
+
 class Rig(Section):
     """The device: which blades move, the handle, and the blade.
 
+    ``motor_sign = -1`` turns the motor's torque round, commanded and measured, for a motor whose
+    wires are swapped.
     ``opening_zero_sd_deg`` says how well the zero of the opening (where the centrelines of the
     blades meet) is known, as by a homing switch; half a millimetre at each tip where not given.
     ``hand_damping_N_s_per_m`` is what a hand adds to each handle at least, and what a rendering
@@ -118,6 +136,8 @@ class Rig(Section):
     edge: Edge
     control: Control = Control()
     line: Line = Line()
+    motor_sign: Literal[1, -1] = 1
+    probe: Probe = Probe()
 
     @property
     def moving_blades(self) -> int:

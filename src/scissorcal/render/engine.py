@@ -1,11 +1,11 @@
 """Render a package on a rig within limits, record it, and judge it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from scissorcal.device.capture import identity_facts
+from scissorcal.device.capture import rig_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
@@ -16,6 +16,7 @@ from scissorcal.kernel import Capability, ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
+from scissorcal.recording.probe import ProbeResult
 from scissorcal.render.admission import (
     Admission,
     admit_package,
@@ -59,6 +60,7 @@ def render(
     *,
     seconds: float = 30.0,
     limits: Limits | None = None,
+    motor_sign: int = 1,
     strokes: VirtualStrokes | None = None,
     writer: RecordingWriter | None = None,
     progress: Progress | None = None,
@@ -68,10 +70,11 @@ def render(
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
     The loop runs in a separate process, paced by the device's frames, or frame by frame in
-    virtual time on a LockstepLink. It keeps to the tightest of three limits: ``limits`` (a
-    recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
-    On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
-    with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
+    virtual time on a LockstepLink; ``motor_sign`` is the recipe's. It keeps to the tightest of
+    three limits: ``limits`` (a recipe's), the package's own, the device's. Force is ramped up from
+    zero, also after a fault. On a simulator the virtual hand makes ``strokes`` (four, unless
+    given), and the rendering ends with them; on a real rig ``confirm`` asks a person to clear the
+    blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
@@ -90,6 +93,7 @@ def render(
     admission = admit_package(package, identity, rig, applied.torque_Nm)
     warnings = package.warnings + mismatches + _admitted(admission)
     config = _servo_config(applied, admission, identity, seconds)
+    config = replace(config, motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
             writer.note(sentence)
@@ -137,18 +141,25 @@ def render(
 
 
 def open_writer(
-    path: Path, link: Link, package: ModelPackage, recipe_toml: str = ""
+    path: Path,
+    link: Link,
+    package: ModelPackage,
+    recipe_toml: str = "",
+    *,
+    motor_sign: int = 1,
+    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a rendering; the package's manifest travels in it.
 
-    ``recipe_toml`` is the recipe's text as it stands in its file. Raises as RecordingWriter does.
+    ``recipe_toml`` is the recipe's text as it stands in its file, ``probe`` what a probe of this
+    rig found. Raises as RecordingWriter does.
     """
     writer = RecordingWriter(
         path,
         "render",
         Joint("rotary"),
         recipe_toml,
-        identity_facts(link.identity),
+        rig_facts(link.identity, motor_sign, probe),
         link.identity.handle_radius,
         min_travel=_travel(package),
     )

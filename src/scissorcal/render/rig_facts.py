@@ -1,11 +1,12 @@
 """What is known of a rig before it renders: friction, inertia, delay, and where each comes from."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from scissorcal.kernel import Identity
 from scissorcal.package import ModelPackage
+from scissorcal.recording.probe import ProbeResult
 from scissorcal.render.admission_rule import LoopFacts
 
 LATE_TICKS = 2.0
@@ -63,6 +64,30 @@ def fitted_facts(parameters: Sequence[Fitted], least: float, source: str) -> Rig
         inertia_kg_m2=inertia[0] if inertia and inertia[0] > 0.0 else None,
         source=source,
     )
+
+
+def with_probe(rig: RigFacts, probe: ProbeResult | None) -> RigFacts:
+    """Add what a probe measured: its delay (upper end), and what nothing else has.
+
+    Friction and inertia of a probe are rough, so a fit's count where there is one.
+    """
+    if probe is None:
+        return rig
+    found, name = rig, f"the probe of {probe.made_at}"
+    if probe.delay_s is not None:
+        late_s = max(probe.delay_s.interval[1], 0.0)
+        found = replace(found, late_s=late_s, late_source=name)
+    if found.coulomb_Nm is None and probe.coulomb_Nm is not None:
+        viscous = probe.viscous_Nm_s_per_rad
+        found = replace(
+            found,
+            coulomb_Nm=max(probe.coulomb_Nm.interval[0], 0.0),
+            damping_Nm_s_per_rad=0.0 if viscous is None else max(viscous.interval[0], 0.0),
+            source=name,
+        )
+    if found.inertia_kg_m2 is None and probe.inertia_kg_m2 is not None:
+        found = replace(found, inertia_kg_m2=max(probe.inertia_kg_m2.mean, 0.0) or None)
+    return found
 
 
 def loop_facts(identity: Identity, rig: RigFacts) -> tuple[LoopFacts | None, tuple[str, ...]]:

@@ -73,6 +73,8 @@ typedef struct {
     uint32_t tick_us;
     sc_passivity_config passivity;
     sc_watch_config watch;
+    float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
+                                  measured; everything else here is of corrected signs */
 } sc_servo_config;
 
 typedef struct {

@@ -20,6 +20,7 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
+from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace, create_workspace
 
@@ -225,9 +226,12 @@ def _capture(root: Path, seed: int) -> None:
     recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
     specimen, streams = _drawn(recipe, seed)
     link = LockstepLink(specimen, streams[0])
-    with open_writer(workspace.new_recording("friction"), "friction", link, recipe, text) as writer:
+    probe = ensure_probed(workspace, link, recipe)
+    path = workspace.new_recording("friction")
+    with open_writer(path, "friction", link, recipe, text, probe=probe) as writer:
         capture_friction(link, recipe, writer)
-    with open_writer(workspace.new_recording("cut"), "cut", link, recipe, text) as writer:
+    path = workspace.new_recording("cut")
+    with open_writer(path, "cut", link, recipe, text, probe=probe) as writer:
         capture_cut(link, recipe, writer)
     link.close()
 
@@ -272,11 +276,17 @@ def _render(
 ) -> "tuple[ModelPackage, RenderResult, Path]":
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
+    from scissorcal.render.rig_facts import rig_facts, with_probe
 
     package = open_package(workspace.package_path(recipe), warn=False)
+    probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("render")
-    with open_writer(path, link, package, read_text(workspace.recipe_path)) as writer:
-        result = render(link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer)
+    text = read_text(workspace.recipe_path)
+    with open_writer(path, link, package, text, probe=probe) as writer:
+        rig = with_probe(rig_facts(package), probe)
+        result = render(
+            link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer, rig=rig
+        )
     return package, result, path
 
 
