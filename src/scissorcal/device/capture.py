@@ -21,8 +21,9 @@ from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.recorder import Recorder, Tally, unloaded_sentence
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.unloaded import LoadWatch
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
@@ -47,12 +48,16 @@ CLEAR_REQUEST = (
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran.
+
+    ``empty`` are the closing strokes in which nothing was cut.
+    """
 
     sample_count: int
     coverage: CoverageGrid
     tally: Tally
     motion: MotionReport
+    empty: tuple[Stroke, ...] = ()
 
 
 def open_writer(
@@ -98,17 +103,16 @@ def capture_friction(
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. Gains follow from
-    ``probe`` (`capture_gains`). What was recorded stays in the writer, whatever happens. Raises
-    DeviceError where the rig fails (limits, faults that do not clear, an unplugged cable) or no
-    gains can control it, InputError where the recipe does not fit it.
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. The gains follow
+    from ``probe`` where there is one; DeviceError where none could follow the plan. What was
+    recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
+    faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
     """
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    gains = capture_gains(recipe, link.identity, "friction", Probed.of(probe))
+    gains = _gains(link, recipe, "friction", probe, writer)
     with _motion_for(link, recipe, plan, gains) as motion:
-        _note_margin(writer, gains)
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
@@ -137,7 +141,7 @@ def capture_cut(
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
-    gains = capture_gains(recipe, identity, "cut", Probed.of(probe))
+    gains = _gains(link, recipe, "cut", probe, writer)
     if hand:
         with _motion_for(link, recipe, None, gains) as motion:
             loader = Loader(motion, recorder, confirm)
@@ -148,7 +152,6 @@ def capture_cut(
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
     with _motion_for(link, recipe, plan, gains) as motion:
-        _note_margin(writer, gains)
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
@@ -156,7 +159,7 @@ def capture_cut(
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)
-            loader.load(segment.request)
+            loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
         return _finish(recorder, motion)
@@ -198,10 +201,10 @@ def servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
+        motor_sign=recipe.rig.motor_sign,
         watch=replace(
             watches_of(identity, torque_limit, limits.held_at_limit_s), still_rad=control.still_rad
         ),
-        motor_sign=recipe.rig.motor_sign,
     )
 
 
@@ -244,6 +247,14 @@ class _Drive:
         self._tell = progress or _silent
         self._total = sum(len(segment.reference) for segment in plan.segments)
         self._done = 0
+        identity, cuts = motion.identity, any(stroke.sheet >= 0 for stroke in plan.strokes)
+        self._load = LoadWatch(plan.strokes, identity.handle_radius) if cuts else None
+        self._warned = 0
+
+    def warning(self) -> str:
+        """What to tell whoever loads the next piece about the last one; empty if it was cut."""
+        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
+        return f"{unloaded_sentence(empty[-1])} " if empty else ""
 
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
@@ -266,6 +277,9 @@ class _Drive:
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
+        for stroke in self._load.take(samples) if self._load and len(samples) else ():
+            self._recorder.unloaded(stroke)
+            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
         self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
@@ -279,17 +293,20 @@ class _Drive:
         return f"{stroke.kind}{speed} ({of})"
 
 
+def _gains(
+    link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
+) -> CaptureGains:
+    """Gains by what the probe found; what is said of them is noted."""
+    gains = capture_gains(recipe, link.identity, kind, Probed.of(probe))
+    for verdict in gains.verdicts if probe else ():
+        writer.note(verdict.why)
+    return gains
+
+
 def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
     config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
-
-
-def _note_margin(writer: RecordingWriter, gains: CaptureGains) -> None:
-    """Note in the recording what the controller's margin is, where it is not that of a design."""
-    for verdict in gains.verdicts:
-        if verdict.status != "pass":
-            writer.note(f"The {verdict.check} is not what it should be: {verdict.why}")
 
 
 def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
@@ -298,7 +315,9 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     if report.rights:
         recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
-    return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
+    return CaptureReport(
+        recorder.sample_count, recorder.coverage, recorder.tally, report, tuple(recorder.empty)
+    )
 
 
 def _silent(done: float, sentence: str, recorder: Recorder) -> None:

@@ -55,14 +55,15 @@ class Probed:
 
     @classmethod
     def of(cls, probe: ProbeResult | None) -> "Probed | None":
-        """Of a probe; None where it found no inertia, friction or delay."""
+        """Of a probe; None where it found no inertia, dry friction or delay."""
         if probe is None:
             return None
-        inertia, delay = probe.inertia_kg_m2, probe.delay_s
-        dry, viscous = probe.coulomb_Nm, probe.viscous_Nm_s_per_rad
-        if inertia is None or delay is None or dry is None or viscous is None:
+        inertia, delay, dry = probe.inertia_kg_m2, probe.delay_s, probe.coulomb_Nm
+        if inertia is None or delay is None or dry is None:
             return None
-        return cls(inertia.mean, inertia.sd, viscous.mean, dry.mean, delay.mean)
+        viscous = probe.viscous_Nm_s_per_rad
+        damping = 0.0 if viscous is None else viscous.mean
+        return cls(inertia.mean, inertia.sd, damping, dry.mean, delay.mean)
 
 
 @dataclass(frozen=True)
