@@ -117,8 +117,9 @@ def test_margins_are_where_poles_reach_the_unit_circle(
     assert not (settles(1.1 * margins.gain) and settles(0.9 / margins.gain))
 
 
-@pytest.mark.parametrize("tick_us", [250, 500, 1000, 2000])
-@pytest.mark.parametrize("delay_ms", [0.2, 1.0, 3.0])
+@pytest.mark.parametrize(
+    ("tick_us", "delay_ms"), [(250, 0.2), (250, 3.0), (500, 1.0), (1000, 0.2), (2000, 3.0)]
+)
 def test_designs_keep_their_margins(tick_us: int, delay_ms: float) -> None:
     probed = replace(PROBED, delay_s=1e-3 * delay_ms)
     identity = IDENTITY._replace(tick_us=tick_us)
@@ -195,8 +196,10 @@ def swung(faults: Faults, gains: CaptureGains, identity: Identity) -> tuple[floa
     return device.largest_rate, device.largest_torque
 
 
-@pytest.mark.parametrize("tick_us", [250, 1000, 2000])
-@pytest.mark.parametrize("late_ms", [0.0, 1.0, 3.0, 5.0])
+@pytest.mark.parametrize(
+    ("late_ms", "tick_us"),
+    [(0.0, 1000), (1.0, 1000), (3.0, 1000), (5.0, 1000), (3.0, 250), (5.0, 2000)],
+)
 def test_an_independent_device_is_followed_without_swinging(late_ms: float, tick_us: int) -> None:
     half = 0.5e-3 * late_ms
     faults = Faults(delay_to_host_s=half, delay_to_device_s=half, tick_us=tick_us)
