@@ -79,7 +79,7 @@ static int finish_frame(sc_decoder *decoder)
     const size_t size = overrun ? 0 : uncobs(decoder->buffer, fill);
     if (size >= 3) {
         const uint8_t *crc = decoder->buffer + size - 2;
-        if (sc_crc16(decoder->buffer, size - 2) == (uint16_t)(crc[0] | (crc[1] << 8))) {
+        if (sc_crc16(decoder->buffer, size - 2) == get_u16(crc)) {
             return (int)(size - 2);
         }
     }
