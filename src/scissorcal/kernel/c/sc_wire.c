@@ -1,5 +1,7 @@
 #include "sc_wire.h"
 
+#include "sc_bytes.h"
+
 #include <string.h>
 
 uint16_t sc_crc16(const uint8_t *data, size_t size)
