@@ -1,4 +1,4 @@
-"""The C tests, strict and under the sanitizers, and a step on a Cortex-M4F, if the tools are here."""
+"""The C tests, strict and under the sanitizers, and a step on a Cortex-M4F where tools are here."""
 
 import shutil
 import subprocess
@@ -60,7 +60,7 @@ def test_what_two_threads_share(tmp_path: Path) -> None:
     reason="no arm-none-eabi-gcc or qemu-system-arm here",
 )
 def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
-    """The whole portable core compiles without a warning, and its step's instructions are bounded."""
+    """The portable core compiles without a warning, and its step's instructions are bounded."""
     rows = [line for line in make("cortex-m", tmp_path).splitlines() if ", " in line]
     assert len(rows) == 10
     for row in rows:
