@@ -5,7 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-BEAT_S = 0.02
+BEAT_S = 0.04
+"""A fifth of the least supervisor_ms; each time this process wakes may delay the loop."""
 PATIENCE_S = 1.0
 """Chosen: longer than any pause of the supervisor that was seen on a busy computer (0.45 s), and
 an eighth of what the ring of samples holds at 4 kHz, so that nothing is lost before it shows."""
@@ -15,7 +16,7 @@ class Heartbeat:
     """Beats from a thread while the supervisor's main loop shows that it works.
 
     The main loop calls :meth:`seen` with each block of samples that it takes. The thread beats
-    every 20 ms as long as that was within the last ``PATIENCE_S``, so that a block that takes
+    every 40 ms as long as that was within the last ``PATIENCE_S``, so that a block that takes
     long (a slow disk, a busy processor) does not end a rendering, while a main loop that hangs is
     noticed ``PATIENCE_S`` and the servo's own limit later. A process that is stopped or dies does
     not beat at all.

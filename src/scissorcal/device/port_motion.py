@@ -143,8 +143,9 @@ class PortMotion(Motion):
         """Wait until 50 ms after the last call, or the end of the loop; empty the ring buffer."""
         self._process.heartbeat.seen()
         self._drain_at = max(self._drain_at + DRAIN_S, time.monotonic())
-        while (left := self._drain_at - time.monotonic()) > 0 and self._process.alive:
-            time.sleep(min(left, 0.01))
+        left = self._drain_at - time.monotonic()
+        if left > 0 and self._process.alive:
+            time.sleep(left)  # in one piece: each time this process wakes may delay the loop
         return self._block.read()
 
     def _why_lost(self) -> DeviceError | None:

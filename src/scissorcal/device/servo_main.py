@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 
-from scissorcal.kernel import LoopBlock, lock_memory, run_loop
+from scissorcal.kernel import LoopBlock, ask_for_short_slice, lock_memory, run_loop
 
 PRIORITY = 10
 """Under SCHED_FIFO, where that is allowed: above all that is not real-time, below drivers."""
@@ -30,9 +30,11 @@ def main(arguments: list[str]) -> int:
 
 
 def _ask_for_priority() -> bool:
+    """Ask for real-time priority, for a short time slice where it is refused; which it was."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except (OSError, AttributeError):
+        ask_for_short_slice()
         return False
     return True
 

@@ -8,7 +8,14 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihoods,
 )
 from scissorcal.kernel.lag import LagCounts
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, lock_memory, run_loop
+from scissorcal.kernel.loop import (
+    Histogram,
+    LoopBlock,
+    LoopCounters,
+    ask_for_short_slice,
+    lock_memory,
+    run_loop,
+)
 from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -82,6 +89,7 @@ __all__ = [
     "StopReason",
     "Table",
     "WatchConfig",
+    "ask_for_short_slice",
     "c_sources",
     "crc16",
     "cut_log_likelihood",

@@ -21,6 +21,7 @@ HEADERS = (
     "sc_servo.h",
     "sc_block.h",
     "sc_loop.h",
+    "sc_rights.h",
     "sc_cut_fit.h",
     "sc_crack.h",
     "sc_presliding.h",

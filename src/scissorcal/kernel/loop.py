@@ -45,7 +45,15 @@ def run_loop(fd: int, block: "LoopBlock") -> StopReason:
 
 def lock_memory() -> bool:
     """Keep this process's memory from being paged out; whether the system grants it."""
-    return bool(lib.sc_loop_lock_memory())
+    return bool(lib.sc_rights_lock_memory())
+
+
+def ask_for_short_slice() -> bool:
+    """Ask that this thread interrupts others when it wakes, without real-time priority.
+
+    Needs no right, and Linux 6.12 or newer; whether the call is known. It ends real-time priority.
+    """
+    return bool(lib.sc_rights_short_slice())
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -292,11 +291,6 @@ static void wait_and_serve(loop *self)
     } else if (ready < 0 && errno != EINTR) {
         fail(self, SC_STOP_LINE_ERROR, errno);
     }
-}
-
-int sc_loop_lock_memory(void)
-{
-    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 }
 
 uint32_t sc_loop_run(int fd, sc_block *block)

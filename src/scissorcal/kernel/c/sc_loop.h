@@ -11,7 +11,4 @@
  * socket, have SIGPIPE ignored, as Python does. */
 uint32_t sc_loop_run(int fd, sc_block *block);
 
-/* Keep all memory of this process, also what it gets later, from being paged out; 1 if granted. */
-int sc_loop_lock_memory(void);
-
 #endif
