@@ -37,10 +37,8 @@ def test_the_device_is_told_how_long_to_wait() -> None:
             with open_rig(sim.port, None):
                 pass
         with patch("scissorcal.device.link.open_port", side_effect=ValueError("none")) as opened:
-            with (
-                pytest.raises(ValueError, match="none"),
-                open_rig(sim.port, None, line=Line(baud=115200)),
-            ):
+            slow = Line(baud=115200)
+            with pytest.raises(ValueError, match="none"), open_rig(sim.port, None, line=slow):
                 pass
             assert opened.call_args.args == (sim.port, 115200)
     assert told == [(ConfigKey.BRAKE_AFTER_MS, 25.0)]

@@ -69,6 +69,7 @@ def render(
             realtime=realtime,
             progress=view.show,
             confirm=view.confirm,
+            say=note,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts

@@ -203,7 +203,7 @@ class LoopBlock(ServoView):
         for row, array in enumerate(arrays):
             at = start + row * capacity * 4
             self._memory[at : at + 4 * n] = array.tobytes()
-        block.reference_size = n
+        lib.sc_block_set_reference_size(block, n)
 
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
@@ -294,8 +294,10 @@ def _store_tables(block: Any, tables: ModelTables) -> None:
     for name in ("edge", "response", "friction_opening", "friction_closing", "friction_angle"):
         _store_table(getattr(block, name), getattr(tables, name))
     block.has_model = 1
-    if not lib.sc_block_model(block, ffi.new("sc_model *")):
+    model = ffi.new("sc_model *")
+    if not lib.sc_block_model(block, model):
         raise ValueError("The kernel refuses these tables: their numbers do not fit float32.")
+    block.model.release_falls = lib.sc_model_release_falls(model)
 
 
 def _store_table(store: Any, table: Table) -> None:

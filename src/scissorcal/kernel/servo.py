@@ -74,6 +74,7 @@ class ServoConfig:
     A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
     mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
     usable, nor are places that would need twice as fast a motion.
+    ``motor_sign = -1`` turns the motor's torque round on the wire, commanded and measured.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
     more stops. ``watch`` has the thresholds of the watches, by default none.
@@ -102,11 +103,14 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
+    motor_sign: int = 1
     watch: WatchConfig = NO_WATCHES
 
     def __post_init__(self) -> None:
         for field in self._numbers():
             value = getattr(self, field.name)
+            if field.name == "motor_sign":
+                continue
             least = -WIDEST_OPENING if field.name in ("opening_low", "opening_high") else 0
             if not least <= value <= U32:  # NaN and infinity fail this too
                 raise ValueError(
@@ -115,6 +119,8 @@ class ServoConfig:
         for name in _ABOVE_ZERO:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0.")
+        if self.motor_sign not in (1, -1):
+            raise ValueError("motor_sign must be 1 or -1.")
         if not self.opening_low < self.opening_high:
             raise ValueError("opening_low must be below opening_high.")
 
@@ -290,19 +296,20 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> Command:
         """Take a state and return the command.
 
         ``heartbeat=False`` simulates a supervisor without heartbeat. ``answered=False`` says that
         this command is not sent, as for all but the newest of states that arrived at once: a tick
-        of time passes with the first of them, and slews and clearings of faults count by commands
-        that are sent.
+        of time passes with the first of them (or ``passed_us``), and slews and clearings of faults
+        count by commands that are sent.
         """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
         c.opening, c.advance = state.opening, state.advance
         c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)
 
@@ -313,6 +320,7 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> bytes:
         """Take a STATE payload and return the whole COMMAND frame: :meth:`step` for bytes, faster.
 
@@ -320,16 +328,18 @@ class Servo(ServoView):
         """
         if not lib.sc_unpack_state(ffi.from_buffer(payload), len(payload), self._state):
             raise ValueError(f"A payload of {len(payload)} bytes is no STATE.")
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         size = lib.sc_pack_command(self._command, self._payload)
         return encode_frame(bytes(ffi.buffer(self._payload, size)))
 
-    def _step(self, heartbeat: bool, host_time_ns: int, answered: bool) -> None:
+    def _step(
+        self, heartbeat: bool, host_time_ns: int, answered: bool, passed_us: int | None
+    ) -> None:
         if heartbeat:
             self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
         if not self._waiting:
-            tick_us = self.config.tick_us
-            lib.sc_servo_pass(self._config, self._orders, self._servo, tick_us)
+            time_us = self.config.tick_us if passed_us is None else passed_us
+            lib.sc_servo_pass(self._config, self._orders, self._servo, time_us)
         self._waiting = not answered
         fresh = lib.sc_servo_step(
             self._config,

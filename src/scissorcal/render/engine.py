@@ -1,11 +1,11 @@
 """Render a package on a rig within limits, record it, and judge it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from scissorcal.device.capture import identity_facts
+from scissorcal.device.capture import rig_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
@@ -16,6 +16,7 @@ from scissorcal.kernel import ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
+from scissorcal.recording.probe import ProbeResult
 from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
 
@@ -52,6 +53,7 @@ def render(
     *,
     seconds: float = 30.0,
     limits: Limits | None = None,
+    motor_sign: int = 1,
     strokes: VirtualStrokes | None = None,
     writer: RecordingWriter | None = None,
     progress: Progress | None = None,
@@ -60,10 +62,11 @@ def render(
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
     The loop runs in a separate process, paced by the device's frames, or frame by frame in
-    virtual time on a LockstepLink. It keeps to the tightest of three limits: ``limits`` (a
-    recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
-    On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
-    with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
+    virtual time on a LockstepLink; ``motor_sign`` is the recipe's. It keeps to the tightest of
+    three limits: ``limits`` (a recipe's), the package's own, the device's. Force is ramped up from
+    zero, also after a fault. On a simulator the virtual hand makes ``strokes`` (four, unless
+    given), and the rendering ends with them; on a real rig ``confirm`` asks a person to clear the
+    blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
@@ -74,7 +77,7 @@ def render(
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
-    config = _servo_config(applied, identity, seconds)
+    config = replace(_servo_config(applied, identity, seconds), motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
             writer.note(sentence)
@@ -121,18 +124,25 @@ def render(
 
 
 def open_writer(
-    path: Path, link: Link, package: ModelPackage, recipe_toml: str = ""
+    path: Path,
+    link: Link,
+    package: ModelPackage,
+    recipe_toml: str = "",
+    *,
+    motor_sign: int = 1,
+    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a rendering; the package's manifest travels in it.
 
-    ``recipe_toml`` is the recipe's text as it stands in its file. Raises as RecordingWriter does.
+    ``recipe_toml`` is the recipe's text as it stands in its file, ``probe`` what a probe of this
+    rig found. Raises as RecordingWriter does.
     """
     writer = RecordingWriter(
         path,
         "render",
         Joint("rotary"),
         recipe_toml,
-        identity_facts(link.identity),
+        rig_facts(link.identity, motor_sign, probe),
         link.identity.handle_radius,
         min_travel=_travel(package),
     )

@@ -33,7 +33,8 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->advance_error_limit > 0.0f && config->tick_us > 0 &&
            isfinite(config->opening_low) && isfinite(config->opening_high) &&
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
-           config->advance_rate_limit > 0.0f && sc_watch_config_is_sound(&config->watch);
+           config->advance_rate_limit > 0.0f && isfinite(config->motor_sign) &&
+           sc_watch_config_is_sound(&config->watch);
 }
 
 /* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
@@ -184,6 +185,8 @@ static void count_frame(sc_servo *servo, const sc_state *state)
     if (servo->started && passed > 1 && passed < 0x80000000u) {
         servo->misses += passed - 1;
         servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
+    } else if (servo->started && passed >= 0x80000000u) {
+        sc_servo_stop(servo, SC_STOP_RESTARTED); /* the reference counts by sequence numbers */
     }
     servo->sequence = state->sequence;
     servo->started = 1;
@@ -279,9 +282,9 @@ static void repeat_command(const sc_servo_config *config, sc_servo *servo, sc_co
     write_command(servo, (uint16_t)servo->command_flags, command);
 }
 
-int sc_servo_step(const sc_servo_config *config, const sc_model *model,
-                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
-                  const sc_state *state, sc_command *command)
+static int step(const sc_servo_config *config, const sc_model *model,
+                const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                const sc_state *state, sc_command *command)
 {
     sc_servo_obey(orders, servo);
     if (servo->started && state->sequence == servo->sequence) {
@@ -326,6 +329,18 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     }
     answer(config, servo, valid, faulty, wanted, command);
     return 1;
+}
+
+int sc_servo_step(const sc_servo_config *config, const sc_model *model,
+                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                  const sc_state *state, sc_command *command)
+{
+    const float sign = config->motor_sign < 0.0f ? -1.0f : 1.0f;
+    sc_state corrected = *state;
+    corrected.motor_torque *= sign;
+    const int fresh = step(config, model, reference, orders, servo, &corrected, command);
+    command->torque *= sign;
+    return fresh;
 }
 
 void sc_servo_sent(sc_servo *servo)
