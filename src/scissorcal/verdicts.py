@@ -47,6 +47,14 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
+    "fit sensor zeros": (
+        "at most",
+        TORQUE + "zero of the sensors, share of the drive (rms); it is subtracted",
+    ),
+    "fit zero drift": (
+        "at most",
+        TORQUE + "two sds of what is left of the zeros, share of the drive (rms)",
+    ),
     "fit foundations": ("at most", "what the fit builds on: failed verdicts there"),
     "fit teeth": (
         "at most",
@@ -99,6 +107,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "what the package is made from: checks that its fits failed",
     ),
     "package review": ("at least", "whether the report was accepted: 1 if so"),
+    "render admission": (
+        "at most",
+        "stability of what is felt: rendered stiffness over what the rig renders in a hand",
+    ),
     "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),

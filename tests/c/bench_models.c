@@ -32,6 +32,11 @@ static void fill_response(const bench_case *one, bench_room *room)
         room->y[1][i] = FORCE * powf(ratio, one->exponent);
         room->slope[1][i] = i == 0 ? 0.0f : one->exponent * room->y[1][i] / depth;
     }
+    for (int32_t i = 0; i + 1 < one->response_knots; i++) {
+        const float chord = (room->y[1][i + 1] - room->y[1][i]) / (room->x[1][i + 1] - room->x[1][i]);
+        room->slope[1][i] = fminf(room->slope[1][i], 3.0f * chord); /* so that it never falls */
+        room->slope[1][i + 1] = fminf(room->slope[1][i + 1], 3.0f * chord);
+    }
 }
 
 static sc_table line_table(int which)
@@ -68,9 +73,7 @@ sc_model bench_model(const bench_case *one, bench_room *room)
     model.opening_max = 0.9f;
     model.contact_min = 0.015f;
     model.contact_max = 0.06f;
-#ifndef BENCH_OLD_CORE
     model.release_falls = sc_model_release_falls(&model);
-#endif
     return model;
 }
 

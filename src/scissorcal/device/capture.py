@@ -21,8 +21,9 @@ from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.recorder import Recorder, Tally, unloaded_sentence
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.unloaded import LoadWatch
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
@@ -37,7 +38,7 @@ SUPERVISOR_S = 0.3
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
+"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
 
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they open, and the sledge "
@@ -47,12 +48,16 @@ CLEAR_REQUEST = (
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran.
+
+    ``empty`` are the closing strokes in which nothing was cut.
+    """
 
     sample_count: int
     coverage: CoverageGrid
     tally: Tally
     motion: MotionReport
+    empty: tuple[Stroke, ...] = ()
 
 
 def open_writer(
@@ -111,7 +116,9 @@ def capture_friction(
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         drive.follow(plan.segments[0])
+        drive.idle()
         return _finish(recorder, motion)
 
 
@@ -148,10 +155,11 @@ def capture_cut(
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)
-            loader.load(segment.request)
+            loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
         return _finish(recorder, motion)
@@ -237,6 +245,14 @@ class _Drive:
         self._tell = progress or _silent
         self._total = sum(len(segment.reference) for segment in plan.segments)
         self._done = 0
+        identity, cuts = motion.identity, any(stroke.sheet >= 0 for stroke in plan.strokes)
+        self._load = LoadWatch(plan.strokes, identity.handle_radius) if cuts else None
+        self._warned = 0
+
+    def warning(self) -> str:
+        """What to tell whoever loads the next piece about the last one; empty if it was cut."""
+        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
+        return f"{unloaded_sentence(empty[-1])} " if empty else ""
 
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
@@ -259,6 +275,9 @@ class _Drive:
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
+        for stroke in self._load.take(samples) if self._load and len(samples) else ():
+            self._recorder.unloaded(stroke)
+            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
         self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
@@ -305,7 +324,9 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     if report.rights:
         recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
-    return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
+    return CaptureReport(
+        recorder.sample_count, recorder.coverage, recorder.tally, report, tuple(recorder.empty)
+    )
 
 
 def _silent(done: float, sentence: str, recorder: Recorder) -> None:

@@ -202,7 +202,7 @@ class LoopBlock(ServoView):
         for row, array in enumerate(arrays):
             at = start + row * capacity * 4
             self._memory[at : at + 4 * n] = array.tobytes()
-        block.reference_size = n
+        lib.sc_block_set_reference_size(block, n)
 
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""

@@ -12,6 +12,7 @@ from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
+from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
@@ -77,8 +78,8 @@ class ServoConfig:
     ``motor_sign = -1`` turns the motor's torque round on the wire, commanded and measured.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
-    more stops. ``watch`` has the thresholds of the watches, by default none.
-    Raises ValueError for a number that is not finite or below 0.
+    more stops. ``watch`` has the thresholds of the watches, by default none; ``passivity`` watches
+    the energy of RENDER. Raises ValueError for a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -105,6 +106,7 @@ class ServoConfig:
     tick_us: int = 1000
     motor_sign: int = 1
     watch: WatchConfig = NO_WATCHES
+    passivity: PassivityConfig = UNWATCHED_ENERGY
 
     def __post_init__(self) -> None:
         for field in self._numbers():
@@ -129,33 +131,10 @@ class ServoConfig:
         for field in self._numbers():
             setattr(struct, field.name, getattr(self, field.name))
         self.watch.fill(struct.watch)
+        self.passivity.fill(struct.passivity)
 
     def _numbers(self) -> list[Field[Any]]:
-        return [field for field in fields(self) if field.name != "watch"]
-
-
-@dataclass(frozen=True)
-class EnergyLedger:
-    """Joules since the start.
-
-    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest is the
-    model's energy while rendering: stored in the material now, taken by the cut
-    (kappa J_c h dX), lost by arresting cracks, taken by rendered friction.
-    """
-
-    delivered_J: float
-    stored_J: float
-    fracture_J: float
-    arrest_J: float
-    friction_J: float
-
-    @property
-    def created_J(self) -> float:  # noqa: N802  (J is the unit)
-        """Energy delivered beyond what the model absorbed; above 0 the rendering was not passive.
-
-        For runs that only rendered: tracking a reference delivers work as well.
-        """
-        return self.delivered_J + self.stored_J + self.fracture_J + self.arrest_J + self.friction_J
+        return [field for field in fields(self) if field.name not in ("watch", "passivity")]
 
 
 @dataclass(frozen=True)
@@ -296,19 +275,20 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> Command:
         """Take a state and return the command.
 
         ``heartbeat=False`` simulates a supervisor without heartbeat. ``answered=False`` says that
         this command is not sent, as for all but the newest of states that arrived at once: a tick
-        of time passes with the first of them, and slews and clearings of faults count by commands
-        that are sent.
+        of time passes with the first of them (or ``passed_us``), and slews and clearings of faults
+        count by commands that are sent.
         """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
         c.opening, c.advance = state.opening, state.advance
         c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)
 
@@ -319,6 +299,7 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> bytes:
         """Take a STATE payload and return the whole COMMAND frame: :meth:`step` for bytes, faster.
 
@@ -326,16 +307,18 @@ class Servo(ServoView):
         """
         if not lib.sc_unpack_state(ffi.from_buffer(payload), len(payload), self._state):
             raise ValueError(f"A payload of {len(payload)} bytes is no STATE.")
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         size = lib.sc_pack_command(self._command, self._payload)
         return encode_frame(bytes(ffi.buffer(self._payload, size)))
 
-    def _step(self, heartbeat: bool, host_time_ns: int, answered: bool) -> None:
+    def _step(
+        self, heartbeat: bool, host_time_ns: int, answered: bool, passed_us: int | None
+    ) -> None:
         if heartbeat:
             self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
         if not self._waiting:
-            tick_us = self.config.tick_us
-            lib.sc_servo_pass(self._config, self._orders, self._servo, tick_us)
+            time_us = self.config.tick_us if passed_us is None else passed_us
+            lib.sc_servo_pass(self._config, self._orders, self._servo, time_us)
         self._waiting = not answered
         fresh = lib.sc_servo_step(
             self._config,

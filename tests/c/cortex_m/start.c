@@ -13,8 +13,14 @@ void _init(void); /* newlib calls both */
 void _fini(void);
 static void stuck(void);
 
-__attribute__((section(".vectors"), used)) static const void *const VECTORS[16] = {
-    &stack_top, (void *)reset, (void *)stuck, (void *)stuck, (void *)stuck, (void *)stuck, (void *)stuck,
+typedef union {
+    const void *stack;
+    void (*handler)(void);
+} vector;
+
+__attribute__((section(".vectors"), used)) static const vector VECTORS[7] = {
+    {&stack_top},       {.handler = reset}, {.handler = stuck}, {.handler = stuck},
+    {.handler = stuck}, {.handler = stuck}, {.handler = stuck},
 };
 
 void _init(void)

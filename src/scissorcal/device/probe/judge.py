@@ -159,8 +159,8 @@ def judge_follow(found: Follow) -> Verdict:
         return Verdict(MOTORS, check, "fail", 1.0, limit, why)
     if not sd <= GAIN_SD:
         why = (
-            "The gain of motor_torque could not be told: too little of a steady torque was measured "
-            "between stalls of this computer, or its noise is too large."
+            "The gain of motor_torque could not be told: its noise is too large, or this computer "
+            "stalled too often to hold a torque."
         )
         return not_evaluated(MOTORS, check, why, limit)
     off = abs(gain - 1.0)

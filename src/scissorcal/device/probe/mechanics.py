@@ -265,7 +265,10 @@ def _held(part: NDArray[np.void]) -> NDArray[np.bool_]:
     """Where the motors were on and the command had stood for HELD_S."""
     on = (part["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
     t = part["device_us"] * 1e-6
-    changes = np.flatnonzero(np.diff(part["torque"]) != 0.0) + 1
+    answered = np.flatnonzero(part["answer_flags"] >= 0)  # of several at once only the newest is
+    if len(answered) == 0:
+        return np.zeros(len(t), dtype=bool)
+    changes = answered[np.flatnonzero(np.diff(part["torque"][answered]) != 0.0) + 1]
     if len(changes) == 0:
         return np.asarray(on)
     before = np.searchsorted(changes, np.arange(len(t)), side="right") - 1

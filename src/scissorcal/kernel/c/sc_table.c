@@ -9,6 +9,9 @@
  * halves t's error and takes 7/8 of what is left of the rise: float's resolution after 8. */
 enum { SC_ROOT_STEPS = 12 };
 
+/* Slope, as a share of the chord's, below which a cubic hardly rises at first. */
+static const float LITTLE = 0.01f;
+
 /* Share of t up to which its error counts as none. */
 static const float ROOT_CLOSE = 1e-7f;
 
@@ -185,7 +188,12 @@ float sc_share_of_rise(float start, float second, float third, float rise)
     if (curved * curved <= ROOT_CLOSE) {
         return t; /* what this leaves is the square of the curvature */
     }
-    if (!(t > 0.0f && t < 1.0f)) {
+    if (second > start) { /* little slope at first: a parabola */
+        t = 2.0f * rise / (start + sqrtf(start * start + 4.0f * second * rise));
+        t = t < 1.0f ? t : 1.0f;
+    } else if (start < LITTLE * whole) { /* nor a bend: nearly a pure cubic, from its far end */
+        t = 1.0f;
+    } else if (!(t > 0.0f && t < 1.0f)) {
         t = even;
     }
     for (int i = 0; i < SC_ROOT_STEPS; i++) {
