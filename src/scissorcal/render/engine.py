@@ -80,7 +80,7 @@ def render(
 
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
-    inertia and delay, by default the package's friction fit. The result's ``admission`` says so.
+    inertia and delay, by default the package's friction fit. The result's ``admission`` states it.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; DeviceError where the rig fails, and
