@@ -77,6 +77,16 @@ class Admission:
         """Rendered over needed stiffness."""
         return self.rendered / self.needed if self.needed > 0.0 else 1.0
 
+    @property
+    def summary(self) -> str:
+        """What is rendered of the package's stiffness, in a line."""
+        if not self.evaluated:
+            return f"stiffness {self.rendered:.3g} N m/rad, not checked against this rig"
+        return (
+            f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad "
+            f"(stable alone {self.allowed_alone:.2g}, in a hand {self.allowed_in_hand:.2g})"
+        )
+
 
 def admit(
     tables: ModelTables, facts: LoopFacts | None, hand: float, limit: float, rate: float
