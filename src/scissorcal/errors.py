@@ -30,9 +30,16 @@ class VerdictError(ScissorcalError):
 
 
 class DeviceError(ScissorcalError):
-    """The rig or the link to it failed (exit code 4)."""
+    """The rig or the link to it failed (exit code 4).
+
+    ``stop`` names the servo's stop (``scissorcal.kernel.StopReason``) where that was one.
+    """
 
     exit_code = 4
+
+    def __init__(self, sentence: str, stop: str = "") -> None:
+        super().__init__(sentence)
+        self.stop = stop
 
 
 class MissingError(ScissorcalError):

@@ -47,6 +47,14 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
+    "fit sensor zeros": (
+        "at most",
+        TORQUE + "zero of the sensors, share of the drive (rms); it is subtracted",
+    ),
+    "fit zero drift": (
+        "at most",
+        TORQUE + "two sds of what is left of the zeros, share of the drive (rms)",
+    ),
     "fit foundations": ("at most", "what the fit builds on: failed verdicts there"),
     "fit teeth": (
         "at most",

@@ -251,7 +251,7 @@ class StrangeDevice:
         f = self.faults
         if self._streamed_s >= f.unplugged_at_s:
             self.unplugged = True
-        if math.isfinite(f.late_every_s) and self._streamed_s % f.late_every_s < f.late_for_s:
+        if self._streaming and self._streamed_s % f.late_every_s < f.late_for_s:
             return b""
         due = b""
         while self._leaving and self._leaving[0][0] <= self.time_s + 1e-9:

@@ -95,6 +95,9 @@ FAULTS = {
     "1 ms late": Faults(delay_to_host_s=0.0005, delay_to_device_s=0.0005),
     "3 ms late": Faults(delay_to_host_s=0.0015, delay_to_device_s=0.0015),
     "5 ms late": Faults(delay_to_host_s=0.0025, delay_to_device_s=0.0025),
+    "3 ms late, light blades": Faults(
+        delay_to_host_s=0.0015, delay_to_device_s=0.0015, inertia=2e-4
+    ),
     "500 Hz": Faults(tick_us=2000),
     "2 kHz": Faults(tick_us=500),
     "4 kHz": Faults(tick_us=250),

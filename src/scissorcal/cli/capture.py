@@ -139,6 +139,8 @@ def _capture(
 
 
 def _text(workspace: "Workspace", captured: "Captured") -> str:
+    from scissorcal.device.recorder import unloaded_sentence
+
     report = captured.report
     lines = [
         f"{workspace.relative(captured.path)}: {report.sample_count} samples from {captured.rig}",
@@ -152,6 +154,7 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
         )
     if tally.faults:
         lines.append("'scissorcal recording show' states when each fault latched, and which it was")
+    lines += [unloaded_sentence(stroke) for stroke in report.empty]
     latency = report.motion.latency
     if latency is not None:
         lines.append(
@@ -182,4 +185,5 @@ def _facts(captured: "Captured") -> dict[str, Any]:
         },
         "tally": report.tally,
         "motion": report.motion,
+        "unloaded_strokes": [stroke.index for stroke in report.empty],
     }

@@ -36,6 +36,7 @@ class LiveView:
         self._began_s = time.monotonic()
         self._drawn_s = float("-inf")
         self._finished = False
+        self._unloaded = 0
         self._trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_POINTS)
 
     def __enter__(self) -> Self:
@@ -48,6 +49,8 @@ class LiveView:
     def show(self, done: float, sentence: str, recorder: "Recorder | None" = None) -> None:
         """Show the progress of the work at the rig, and what a capture recorded so far."""
         now = time.monotonic()
+        if recorder is not None:
+            self._tell_unloaded(recorder)
         if recorder is not None and recorder.last is not None:
             last = recorder.last[0]
             self._trace.append((math.degrees(last["opening"]), 1e3 * last["motor_torque"]))
@@ -83,6 +86,18 @@ class LiveView:
         self._stop()
         typer.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
         self._start()
+
+    def _tell_unloaded(self, recorder: "Recorder") -> None:
+        """Say at once, and for good, which strokes cut nothing."""
+        from scissorcal.device.recorder import unloaded_sentence
+
+        for stroke in recorder.empty[self._unloaded :]:
+            sentence = unloaded_sentence(stroke)
+            if self._live is None:
+                typer.echo(sentence, err=True)
+            else:
+                self._live.console.print(sentence)
+        self._unloaded = len(recorder.empty)
 
     def _start(self) -> None:
         if sys.stderr.isatty():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scissorcal.cli.options import Device, Folder, Seed, Yes
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
@@ -41,8 +41,10 @@ def probe(
             "--recipe", dir_okay=False, help="A recipe file, where there is no workspace."
         ),
     ] = None,
+    realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Check a rig before its motors run: line, sensors, watchdog, signs, delay, inertia, friction.
@@ -73,6 +75,8 @@ def probe(
                 device,
                 workspace=workspace,
                 seed=seed,
+                baud=baud,
+                realtime=realtime,
                 progress=view.show,
                 confirm=view.confirm,
             )

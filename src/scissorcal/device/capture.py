@@ -11,6 +11,7 @@ from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
     CaptureGains,
+    Probed,
     capture_gains,
 )
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
@@ -20,8 +21,9 @@ from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.recorder import Recorder, Tally, unloaded_sentence
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
+from scissorcal.device.unloaded import LoadWatch
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
@@ -36,7 +38,7 @@ SUPERVISOR_S = 0.3
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
+"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
 
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they open, and the sledge "
@@ -46,12 +48,16 @@ CLEAR_REQUEST = (
 
 @dataclass(frozen=True)
 class CaptureReport:
-    """Samples, coverage, gaps and faults of a capture, and how the servo ran."""
+    """Samples, coverage, gaps and faults of a capture, and how the servo ran.
+
+    ``empty`` are the closing strokes in which nothing was cut.
+    """
 
     sample_count: int
     coverage: CoverageGrid
     tally: Tally
     motion: MotionReport
+    empty: tuple[Stroke, ...] = ()
 
 
 def open_writer(
@@ -93,21 +99,26 @@ def capture_friction(
     progress: CaptureProgress | None = None,
     *,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. The gains follow
+    from ``probe`` where there is one; DeviceError where none could follow the plan. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
     faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
     """
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    with _motion_for(link, recipe, plan) as motion:
+    gains = _gains(link, recipe, "friction", probe, writer)
+    with _motion_for(link, recipe, plan, gains) as motion:
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         drive.follow(plan.segments[0])
+        drive.idle()
         return _finish(recorder, motion)
 
 
@@ -118,6 +129,7 @@ def capture_cut(
     hand: bool = False,
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive strokes through sheets (or presses), or record those of a hand.
 
@@ -129,8 +141,9 @@ def capture_cut(
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
+    gains = _gains(link, recipe, "cut", probe, writer)
     if hand:
-        with _motion_for(link, recipe, None) as motion:
+        with _motion_for(link, recipe, None, gains) as motion:
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
@@ -138,14 +151,15 @@ def capture_cut(
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan) as motion:
+    with _motion_for(link, recipe, plan, gains) as motion:
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)
-            loader.load(segment.request)
+            loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
         return _finish(recorder, motion)
@@ -187,8 +201,8 @@ def servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
-        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
         motor_sign=recipe.rig.motor_sign,
+        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
     )
 
 
@@ -231,6 +245,14 @@ class _Drive:
         self._tell = progress or _silent
         self._total = sum(len(segment.reference) for segment in plan.segments)
         self._done = 0
+        identity, cuts = motion.identity, any(stroke.sheet >= 0 for stroke in plan.strokes)
+        self._load = LoadWatch(plan.strokes, identity.handle_radius) if cuts else None
+        self._warned = 0
+
+    def warning(self) -> str:
+        """What to tell whoever loads the next piece about the last one; empty if it was cut."""
+        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
+        return f"{unloaded_sentence(empty[-1])} " if empty else ""
 
     def go_to_start(self, segment: Segment) -> None:
         """Bring the rig to where a segment starts, so that material can be loaded there."""
@@ -253,6 +275,9 @@ class _Drive:
 
     def _take(self, samples: Samples, sentence: str) -> None:
         self._recorder.take(samples, self._motion.garbled)
+        for stroke in self._load.take(samples) if self._load and len(samples) else ():
+            self._recorder.unloaded(stroke)
+            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
         self._tell(self._done / self._total, sentence, self._recorder)
 
     def _doing(self, samples: Samples) -> str:
@@ -266,8 +291,29 @@ class _Drive:
         return f"{stroke.kind}{speed} ({of})"
 
 
-def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0)
+def _gains(
+    link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
+) -> CaptureGains:
+    """Gains by what the probe found; what is said of them is noted."""
+    probed = None
+    if probe and probe.inertia_kg_m2 and probe.delay_s and probe.coulomb_Nm:
+        viscous = probe.viscous_Nm_s_per_rad
+        probed = Probed(
+            inertia_kg_m2=probe.inertia_kg_m2.mean,
+            inertia_sd_kg_m2=probe.inertia_kg_m2.sd,
+            viscous_Nm_s_per_rad=viscous.mean if viscous else 0.0,
+            coulomb_Nm=probe.coulomb_Nm.mean,
+            delay_s=max(probe.delay_s.mean, 0.0),
+            delay_sd_s=probe.delay_s.sd,
+        )
+    gains = capture_gains(recipe, link.identity, kind, probed)
+    for verdict in gains.verdicts if probe else ():
+        writer.note(verdict.why)
+    return gains
+
+
+def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
 
@@ -278,7 +324,9 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     if report.rights:
         recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
-    return CaptureReport(recorder.sample_count, recorder.coverage, recorder.tally, report)
+    return CaptureReport(
+        recorder.sample_count, recorder.coverage, recorder.tally, report, tuple(recorder.empty)
+    )
 
 
 def _silent(done: float, sentence: str, recorder: Recorder) -> None:

@@ -112,8 +112,8 @@ def _plan(
 
 
 def _whole(recording: Recording, label: Labels) -> set[int]:
-    """The strokes that were recorded to their end: other samples follow them."""
-    return set(np.unique(label).tolist()) - {-1, *label[-1:].tolist()}
+    """The strokes that were recorded to their end: other samples follow them, and they cut."""
+    return set(np.unique(label).tolist()) - {-1, *label[-1:].tolist()} - recording.unloaded
 
 
 def _used(recording: Recording, label: Labels, used: Mask, kind: CaptureKind) -> set[int]:

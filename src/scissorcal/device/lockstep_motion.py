@@ -52,6 +52,7 @@ class LockstepMotion(Motion):
         self._silent_s = 0.0
         self._garbled_before = link.garbled
         before_s = link.virtual_time
+        self._passed_ns = round(1e9 * link.virtual_time)
         link.configure(ConfigKey.STREAM, 1.0)
         self._round_trip_s = link.virtual_time - before_s
         self.step()
@@ -129,11 +130,11 @@ class LockstepMotion(Motion):
                 rows += self._exchange()
         except DeviceError as error:
             self._failure = error
-        self._silent_s = 0.0 if rows else self._silent_s + self._ticks * self.tick_s
+        samples = self._without_repeats(np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE))
+        self._silent_s = 0.0 if len(samples) else self._silent_s + self._ticks * self.tick_s
         if self._silent_s > SILENCE_S and not stopped:
             self._failure = DeviceError(StopReason.SILENCE.sentence)
-        samples = np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE)
-        return self._without_repeats(samples)
+        return samples
 
     def _exchange(self) -> list[bytes]:
         """Advance one tick: send the newest command, return the samples of the frames received."""
@@ -142,7 +143,13 @@ class LockstepMotion(Motion):
         rows = []
         now_ns = round(1e9 * self._link.virtual_time)
         for left, payload in zip(range(len(payloads) - 1, -1, -1), payloads, strict=True):
-            self._frame = self._servo.answer(payload, host_time_ns=now_ns, answered=left == 0)
+            self._frame = self._servo.answer(
+                payload,
+                host_time_ns=now_ns,
+                answered=left == 0,
+                passed_us=round((now_ns - self._passed_ns) * 1e-3),
+            )
+            self._passed_ns = now_ns
             rows.append(self._servo.telemetry().tobytes())
         return rows
 

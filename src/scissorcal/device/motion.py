@@ -199,7 +199,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
                 " If 'scissorcal device doctor' finds the port slow, lower the gains in the "
                 "recipe's rig.control."
             )
-        return DeviceError(sentence)
+        return DeviceError(sentence, self.stop_reason.name)
 
     def _for_ticks(self, ticks: int) -> Iterator[Samples]:
         first: int | None = None

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from scissorcal.device.coverage import CoverageGrid
 from scissorcal.kernel import StateFlag
-from scissorcal.recording import RecordingWriter
+from scissorcal.recording import RecordingWriter, Stroke
+from scissorcal.recording.recording import UNLOADED_MARK
 from scissorcal.recording.summarising import missing_frames
 
 NOTES_OF_A_KIND = 3
@@ -37,6 +38,7 @@ class Recorder:
         self.coverage = coverage
         self.tally = Tally()
         self.last: NDArray[np.void] | None = None
+        self.empty: list[Stroke] = []
         self._faulty = False
         self._enabled_once = False
         self._noted: Counter[str] = Counter()
@@ -65,6 +67,12 @@ class Recorder:
         if self.last is not None:
             self.writer.note(f"Paused at {self._when()}: {sentence}")
         self.last = None
+
+    def unloaded(self, stroke: Stroke) -> None:
+        """Note that a stroke cut nothing, and mark it."""
+        self.empty.append(stroke)
+        self.writer.mark(UNLOADED_MARK, str(stroke.index))
+        self.writer.note(unloaded_sentence(stroke))
 
     def finish(self, overrun: int = 0) -> None:
         """Note the totals; ``overrun`` counts samples that were not read from the loop in time."""
@@ -122,6 +130,14 @@ class Recorder:
     @staticmethod
     def _sample_time(sample: np.void) -> float:
         return float(sample["device_time_us"]) * 1e-6
+
+
+def unloaded_sentence(stroke: Stroke) -> str:
+    """Say that a stroke cut nothing, of which piece, and what to do."""
+    return (
+        f"Stroke {stroke.index + 1} (piece {stroke.sheet + 1}) cut nothing: the torque stayed at "
+        "that of friction. The piece was cut before, or is missing: put in a fresh one."
+    )
 
 
 def _frames(count: int) -> str:

@@ -12,20 +12,24 @@ RUNAWAY_RAD_PER_S = 1.0
 """Chosen: far below the strokes of a capture that a reversed motor would end in (25 rad/s), far
 above what friction's reversal or the sheet's springing back adds within 8 ms."""
 
+RUNAWAY_M_PER_S = 0.1
+"""A little more than the speed at which captures move the sledge."""
+
 STILL_RAD = 0.03
 """The default gains answer it with 0.2 N m: ten times the breakaway of scissors."""
 STILL_M = 0.005
 """A quarter of the error at which tracking is lost."""
 STILL_TORQUE_SHARE = 0.1
-STILL_TORQUE_Nm = 0.05
-"""At least, however low the limit: three times the dry friction of scissors, under which blades
-rest."""
+"""Of the device's limit: five times the breakaway of scissors with a motor of 1 N m."""
 
 LEAST_RATIO = 0.7
 MOST_RATIO = 1.4
 """A torque constant is known to 10 %, cogging and lag add as much; half and double are beyond."""
 RATIO_TORQUE_SHARE = 0.01
-"""The friction of scissors is about 0.015 N m, 1.5 % of the limit of a motor of 1 N m."""
+"""Of the device's limit: the friction of scissors is about 0.015 N m, with a motor of 1 N m."""
+
+STOP_MARGIN_RAD = 0.1
+"""Twice by how much the opening may exceed a stop before it is taken for implausible."""
 
 CLOCK_SHARE = 0.02
 HOST_CLOCK_SHARE = 0.05
@@ -47,13 +51,17 @@ def watches_of(identity: Identity, torque_limit: float, held_at_limit_s: float) 
         swing_torque=SWING_TORQUE_SHARE * torque_limit,
         swing_Hz=SWING_HZ,
         runaway_rate=RUNAWAY_RAD_PER_S,
+        runaway_speed=RUNAWAY_M_PER_S,
         still_rad=STILL_RAD,
         still_m=STILL_M,
-        still_torque=max(STILL_TORQUE_SHARE * torque_limit, STILL_TORQUE_Nm),
+        still_torque=STILL_TORQUE_SHARE * identity.torque_limit,
         least_ratio=LEAST_RATIO,
         most_ratio=MOST_RATIO,
-        ratio_torque=RATIO_TORQUE_SHARE * torque_limit,
+        ratio_torque=RATIO_TORQUE_SHARE * identity.torque_limit,
         clock_share=CLOCK_SHARE,
         host_clock_share=0.0 if virtual else HOST_CLOCK_SHARE,
+        stop_low=identity.opening_min,
+        stop_high=identity.opening_max,
+        stop_margin=STOP_MARGIN_RAD,
         handle_radius=identity.handle_radius if sensor else 0.0,
     )

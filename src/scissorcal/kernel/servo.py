@@ -275,19 +275,20 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> Command:
         """Take a state and return the command.
 
         ``heartbeat=False`` simulates a supervisor without heartbeat. ``answered=False`` says that
         this command is not sent, as for all but the newest of states that arrived at once: a tick
-        of time passes with the first of them, and slews and clearings of faults count by commands
-        that are sent.
+        of time passes with the first of them (or ``passed_us``), and slews and clearings of faults
+        count by commands that are sent.
         """
         c = self._state
         c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
         c.opening, c.advance = state.opening, state.advance
         c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)
 
@@ -298,6 +299,7 @@ class Servo(ServoView):
         heartbeat: bool = True,
         host_time_ns: int = 0,
         answered: bool = True,
+        passed_us: int | None = None,
     ) -> bytes:
         """Take a STATE payload and return the whole COMMAND frame: :meth:`step` for bytes, faster.
 
@@ -305,16 +307,18 @@ class Servo(ServoView):
         """
         if not lib.sc_unpack_state(ffi.from_buffer(payload), len(payload), self._state):
             raise ValueError(f"A payload of {len(payload)} bytes is no STATE.")
-        self._step(heartbeat, host_time_ns, answered)
+        self._step(heartbeat, host_time_ns, answered, passed_us)
         size = lib.sc_pack_command(self._command, self._payload)
         return encode_frame(bytes(ffi.buffer(self._payload, size)))
 
-    def _step(self, heartbeat: bool, host_time_ns: int, answered: bool) -> None:
+    def _step(
+        self, heartbeat: bool, host_time_ns: int, answered: bool, passed_us: int | None
+    ) -> None:
         if heartbeat:
             self._orders.heartbeat = (self._orders.heartbeat + 1) & U32
         if not self._waiting:
-            tick_us = self.config.tick_us
-            lib.sc_servo_pass(self._config, self._orders, self._servo, tick_us)
+            time_us = self.config.tick_us if passed_us is None else passed_us
+            lib.sc_servo_pass(self._config, self._orders, self._servo, time_us)
         self._waiting = not answered
         fresh = lib.sc_servo_step(
             self._config,

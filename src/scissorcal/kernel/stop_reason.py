@@ -19,6 +19,7 @@ class StopReason(IntEnum):
     IMPLAUSIBLE = 10
     DEVICE_CLOCK = 11
     OVERSPEED = 12
+    RESTARTED = 13
     TORQUE_HELD = 32
     OSCILLATION = 33
     RUNAWAY = 34
@@ -28,6 +29,8 @@ class StopReason(IntEnum):
     MEASURED_DIFFERS = 38
     CLOCK_RATE = 39
     UNREADABLE = 40
+    RUNAWAY_ADVANCE = 41
+    STOP_ELSEWHERE = 42
 
     @property
     def sentence(self) -> str:
@@ -74,19 +77,33 @@ _STOP_SENTENCES = {
         "The blades moved faster than any capture or hand moves them; check that the motor and "
         "its encoder have the same sense, and that nothing is loose."
     ),
+    StopReason.RESTARTED: (
+        "The device restarted: its sequence numbers fell back. Check its power supply and cable, "
+        "then start again."
+    ),
     StopReason.TORQUE_HELD: (
         "The motor's torque stayed at its limit. Check for an obstacle, or material that is too "
         "stiff for limits.torque_Nm; if the torque is meant, raise limits.held_at_limit_s."
     ),
     StopReason.OSCILLATION: (
         "The blades swung to and fro, driven by the loop itself: commands act too late, or the "
-        "gains or the rendered stiffness are too high for it. Run 'scissorcal device doctor' to "
-        "find what is late, or lower the gains in the recipe's rig.control."
+        "gains or the rendered stiffness are too high for it, or the encoder is noisy. Run "
+        "'scissorcal device doctor' to find what is late, or lower the gains in the recipe's "
+        "rig.control."
     ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "
         "sense. Positive torque must open the blades and a wider opening count up; swap two wires "
         "of one of the two."
+    ),
+    StopReason.RUNAWAY_ADVANCE: (
+        "The sledge sped up against the force of its motor: motor or encoder has the wrong sense. "
+        "Positive force must advance it and the advance count up; swap two wires of one of the two."
+    ),
+    StopReason.STOP_ELSEWHERE: (
+        "The device reports that the blades are at a stop, and the opening says that they are not. "
+        "Check scale and zero of the encoder, opening_min and opening_max of the device, and that "
+        "nothing blocks the blades."
     ),
     StopReason.OPENING_STANDS: (
         "The opening did not change at all while the blades were driven. Check the encoder and its "

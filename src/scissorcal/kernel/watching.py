@@ -18,7 +18,9 @@ class WatchConfig:
     ``held_s``: torque at its limit for so long, less the time below it since. ``swing_rate``,
     ``swing_torque``, ``swing_Hz``: three swings in a row of at least this amplitude (rad/s), change
     of torque (N m) and frequency; of a tracked reference, its own rate is subtracted.
-    ``runaway_rate``: blades speed up by so much (rad/s) against a torque. ``still_rad``,
+    ``runaway_rate``, ``runaway_speed``: blades (rad/s) or sledge (m/s) speed up by so much against
+    their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
+    ``stop_low`` and ``stop_high``. ``still_rad``,
     ``still_m``: the reference moves so far while the measured place stays exactly the same.
     ``still_torque``: torques of motor and hand differ by so much (N m) for half a second, and the
     opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a force sensor.
@@ -32,6 +34,7 @@ class WatchConfig:
     swing_torque: float = 0.0
     swing_Hz: float = 0.0
     runaway_rate: float = 0.0
+    runaway_speed: float = 0.0
     still_rad: float = 0.0
     still_m: float = 0.0
     still_torque: float = 0.0
@@ -40,12 +43,16 @@ class WatchConfig:
     ratio_torque: float = 0.0
     clock_share: float = 0.0
     host_clock_share: float = 0.0
+    stop_low: float = 0.0
+    stop_high: float = 0.0
+    stop_margin: float = 0.0
     handle_radius: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and value >= 0.0):
+            least = -math.pi if field.name in ("stop_low", "stop_high") else 0.0
+            if not (math.isfinite(value) and value >= least):
                 raise ValueError(f"watch.{field.name} = {value}: give a finite number from 0 on.")
         if self.ratio_torque > 0 and not self.least_ratio < 1 < self.most_ratio:
             raise ValueError("least_ratio must be below 1 and most_ratio above 1.")

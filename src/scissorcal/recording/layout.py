@@ -24,6 +24,7 @@ MESSAGE_ENCODING = "cdr"
 CDR_HEADER = b"\x00\x01\x00\x00"
 
 SHEET_NAME = "scissorcal.sheet"
+MARK_NAME = "scissorcal.mark"
 
 PART_SUFFIX = ".part"
 """A capture in progress is called ``<name>.mcap.part`` until it is closed."""

@@ -43,6 +43,7 @@ def read_recording(path: str | Path) -> Recording:
         source=str(path),
         content_hash=scan.content_hash,
         notes=tuple(dict.fromkeys(notes)),
+        marks=scan.marks(),
     )
 
 

@@ -14,6 +14,9 @@ from scissorcal.recording.layout import SAMPLE_DTYPE
 if TYPE_CHECKING:
     import pandas as pd
 
+STOP_MARK = "stop"
+UNLOADED_MARK = "unloaded stroke"
+
 __all__ = ["SAMPLE_DTYPE", "Joint", "Kind", "Recording", "Stroke", "StrokeKind"]
 
 
@@ -25,7 +28,8 @@ class Recording:
     ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
     SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
-    it found (recovered end, garbled frames, gaps), for the report.
+    it found (recovered end, garbled frames, gaps), for the report. ``marks`` are facts by name, as
+    the capture wrote them; see ``stop`` and ``unloaded``.
     """
 
     kind: Kind
@@ -38,6 +42,17 @@ class Recording:
     source: str = ""
     content_hash: str = ""
     notes: tuple[str, ...] = ()
+    marks: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def stop(self) -> str:
+        """Name of the servo's stop that ended the capture (StopReason); empty if none did."""
+        return next((value for name, value in self.marks if name == STOP_MARK), "")
+
+    @property
+    def unloaded(self) -> frozenset[int]:
+        """Indices of the closing strokes of a cut in which nothing was cut."""
+        return frozenset(int(value) for name, value in self.marks if name == UNLOADED_MARK)
 
     def __repr__(self) -> str:
         """One line: kind, length, strokes and source."""

@@ -10,7 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.recording import layout
 from scissorcal.recording.partfile import explained, is_same_file, seal, try_lock
 from scissorcal.recording.samplefile import SampleFile
-from scissorcal.recording.scan import Attachment, Note, Scan, Sheet, scan_file
+from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, scan_file
 
 KEPT_SUFFIX = ".interrupted"
 
@@ -93,6 +93,8 @@ def _rewrite(part: Path, scan: Scan) -> Path:
                 file.note(event.sentence)
             elif isinstance(event, Sheet):
                 file.mark_sheet(event.number)
+            elif isinstance(event, Mark):
+                file.mark(event.name, event.value)
             elif isinstance(event, Attachment):
                 file.attach(event.name, event.data, event.media_type)
         if not scan.finished:

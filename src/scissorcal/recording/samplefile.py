@@ -95,6 +95,10 @@ class SampleFile:
         """Record that this sheet of material is loaded from the next sample on (-1: none)."""
         self._mark(layout.SHEET_NAME, {"sheet": str(sheet)})
 
+    def mark(self, name: str, value: str) -> None:
+        """Add a fact about the samples so far, by name."""
+        self._mark(layout.MARK_NAME, {"name": name, "value": value})
+
     def finish(self) -> None:
         """Write what is left, the metadata again, the index and the footer; leave the file open."""
         self._flush(self._newest_host_time)

@@ -45,7 +45,15 @@ class Sheet:
     number: int
 
 
-Event = NDArray[np.void] | Note | Sheet | Attachment
+@dataclass(frozen=True)
+class Mark:
+    """A fact about the samples until here, such as the stop that ended them."""
+
+    name: str
+    value: str
+
+
+Event = NDArray[np.void] | Note | Sheet | Mark | Attachment
 
 
 @dataclass
@@ -67,6 +75,10 @@ class Scan:
     def notes(self) -> tuple[str, ...]:
         """The sentences that the writer left."""
         return tuple(event.sentence for event in self.events if isinstance(event, Note))
+
+    def marks(self) -> tuple[tuple[str, str], ...]:
+        """Facts by name, in order; a name may come more than once."""
+        return tuple((event.name, event.value) for event in self.events if isinstance(event, Mark))
 
 
 def scan_file(path: Path) -> Scan:
@@ -155,6 +167,9 @@ class _Walk:
                 self.events.append(Sheet(int(record.metadata["sheet"])))
             except (KeyError, ValueError):
                 raise _DamageError("a sheet mark without a number") from None
+        elif record.name == layout.MARK_NAME:
+            entries = record.metadata
+            self.events.append(Mark(entries.get("name", ""), entries.get("value", "")))
         elif record.name == METADATA_NAME:
             try:
                 metadata = from_entries(record.metadata)

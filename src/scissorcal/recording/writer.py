@@ -10,10 +10,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.recording import layout
 from scissorcal.recording.partfile import create_locked, explained, seal
-from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
+from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
 from scissorcal.recording.samplefile import SampleFile
 from scissorcal.recording.schema import describe
 
@@ -85,6 +85,11 @@ class RecordingWriter:
         with self._writing():
             self._file.note(sentence)
 
+    def mark(self, name: str, value: str) -> None:
+        """Add a fact about the samples so far, as ``Recording.marks`` has them."""
+        with self._writing():
+            self._file.mark(name, value)
+
     def mark_sheet(self, sheet: int) -> None:
         """Record that this sheet of material is loaded from the next sample on (-1: none).
 
@@ -126,6 +131,8 @@ class RecordingWriter:
         else:
             reason = str(error) or type(error).__name__
             self.note(f"The capture ended early after {self.sample_count} samples: {reason}")
+            if isinstance(error, DeviceError) and error.stop:
+                self.mark(STOP_MARK, error.stop)
             self.close()
 
     @contextlib.contextmanager
@@ -159,4 +166,6 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         for sentence in recording.notes:
             writer.note(sentence)
         writer.append(recording.samples)
+        for name, value in recording.marks:
+            writer.mark(name, value)
     return writer.path

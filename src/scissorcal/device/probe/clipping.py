@@ -13,11 +13,12 @@ REST_S = 0.05
 SDS = 2.0
 
 
-def clipping(talk: Talk, inertia: Estimate | None) -> Verdict:
+def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Verdict:
     """Command more than the limit for one tick, if the blades cannot get faster than the bounds.
 
     The watchdog is set to 1 ms for it, so that a computer that stalls there gives three ticks of
-    torque at most: with these and the least inertia the rate is bounded before it is tried.
+    torque at most: with these and the least inertia the rate is bounded before it is tried. Then
+    it is set to ``brake_after_ms`` again.
     """
     limit, bounds = talk.identity.torque_limit, talk.bounds
     check = "clipping"
@@ -33,12 +34,12 @@ def clipping(talk: Talk, inertia: Estimate | None) -> Verdict:
         )
         return not_evaluated("probe.motors", check, why, bounds.rate_rad_per_s, fastest)
     try:
-        before = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, SHORTEST_BRAKE_MS)
+        talk.link.configure(ConfigKey.BRAKE_AFTER_MS, SHORTEST_BRAKE_MS)
     except DeviceError as error:
         return not_evaluated("probe.motors", check, f"Clipping was not tried: {error}")
     with talk.allowing(ABOVE * limit):
         flagged, largest = talk.play(_struck(talk, ABOVE * limit))
-    talk.link.configure(ConfigKey.BRAKE_AFTER_MS, max(before, 10.0))
+    talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
     good = "A torque above the stated limit is clipped and flagged."
     bad = (
         f"A command of {ABOVE * limit:.3g} N m was not flagged TORQUE_SATURATED (largest measured "

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from scissorcal.device.capture import identity_facts
-from scissorcal.device.link import Link
+from scissorcal.device.link import Link, PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.creep import creep
@@ -21,10 +21,19 @@ from scissorcal.device.probe.judge import (
     judge_watchdog,
 )
 from scissorcal.device.probe.mechanics import follow, mechanics, swing_of
-from scissorcal.device.probe.pulses import Axis, Stairs, axis_of, joined, make_room, stairs, swings
-from scissorcal.device.probe.result import Estimate, ProbeResult
+from scissorcal.device.probe.pulses import (
+    Axis,
+    Stairs,
+    axis_of,
+    holds,
+    joined,
+    make_room,
+    stairs,
+    swings,
+)
+from scissorcal.device.probe.result import REAL_TIME, Estimate, ProbeResult
 from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
-from scissorcal.device.probe.watchdog import lag_ticks, watchdog
+from scissorcal.device.probe.watchdog import Watchdog, lag_ticks, watchdog
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
@@ -111,18 +120,17 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
     finding.add(
         judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
     )
+    finding.add([], facts={REAL_TIME: float(isinstance(talk.link, PortLink))})
     tell(0.4, "watchdog, at zero torque")
-    watched = watchdog(talk)
-    finding.add(
-        judge_watchdog(watched, identity.tick_us * 1e-3),
-        facts={"command_lag_ticks": lag_ticks(watched.lags)} if watched.lags else {},
-    )
+    watched = watchdog(talk, recipe.rig.line.brake_after_ms)
+    finding.add(judge_watchdog(watched, identity.tick_us * 1e-3), **_of_watchdog(watched, talk))
     tell(0.5, "small pulses of torque")
     _push(talk, finding, quiet, recipe)
     if identity.capabilities & Capability.ADVANCE_MOTOR and identity.force_limit > 0.0:
         tell(0.85, "small pulses of force on the sledge")
         _push_sledge(talk, finding, recipe)
-    finding.add([clipping(talk, finding.result.inertia_kg_m2)])
+    brake_after_ms = recipe.rig.line.brake_after_ms
+    finding.add([clipping(talk, finding.result.inertia_kg_m2, brake_after_ms)])
     if limits.creep:
         tell(0.9, "creeping to the stops")
         verdicts, facts = creep(talk, finding.result.facts["breakaway_Nm"], tell)
@@ -191,6 +199,18 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     }
 
 
+def _of_watchdog(found: Watchdog, talk: Talk) -> dict[str, object]:
+    """The delay as far as flags show it: somewhere in the tick before the one that shows it.
+
+    Swings replace it by what the blades show.
+    """
+    if not found.lags:
+        return {}
+    lag = lag_ticks(found.lags)
+    delay = Estimate((lag - 0.5) * talk.tick_s, talk.tick_s / math.sqrt(12.0))
+    return {"delay_s": delay, "facts": {"command_lag_ticks": lag}}
+
+
 def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     """Pulses on the blades: signs, breakaway, gain; then swings: inertia, friction, delay."""
     identity = talk.identity
@@ -203,9 +223,12 @@ def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     most = axis.effort
     push = min(most, SWING_SHARE * pushed.effort + SWING_MORE_NM)
     pull = -min(most, SWING_SHARE * -pulled.effort + SWING_MORE_NM)
+    held = holds(talk, axis, pushed.effort, pulled.effort)
     swung = swings(talk, axis, push, pull)
     zero = finding.result.torque_zero_Nm
-    answered = follow(joined(talk, (*found.pulses, *swung)), zero.mean if zero is not None else 0.0)
+    answered = follow(
+        joined(talk, (*found.pulses, *held, *swung)), zero.mean if zero is not None else 0.0
+    )
     step = observed_step(talk.heard()["opening"])
     parts = [swing_of(part, axis.moved) for part in joined(talk, swung)]
     resolution = step if math.isfinite(step) else identity.opening_resolution

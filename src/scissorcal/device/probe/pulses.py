@@ -23,6 +23,8 @@ AxisName = Literal["opening", "advance"]
 RAMP_S = 0.01
 HOLD_S = 0.02
 LONG_HOLD_S = 0.08
+GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
+"""How long an effort is held for its gain, and its share of the one that moved the blades."""
 BEFORE_S = 5e-3
 REST_S = 0.02
 """Blades that stay within a step for so long are at rest."""
@@ -159,6 +161,12 @@ def swings(talk: Talk, axis: Axis, push: float, pull: float) -> tuple[Pulse, ...
             ways[sign] = min(grow * ways[sign], CUT_SHARE * axis.way)
             rates[sign] = min(grow * rates[sign], CUT_SHARE * axis.rate)
     return tuple(found)
+
+
+def holds(talk: Talk, axis: Axis, push: float, pull: float) -> tuple[Pulse, ...]:
+    """Hold an effort each way that moves nothing, for the gain of the measured torque."""
+    cut = Cut(axis.moved, CUT_SHARE * axis.rate, GAIN_HOLD_S)
+    return tuple(pulse_of(talk, axis, HELD_SHARE * effort, cut) for effort in (push, pull))
 
 
 def _fastest(talk: Talk, places: NDArray[np.float64]) -> float:

@@ -13,8 +13,6 @@ TOGGLES = 12
 LONGEST_TICKS_S = 0.1
 PAUSES = (7, 11, 5, 13, 9, 6)
 """Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
-BRAKE_AFTER_MS = 10.0
-"""The protocol's default."""
 LATER_S = 0.05
 
 
@@ -38,14 +36,17 @@ class Watchdog:
     fault_cleared: bool
 
 
-def watchdog(talk: Talk) -> Watchdog:
-    """Enable and release the motors at zero torque, then withhold commands."""
+def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
+    """Enable and release the motors at zero torque, then withhold commands.
+
+    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays.
+    """
     lags = talk.play(_toggled(talk))
     if not lags:
         return Watchdog((), True, None, "", None, False, False, False, False)
-    refused, in_force = "", BRAKE_AFTER_MS
+    refused, in_force = "", brake_after_ms
     try:
-        in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, BRAKE_AFTER_MS)
+        in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
     except DeviceError as error:
         refused = str(error)
     braked, latched, shown = talk.play(_silenced(talk, in_force))

@@ -205,6 +205,8 @@ static void count_frame(sc_servo *servo, const sc_state *state)
     if (servo->started && passed > 1 && passed < 0x80000000u) {
         servo->misses += passed - 1;
         servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
+    } else if (servo->started && passed >= 0x80000000u) {
+        sc_servo_stop(servo, SC_STOP_RESTARTED); /* the reference counts by sequence numbers */
     }
     servo->sequence = state->sequence;
     servo->started = 1;

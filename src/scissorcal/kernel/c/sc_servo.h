@@ -38,6 +38,7 @@ enum {
     SC_STOP_IMPLAUSIBLE = 10,
     SC_STOP_DEVICE_CLOCK = 11,
     SC_STOP_OVERSPEED = 12,
+    SC_STOP_RESTARTED = 13,
     SC_STOP_WATCHED = 32 /* and above: by what a watch saw, SC_WATCH_... */
 };
 
@@ -72,9 +73,9 @@ typedef struct {
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
     sc_passivity_config passivity;
-    sc_watch_config watch;
     float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
                                   measured; everything else here is of corrected signs */
+    sc_watch_config watch;
 } sc_servo_config;
 
 typedef struct {

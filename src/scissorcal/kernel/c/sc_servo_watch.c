@@ -171,12 +171,14 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
         servo->mode == SC_MODE_TRACK,
         (state->flags & SC_STATE_OPENING_AT_STOP) != 0,
         servo->sent_torque,
+        servo->sent_force,
         config->torque_limit,
         state->motor_torque,
         state->handle_force,
         motion->opening,
         motion->opening_rate,
         motion->advance,
+        motion->advance_rate,
         servo->aim_opening,
         servo->aim_rate,
         servo->aim_advance,
@@ -191,7 +193,7 @@ void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const 
 {
     const sc_watch_input input = watched(config, servo, state, time_s, usable);
     const int seen = sc_watch_take(&config->watch, &servo->watch, &input);
-    if (seen == SC_WATCH_RUNAWAY) {
+    if (seen == SC_WATCH_RUNAWAY || seen == SC_WATCH_RUNAWAY_ADVANCE) {
         sc_servo_stop(servo, SC_STOP_WATCHED + (uint32_t)seen);
     } else if (seen != SC_WATCH_NOTHING) {
         sc_servo_end(servo, SC_STOP_WATCHED + (uint32_t)seen);

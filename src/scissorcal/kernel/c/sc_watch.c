@@ -8,9 +8,9 @@ static const uint32_t SWINGS_UNTIL_STOP = 6;
 static const float WIDE = 4.0f;  /* times the amplitude: such a half of a swing counts as two ... */
 static const float WILD = 10.0f; /* ... and such a one as three */
 static const float NOISE_SHARE = 0.25f; /* of a swing's amplitude, within which it has no sign */
-/* A torque acts on the rate after wire, motor and filter: in less than this at delays that can be
+/* An effort acts on the rate after wire, motor and filter: in less than this at delays that can be
  * controlled. Blades that speed up against it from then on are driven the wrong way. */
-static const float TORQUE_ACTS_S = 0.008f;
+static const float EFFORT_ACTS_S = 0.008f;
 static const float STILL_S = 0.5f;
 /* Delays of 10 ms move a mean over 30 ms little; the ratio is taken over half a second. */
 static const float SMOOTH_S = 0.03f;
@@ -27,7 +27,7 @@ static const float RESTS = 0.05f; /* rad/s; motors that are off and turn give a 
 static const uint32_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
 static const uint32_t HOST_US = 2000000;  /* by this computer's clock: 20 ms of jitter are 1 % */
 static const uint32_t OFF_UNTIL_STOP = 3; /* windows in a row */
-static const uint32_t UNREADABLE_UNTIL_STOP = 20;
+static const uint32_t STATES_UNTIL_STOP = 20; /* in a row */
 
 enum { LONGEST_US = 0x40000000 };
 
@@ -37,13 +37,14 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
         config->held_s,       config->swing_rate,   config->swing_torque,     config->swing_Hz,
         config->runaway_rate, config->still_rad,    config->still_m,          config->still_torque,
         config->least_ratio,  config->most_ratio,   config->ratio_torque,     config->clock_share,
-        config->host_clock_share, config->handle_radius};
+        config->host_clock_share, config->handle_radius, config->runaway_speed,
+        config->stop_margin};
     for (unsigned i = 0; i < sizeof levels / sizeof levels[0]; i++) {
         if (!isfinite(levels[i]) || levels[i] < 0.0f) {
             return 0;
         }
     }
-    return 1;
+    return isfinite(config->stop_low) && isfinite(config->stop_high);
 }
 
 void sc_watch_pass(sc_watch *watch, uint32_t elapsed_us)
@@ -124,24 +125,44 @@ static int swings(const sc_watch_config *config, sc_watch *watch, const sc_watch
     return over(watch, SC_WATCH_SWING, (float)watch->swings, (float)SWINGS_UNTIL_STOP);
 }
 
-/* Blades that speed up against a torque of one sign; a hand may do that, a reference does not. */
+/* How fast an axis is against an effort of one sign, and got since that effort could act. */
+static float speed_against(sc_watch_effort *since, float effort, float rate, float time_s)
+{
+    const int32_t sign = effort > 0.0f ? 1 : effort < 0.0f ? -1 : 0;
+    const int begins = sign != since->sign || sign == 0;
+    since->sign = sign;
+    since->for_s = begins ? 0.0f : since->for_s + time_s;
+    if (since->for_s < EFFORT_ACTS_S) {
+        since->rate = rate;
+        return 0.0f;
+    }
+    return fminf(-(float)sign * rate, -(float)sign * (rate - since->rate));
+}
+
+/* A hand may speed up an axis against its motor; a motor that follows a reference does not. */
 static int runs_away(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
-    const int32_t sign = in->torque > 0.0f ? 1 : in->torque < 0.0f ? -1 : 0;
-    if (!in->tracking || sign != watch->torque_sign || sign == 0) {
-        watch->torque_sign = sign;
-        watch->torque_sign_s = 0.0f;
-        watch->rate_at_sign = in->opening_rate;
-        return 0;
+    if (!in->tracking) {
+        watch->torque.sign = watch->force.sign = 0;
+        return SC_WATCH_NOTHING;
     }
-    watch->torque_sign_s += in->time_s;
-    if (watch->torque_sign_s < TORQUE_ACTS_S) {
-        watch->rate_at_sign = in->opening_rate;
-        return 0;
+    const float blades = speed_against(&watch->torque, in->torque, in->opening_rate, in->time_s);
+    const float sledge = speed_against(&watch->force, in->force, in->advance_rate, in->time_s);
+    if (over(watch, SC_WATCH_RUNAWAY, blades, config->runaway_rate)) {
+        return SC_WATCH_RUNAWAY;
     }
-    const float against = -(float)sign * in->opening_rate;
-    const float gained = -(float)sign * (in->opening_rate - watch->rate_at_sign);
-    return over(watch, SC_WATCH_RUNAWAY, fminf(against, gained), config->runaway_rate);
+    return over(watch, SC_WATCH_RUNAWAY_ADVANCE, sledge, config->runaway_speed)
+               ? SC_WATCH_RUNAWAY_ADVANCE
+               : SC_WATCH_NOTHING;
+}
+
+static int is_elsewhere(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const float away = fminf(fabsf(in->opening - config->stop_low),
+                             fabsf(in->opening - config->stop_high));
+    watch->elsewhere = in->at_stop && away > config->stop_margin ? watch->elsewhere + 1 : 0;
+    return config->stop_margin > 0.0f &&
+           over(watch, SC_WATCH_STOP, (float)watch->elsewhere, (float)STATES_UNTIL_STOP);
 }
 
 static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
@@ -242,7 +263,8 @@ static int is_off(sc_watch *watch, uint32_t clock_us, uint32_t passed_us, float 
     return over_for_long(watch, SC_WATCH_CLOCK, share, *windows >= OFF_UNTIL_STOP);
 }
 
-/* Time by the device's clock against what its sequence numbers, or this computer, say passed. */
+/* Time by the device's clock against what its sequence numbers, or this computer, say passed. A unit
+ * that is wrong shows within a few states. */
 static int clock_is_off(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
     const uint32_t ticks = in->sequence - watch->clock_sequence;
@@ -251,9 +273,15 @@ static int clock_is_off(const sc_watch_config *config, sc_watch *watch, const sc
         begin_clock(watch, in);
         return 0;
     }
+    const uint32_t ticks_us = ticks * in->tick_us;
+    if (config->clock_share > 0.0f && ticks >= STATES_UNTIL_STOP &&
+        (clock_us > 2 * ticks_us || 2 * clock_us < ticks_us)) {
+        keep(watch, SC_WATCH_CLOCK, 1.0f);
+        return 1;
+    }
     int off = 0;
-    if (ticks * in->tick_us >= CLOCK_US) {
-        off = is_off(watch, clock_us, ticks * in->tick_us, config->clock_share, &watch->off_ticks);
+    if (ticks_us >= CLOCK_US) {
+        off = is_off(watch, clock_us, ticks_us, config->clock_share, &watch->off_ticks);
         watch->clock_sequence = in->sequence;
         watch->clock_us = in->device_us;
     }
@@ -272,7 +300,7 @@ static int unreadable(const sc_watch_config *config, sc_watch *watch, const sc_w
                          (isfinite(in->handle_force) || !(config->handle_radius > 0.0f));
     watch->unreadable = readable ? 0 : watch->unreadable + 1;
     return config->ratio_torque > 0.0f && over(watch, SC_WATCH_UNREADABLE, (float)watch->unreadable,
-                                               (float)UNREADABLE_UNTIL_STOP);
+                                               (float)STATES_UNTIL_STOP);
 }
 
 /* Begin again what counts over a time in which motors drive. */
@@ -281,7 +309,7 @@ static void rest(sc_watch *watch)
     watch->held_s = 0.0f;
     watch->swing_sign = 0;
     watch->swings = 0;
-    watch->torque_sign = 0;
+    watch->torque.sign = watch->force.sign = 0;
     watch->has_still = 0;
     watch->smooth_torque = watch->smooth_measured = 0.0f;
     watch->driven_s = 0.0f;
@@ -304,8 +332,12 @@ int sc_watch_take(const sc_watch_config *config, sc_watch *watch, const sc_watch
         }
         return SC_WATCH_NOTHING;
     }
-    if (runs_away(config, watch, in)) {
-        return SC_WATCH_RUNAWAY;
+    const int running = runs_away(config, watch, in);
+    if (running != SC_WATCH_NOTHING) {
+        return running;
+    }
+    if (is_elsewhere(config, watch, in)) {
+        return SC_WATCH_STOP;
     }
     if (swings(config, watch, in)) {
         return SC_WATCH_SWING;

@@ -19,7 +19,9 @@ enum {
     SC_WATCH_DIFFERS = 6,       /* measured torque is another one than commanded */
     SC_WATCH_CLOCK = 7,         /* the device's clock, against its ticks or this computer's clock */
     SC_WATCH_UNREADABLE = 8,    /* motor torque or handle force is no number */
-    SC_WATCHES = 9
+    SC_WATCH_RUNAWAY_ADVANCE = 9,
+    SC_WATCH_STOP = 10,         /* the device says that it is at a stop; the opening is elsewhere */
+    SC_WATCHES = 11
 };
 
 typedef struct {
@@ -28,6 +30,7 @@ typedef struct {
     float swing_torque;      /* ... and the change of torque within it [N m] that count */
     float swing_Hz;          /* slower swings are a hand's, or planned */
     float runaway_rate;      /* [rad/s] */
+    float runaway_speed;     /* of the advance [m/s] */
     float still_rad;         /* motion of the reference while the opening stands */
     float still_m;           /* motion of the reference while the advance stands */
     float still_torque;      /* imbalance of motor and hand under which blades cannot rest [N m] */
@@ -37,6 +40,8 @@ typedef struct {
                                 measured beside the places is watched */
     float clock_share;       /* of the device's clock against its ticks */
     float host_clock_share;  /* of the device's clock against this computer's */
+    float stop_low, stop_high; /* openings of the stops [rad] ... */
+    float stop_margin;       /* ... and how far from both a stop is none */
     float handle_radius;     /* of a rig that measures the force of the hand [m]; else 0 */
 } sc_watch_config;
 
@@ -48,13 +53,15 @@ typedef struct {
     int32_t released;    /* whether motors are off, and do not brake either */
     int32_t tracking;    /* whether there is a reference */
     int32_t at_stop;
-    float torque;        /* the command in force [N m] */
+    float torque;        /* the commands in force [N m], [N] */
+    float force;
     float torque_limit;
     float measured;      /* torque [N m] */
     float handle_force;  /* [N] */
     float opening;
     float opening_rate;
     float advance;
+    float advance_rate;
     float aim_opening;   /* of the reference, as its rate and the advance */
     float aim_rate;
     float aim_advance;
@@ -62,6 +69,13 @@ typedef struct {
     uint32_t device_us;
     uint32_t tick_us;
 } sc_watch_input;
+
+/* Of one axis: since when its effort has one sign, and how fast it was once that could act. */
+typedef struct {
+    int32_t sign;
+    float for_s;
+    float rate;
+} sc_watch_effort;
 
 typedef struct {
     float worst[SC_WATCHES]; /* largest value over threshold; 1 stops */
@@ -71,9 +85,8 @@ typedef struct {
     float swing_peak;
     float swing_low, swing_high; /* torque within this half of a swing */
     uint32_t swings;
-    int32_t torque_sign;
-    float torque_sign_s;
-    float rate_at_sign;
+    sc_watch_effort torque, force;
+    uint32_t elsewhere;     /* states in a row at a stop that is none */
     int32_t has_still;
     float still_opening, still_aim;
     float still_advance, still_aim_advance;

@@ -229,10 +229,10 @@ def _capture(root: Path, seed: int) -> None:
     probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("friction")
     with open_writer(path, "friction", link, recipe, text, probe=probe) as writer:
-        capture_friction(link, recipe, writer)
+        capture_friction(link, recipe, writer, probe=probe)
     path = workspace.new_recording("cut")
     with open_writer(path, "cut", link, recipe, text, probe=probe) as writer:
-        capture_cut(link, recipe, writer)
+        capture_cut(link, recipe, writer, probe=probe)
     link.close()
 
 
@@ -245,6 +245,7 @@ def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
         if not fit.structure["symmetric"]:
             sides["coulomb_pos"] += sides["offset"]
             sides["coulomb_neg"] -= sides["offset"]
+            sides["offset"] = 0.0
             return sides
         truth = true_parameters(specimen, angle_center=center, symmetric=True)
         truth["offset"] += 0.5 * (sides["coulomb_pos"] - sides["coulomb_neg"])

@@ -66,7 +66,9 @@ def capture_into(
         path = workspace.new_recording(kind)
         with open_writer(path, kind, link, recipe, text, hand=hand, probe=probe) as writer:
             if kind == "friction":
-                report = capture_friction(link, recipe, writer, progress, confirm=confirm)
+                report = capture_friction(
+                    link, recipe, writer, progress, confirm=confirm, probe=probe
+                )
             else:
-                report = capture_cut(link, recipe, writer, hand, progress, confirm)
+                report = capture_cut(link, recipe, writer, hand, progress, confirm, probe)
         return Captured(path, report, f"{link.identity.name} {link.identity.serial}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from scissorcal.files import replacing
 from scissorcal.verdicts import failed
-from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -27,17 +27,23 @@ def probe_device(
     *,
     workspace: Workspace | None = None,
     seed: int = 0,
+    baud: int | None = None,
+    realtime: bool = False,
     progress: Progress | None = None,
     confirm: "Confirm | None" = None,
 ) -> "ProbeResult":
     """Probe ``device`` (a port, or "sim") and keep the result in the workspace, if there is one.
+
+    "sim" is a virtual rig in virtual time, unless ``realtime``; ``baud`` takes the place of the
+    recipe's rate.
 
     A probe that refuses the rig is kept as well, so that what it found can be looked up. Raises
     what `scissorcal.device.probe.probe.probe` raises.
     """
     from scissorcal.device.probe.probe import probe
 
-    with open_rig(device, recipe.specimen, seed) as link:
+    line = line_of(recipe, baud)
+    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
         if workspace is None:
             return probe(link, recipe, progress=progress, confirm=confirm)
         return probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
@@ -98,14 +104,13 @@ def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult
 
     None where there is none that can be read.
     """
-    from scissorcal.device.probe.probe import identity_digest
     from scissorcal.device.probe.result import probe_from_dict
 
     try:
         found = probe_from_dict(json.loads(workspace.probe_path.read_text(encoding="utf-8")))
     except (OSError, ValueError):
         return None
-    if link is not None and found.identity != identity_digest(link.identity):
+    if link is not None and _differs(found, link):
         return None
     return found
 
@@ -116,12 +121,10 @@ def _most(recipe: "Recipe") -> str:
 
 def _why_again(last: "ProbeResult | None", link: "Link", recipe: "Recipe", now: datetime) -> str:
     """Why a probe does not count, as part of a sentence; empty where it does."""
-    from scissorcal.device.probe.probe import identity_digest
-
     if last is None:
         return "there is no probe of it yet"
-    if last.identity != identity_digest(link.identity):
-        return f"the last probe was of another rig or firmware ({last.device})"
+    if _differs(last, link):
+        return f"the last probe was of another rig, firmware or line ({last.device})"
     if last.motor_sign != recipe.rig.motor_sign:
         return "rig.motor_sign changed since"
     if failed(last.verdicts):
@@ -132,6 +135,16 @@ def _why_again(last: "ProbeResult | None", link: "Link", recipe: "Recipe", now: 
             f"the last probe is older than {recipe.rig.probe.max_age_h:g} h (rig.probe.max_age_h)"
         )
     return ""
+
+
+def _differs(last: "ProbeResult", link: "Link") -> bool:
+    """Whether a probe is of another rig, or ran in virtual time where this one does not."""
+    from scissorcal.device.link import PortLink
+    from scissorcal.device.probe.probe import identity_digest
+    from scissorcal.device.probe.result import REAL_TIME
+
+    real = last.facts.get(REAL_TIME) == 1.0
+    return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)
 
 
 def _store(workspace: Workspace, result: "ProbeResult") -> None:

@@ -1,0 +1,124 @@
+"""What scissorcal says of a strange device: a capture or a rendering with each fault.
+
+Every trial is short and in virtual time: one recording of friction, one sheet, one rendering.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.recorder import unloaded_sentence
+from scissorcal.errors import ScissorcalError
+from scissorcal.package import ModelPackage
+from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import read_recording
+from scissorcal.render import open_writer as open_render_writer
+from scissorcal.render import render
+from scissorcal.verdicts import failed
+
+from .device import StrangeDevice
+from .faults import FAULTS, Faults
+from .mechanics import Hand
+from .port import VirtualPort
+
+SEED = 11
+RENDER_S = 6.0
+RENDER_ADVANCE_M = -0.02
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was said, the exit code that a command ends with, and the truth at the device.
+
+    ``torque`` (N m) and ``rate`` (rad/s) are the largest of motor and blades until it stopped,
+    ``stop`` its time (s) since the device was switched on, ``kept`` the samples recorded until
+    then.
+    """
+
+    said: str
+    exit_code: int
+    torque: float
+    rate: float
+    stop: float
+    kept: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def short_recipe() -> Recipe:
+    """Paper, with one speed of each kind and one sheet."""
+    whole = builtin_recipe("paper-80gsm")
+    friction = {"speeds_rad_per_s": (0.6,), "repeats": 1, "excitation_s": 1.0}
+    cut = {"speeds_rad_per_s": (0.6,), "strokes_per_sheet": 2, "sheets": 1}
+    facts = whole.model_dump(exclude_unset=True)
+    facts["capture"] = {"friction": friction, "cut": cut}
+    return Recipe.model_validate(facts)
+
+
+def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = None) -> Outcome:
+    """Capture ``kind`` ("friction" or "cut") on a device with one fault."""
+    device = StrangeDevice(faults or FAULTS[name], seed=SEED)
+    recipe = short_recipe()
+    path = folder / f"{kind}.mcap"
+
+    def confirm(request: str) -> None:
+        if "fresh piece" in request:
+            device.load()
+        else:
+            device.sheet = None
+
+    def run() -> str:
+        link = VirtualPort(device)
+        with open_writer(path, "cut" if kind == "cut" else "friction", link, recipe, "") as writer:
+            if kind == "cut":
+                report = capture_cut(link, recipe, writer, confirm=confirm)
+            else:
+                report = capture_friction(link, recipe, writer, confirm=confirm)
+        tally = report.tally
+        found = [f"{tally.lost} frames lost"] if tally.lost else []
+        found += [f"{tally.faults} faults"] if tally.faults else []
+        found += [unloaded_sentence(stroke) for stroke in report.empty[:1]]
+        return "; ".join(["done", *found])
+
+    return _outcome(run, device, path)
+
+
+def render_trial(
+    name: str, package: ModelPackage, folder: Path, faults: Faults | None = None
+) -> Outcome:
+    """Render on a device with one fault, a hand at the handles."""
+    device = StrangeDevice(faults or FAULTS[name], seed=SEED)
+    device.sledge.place = RENDER_ADVANCE_M
+    path = folder / "render.mcap"
+
+    def run() -> str:
+        link = VirtualPort(device)
+        with open_render_writer(path, link, package) as writer:
+            result = render(
+                link,
+                package,
+                seconds=RENDER_S,
+                writer=writer,
+                confirm=lambda request: device.grasp(Hand()),
+            )
+        wrong = failed(result.verdicts)
+        return "; ".join(f"{v.check}: {v.why}" for v in wrong) if wrong else "done"
+
+    return _outcome(run, device, path)
+
+
+def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path) -> Outcome:
+    try:
+        said, code = run(), 0
+        code = 0 if said.startswith("done") else 3
+    except ScissorcalError as error:
+        said, code = str(error), error.exit_code
+    kept, notes = 0, ()
+    if path.is_file():
+        recording = read_recording(path)
+        kept, notes = len(recording.samples), recording.notes
+    torque, rate = device.largest_torque, device.largest_rate
+    return Outcome(said, code, torque, rate, float(np.round(device.time_s, 3)), kept, notes)
