@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
 from scissorcal.device.recorder import unloaded_sentence
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import read_recording
+from scissorcal.recording import Recording, read_recording
 from scissorcal.render import open_writer as open_render_writer
 from scissorcal.render import render
 from scissorcal.verdicts import failed
@@ -34,18 +32,18 @@ RENDER_ADVANCE_M = -0.02
 class Outcome:
     """What was said, the exit code that a command ends with, and the truth at the device.
 
-    ``torque`` (N m) and ``rate`` (rad/s) are the largest of motor and blades until it stopped,
-    ``stop`` its time (s) since the device was switched on, ``kept`` the samples recorded until
-    then.
+    ``stop`` names the servo's stop, empty where it did not stop by itself. ``torque`` (N m) and
+    ``rate`` (rad/s) are the largest of motor and blades until the end, ``time_s`` its time since
+    the device was switched on, ``recording`` what was kept.
     """
 
     said: str
     exit_code: int
+    stop: str
     torque: float
     rate: float
-    stop: float
-    kept: int = 0
-    notes: tuple[str, ...] = ()
+    time_s: float
+    recording: Recording | None
 
 
 def short_recipe() -> Recipe:
@@ -92,6 +90,7 @@ def render_trial(
     """Render on a device with one fault, a hand at the handles."""
     device = StrangeDevice(faults or FAULTS[name], seed=SEED)
     device.sledge.place = RENDER_ADVANCE_M
+    device.blades.place = Hand().high
     path = folder / "render.mcap"
 
     def run() -> str:
@@ -111,14 +110,13 @@ def render_trial(
 
 
 def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path) -> Outcome:
+    stop = ""
     try:
-        said, code = run(), 0
+        said = run()
         code = 0 if said.startswith("done") else 3
     except ScissorcalError as error:
         said, code = str(error), error.exit_code
-    kept, notes = 0, ()
-    if path.is_file():
-        recording = read_recording(path)
-        kept, notes = len(recording.samples), recording.notes
+        stop = error.stop if isinstance(error, DeviceError) else ""
+    recording = read_recording(path) if path.is_file() else None
     torque, rate = device.largest_torque, device.largest_rate
-    return Outcome(said, code, torque, rate, float(np.round(device.time_s, 3)), kept, notes)
+    return Outcome(said, code, stop, torque, rate, device.time_s, recording)

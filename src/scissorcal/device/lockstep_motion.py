@@ -128,7 +128,7 @@ class LockstepMotion(Motion):
         samples = self._without_repeats(np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE))
         self._silent_s = 0.0 if len(samples) else self._silent_s + self._ticks * self.tick_s
         if self._silent_s > SILENCE_S and not stopped:
-            self._failure = DeviceError(StopReason.SILENCE.sentence)
+            self._failure = DeviceError(StopReason.SILENCE.sentence, StopReason.SILENCE.name)
         return samples
 
     def _exchange(self) -> list[bytes]:
