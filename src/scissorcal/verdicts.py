@@ -17,6 +17,9 @@ _POSE = "where the plate is drawn; no torque depends on it"
 _EDGE = "shape of the edge, which torque follows"
 _CAMERA = "lengths measured in photographs"
 _LOOP = "whether commands reach the motors in time"
+_PROBE_LINE = "the line, before a motor runs"
+_PROBE_SENSORS = "the sensors, before a motor runs"
+_PROBE_MOTORS = "the motors, before they run in earnest"
 
 MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
@@ -44,6 +47,14 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
+    "fit sensor zeros": (
+        "at most",
+        TORQUE + "zero of the sensors, share of the drive (rms); it is subtracted",
+    ),
+    "fit zero drift": (
+        "at most",
+        TORQUE + "two sds of what is left of the zeros, share of the drive (rms)",
+    ),
     "fit foundations": ("at most", "what the fit builds on: failed verdicts there"),
     "fit teeth": (
         "at most",
@@ -105,10 +116,41 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),
     "device lost frames": ("at most", f"{_LOOP}: frames lost, %"),
     "device latency timer": ("at most", f"{_LOOP}: ms that the adapter holds data back"),
+    "device control margin": (
+        "at least",
+        "whether the rig follows a capture without swinging: phase margin of its controller, "
+        "degrees",
+    ),
     "device drift": (
         "at most",
         "rates and accelerations: error of the device's clock beyond two standard errors, ppm",
     ),
+    "probe numbers": ("at most", f"{_PROBE_SENSORS}: fields that are no number"),
+    "probe stops": ("at most", f"{_PROBE_SENSORS}: opening beyond the stated stops, rad"),
+    "probe clock by tick": ("at most", f"{_PROBE_LINE}: device_us a frame over tick_us, less 1"),
+    "probe clock by host": ("at most", f"{_PROBE_LINE}: device clock over this computer's, less 1"),
+    "probe lost frames": ("at most", f"{_PROBE_LINE}: frames lost or garbled, %"),
+    "probe encoder jitter": ("at most", f"{_PROBE_SENSORS}: sd of the opening at rest, steps"),
+    "probe rest": ("at most", f"{_PROBE_SENSORS}: motion with the motors off, rad"),
+    "probe torque zero": ("at most", f"{_PROBE_SENSORS}: it is subtracted, N m"),
+    "probe torque noise": ("at most", f"{_PROBE_SENSORS}: sd, N m"),
+    "probe force zero": ("at most", f"{_PROBE_SENSORS}: it is subtracted, N"),
+    "probe force noise": ("at most", f"{_PROBE_SENSORS}: sd, N"),
+    "probe handle radius": ("at most", f"{_PROBE_SENSORS}: device's over recipe's, less 1"),
+    "probe encoder step": ("at most", f"{_PROBE_SENSORS}: step seen over step stated"),
+    "probe count scale": ("at most", f"{_PROBE_SENSORS}: range counted over range stated, less 1"),
+    "probe faults": ("at most", f"{_PROBE_MOTORS}: faults that do not clear"),
+    "probe enable": ("", f"{_PROBE_MOTORS}: whether they follow ENABLE"),
+    "probe lag": ("at most", f"{_PROBE_MOTORS}: from a state to the effect of its answer, ms"),
+    "probe watchdog": ("at most", f"{_PROBE_MOTORS}: silence after which the device brakes, ms"),
+    "probe watchdog flags": ("at most", f"{_PROBE_MOTORS}: flags that are missing"),
+    "probe fault clears": ("at most", f"{_PROBE_MOTORS}: 1 if it does not"),
+    "probe blades move": ("", f"{_PROBE_MOTORS}: largest torque that was tried, mN m"),
+    "probe blades direction": ("at least", f"{_PROBE_MOTORS}: share of the pushes that obey"),
+    "probe sledge move": ("", f"{_PROBE_MOTORS}: largest force that was tried, N"),
+    "probe sledge direction": ("at least", f"{_PROBE_MOTORS}: share of the pushes that obey"),
+    "probe measured torque": ("at most", f"{TORQUE}measured over commanded, less 1"),
+    "probe clipping": ("at most", f"{_PROBE_MOTORS}: 1 if a torque above the limit is not clipped"),
     "host resolution": ("at most", f"{_LOOP}: steps of this computer's clock, ns"),
     "host wake-up lateness": ("at most", f"{_LOOP}: 99 % of the delays, ms"),
     "host real-time rights": ("at least", f"{_LOOP}: priority that is granted"),

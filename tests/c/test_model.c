@@ -119,7 +119,7 @@ static void check_steps(const json *one)
     const sc_model model = load_model(json_get(one, "model"), rooms);
     const json *opening = json_get(one, "opening"), *rate = json_get(one, "rate");
     const json *advance = json_get(one, "advance");
-    sc_crack state = {0.0f, 0};
+    sc_crack state = {0.0f, 0, 0, 0};
     CHECK(sc_model_is_sound(&model), title);
     for (size_t i = 0; i < opening->size; i++) {
         sc_step_output out;
@@ -152,7 +152,7 @@ static void check_absurd(const json *one)
     const sc_model model = load_model(json_get(one, "model"), rooms);
     const size_t n = sizeof odd / sizeof *odd;
     for (size_t i = 0; i < n * n * n; i++) {
-        sc_crack state = {0.0f, 0};
+        sc_crack state = {0.0f, 0, 0, 0};
         sc_step_output out;
         const float theta = odd[i % n], rate = odd[i / n % n], advance = odd[i / n / n];
         sc_model_step(&model, &state, theta, rate, advance, &out);

@@ -65,6 +65,9 @@ def test_a_capture_through_a_port_has_everything(tmp_path: Path) -> None:
     assert report.motion.counters.frames >= len(samples)
     assert report.motion.latency is not None
     assert report.motion.latency.p50 > 0
+    assert report.motion.lag.ticks.worst >= report.motion.lag.ticks.p50 >= 1.0
+    assert report.motion.lag.transport_ms > 0.0
+    assert report.motion.lag.sentence in recording.notes
     assert np.sum(samples["latency_ns"] > 0) > 0.5 * len(samples)
     assert not samples["flags"][-1] & int(StateFlag.MOTOR_ENABLED)
 

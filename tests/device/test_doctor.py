@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.diagnosis import Measurements, diagnose
+from scissorcal.device.diagnosis import Measurements, brake_after_ms, diagnose
 from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
 from scissorcal.device.link import open_link
-from scissorcal.device.motion import Percentiles
 from scissorcal.device.sim.process import SimProcess
+from scissorcal.device.timing import Percentiles
 from scissorcal.verdicts import failed
 
 GOOD = Percentiles(0.9, 1.2, 1.5, 3.0)
@@ -71,6 +71,24 @@ def test_what_was_not_measured_is_not_judged() -> None:
     )
     open_checks = [v.check for v in diagnose(measured, "p") if v.status == "not_evaluated"]
     assert open_checks == ["latency timer", "drift", "real-time rights"]
+
+
+@pytest.mark.parametrize(
+    ("worst_wait", "worst_trip", "recommended"),
+    [(0.3, 1.2, 10.0), (8.0, 2.0, 25.0), (20.0, float("nan"), 45.0), (900.0, 1.0, 1000.0)],
+)
+def test_a_late_computer_needs_a_device_that_waits_longer(
+    worst_wait: float, worst_trip: float, recommended: float
+) -> None:
+    late, trip = Percentiles(0.1, 0.2, 0.3, worst_wait), Percentiles(1.0, 1.0, 1.0, worst_trip)
+    measured = Measurements(**{**vars(SOUND), "lateness": late, "round_trip": trip})
+    assert brake_after_ms(measured) == recommended
+
+
+def test_listening_keeps_the_stream_going() -> None:
+    with SimProcess("office-paper", seed=3) as sim, open_link(sim.port) as link:
+        found = examine(link, seconds=6.5)
+    assert found.measurements.frames > 5600
 
 
 @pytest.mark.parametrize("true_ppm", [-200.0, 0.0, 30.0, 400.0])

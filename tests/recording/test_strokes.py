@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scissorcal.recording import label_strokes
+from scissorcal.recording import TurningPoints, label_strokes
 
 Array = NDArray[np.float64]
 
@@ -92,3 +92,50 @@ def test_invalid_arguments_are_refused() -> None:
         label_strokes([0, 1], [0, 1], 0.0)
     with pytest.raises(ValueError, match="shape"):
         label_strokes([0, 1], [0], 0.1)
+
+
+def reference_turns(values: list[float], min_travel: float) -> list[int]:
+    """Turning points of the whole motion at once, written without regard to its length."""
+    turns: list[int] = []
+    for end in range(len(values)):
+        low = values.index(min(values[: end + 1]))
+        high = values.index(max(values[: end + 1]))
+        if values[high] - values[low] >= min_travel:
+            turns, at, direction = [min(low, high)], end, 1 if high > low else -1
+            break
+    else:
+        return []
+    while True:
+        reached = at
+        for index in range(at + 1, len(values)):
+            if (values[index] - values[reached]) * direction > 0:
+                reached = index
+            elif (values[reached] - values[index]) * direction >= min_travel:
+                at = index
+                break
+        else:
+            return [*turns, reached]
+        turns.append(reached)
+        direction = -direction
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    values=st.lists(st.floats(-10, 10) | st.sampled_from([0.0, 1.0, 2.0]), max_size=60),
+    cuts=st.lists(st.integers(0, 60), max_size=8),
+    min_travel=st.floats(1e-3, 5),
+)
+def test_turning_points_of_pieces_are_those_of_the_whole(
+    values: list[float], cuts: list[int], min_travel: float
+) -> None:
+    points = TurningPoints(min_travel)
+    for start, end in itertools.pairwise([0, *sorted(cuts), len(values) + 60]):
+        points.feed(values[start:end])
+        here = values[:end]
+        labels = label_strokes(np.array(here), np.arange(len(here)) * 1e-3, min_travel)
+        kinds = [stroke.kind for stroke in labels.strokes]
+        assert (points.closings, points.openings) == (
+            kinds.count("closing"),
+            kinds.count("opening"),
+        )
+        assert points.so_far == reference_turns(here, min_travel)

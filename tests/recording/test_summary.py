@@ -50,3 +50,14 @@ def test_nothing_recorded_gives_finite_numbers() -> None:
     assert found.strokes[0].travel == 0.0
     assert all(entry.low == entry.high == 0.0 for entry in found.ranges)
     assert summary(Recording("friction", made_samples(1))).rate_Hz == 0.0
+
+
+def test_strokes_that_return_to_each_other_are_summed_up_whole() -> None:
+    """The samples of a stroke need not lie together, as where a fault interrupted it."""
+    samples = made_samples(6)
+    samples["stroke"] = [1, -1, 0, 1, 0, 5]
+    samples["opening"] = [0.1, 9.0, 0.5, 0.4, 0.3, 0.0]
+    strokes = tuple(Stroke(index, "closing") for index in (0, 1, 2))
+    found = summary(Recording("cut", samples, strokes)).strokes
+    assert [row.samples for row in found] == [2, 2, 0]
+    assert [row.travel for row in found] == pytest.approx([0.2, 0.3, 0.0])

@@ -1,5 +1,6 @@
 """Rendering through a real pseudo-terminal, in real time. No time is asserted."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -27,3 +28,24 @@ def test_a_port_is_served_by_a_separate_process(paper: ModelPackage, tmp_path: P
     assert latency_of(recording.samples["latency_ns"]) is not None
     assert np.any(recording.samples["torque_command"] != 0.0)
     assert np.all(np.abs(recording.samples["torque_command"]) <= result.limits.torque_Nm)
+    assert result.lag.ticks.p50 >= 1.0
+    assert result.lag.ms.p50 > result.lag.ticks.p50
+    assert result.rights is not None
+    assert {result.lag.sentence, result.rights.sentence} <= set(recording.notes)
+
+
+def test_a_supervisor_that_is_slow_for_a_moment_changes_nothing(paper: ModelPackage) -> None:
+    slept: list[float] = []
+
+    def slow_once(done: float, sentence: str) -> None:
+        if not slept:
+            slept.append(done)
+            time.sleep(0.6)  # three times the servo's patience
+
+    with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
+        link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
+        strokes = VirtualStrokes(1, 0.6)
+        result = render(link, paper, seconds=2.0, strokes=strokes, progress=slow_once)
+    assert slept
+    assert result.fallback_frames == 0
+    assert result.overrun == 0

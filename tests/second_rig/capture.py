@@ -22,6 +22,8 @@ LEAD_S = 0.3
 """Rest in the first pose before a segment begins."""
 IDLE_S = 0.05
 """Motors off at the end of a segment."""
+ZERO_S = 1.2
+"""Motors off before the first and after the last segment, as a capture has it."""
 PAUSE_S = 1.5
 """Unrecorded time while a sheet is changed."""
 FIRST_SEQUENCE = 1000
@@ -70,7 +72,7 @@ def capture_friction(
 ) -> tuple[Recording, Books]:
     """Drive the empty sweeps of the recipe's friction plan (or an own plan) and record them."""
     plan = plan or friction_plan(recipe, identity_of(rig))
-    timeline = driven_timeline(plan)
+    timeline = driven_timeline(plan, zero_s=ZERO_S)
     books = run(rig, timeline, rng)
     return _recording(rig, "friction", plan.strokes, timeline, books, rng), books
 
@@ -91,7 +93,7 @@ def capture_cut(
     """
     plan = plan or cut_plan(recipe, identity_of(rig))
     if not hand:
-        timeline = driven_timeline(plan, interruptions)
+        timeline = driven_timeline(plan, interruptions, ZERO_S)
         books = run(rig, timeline, rng)
         return _recording(rig, "cut", plan.strokes, timeline, books, rng), books
     timeline = hand_timeline(rig, plan, rng)
@@ -109,16 +111,25 @@ def capture_cut(
     return replace(recording, samples=samples, strokes=labels.strokes), books
 
 
-def driven_timeline(plan: Plan, interruptions: Sequence[Interruption] = ()) -> Timeline:
-    """String a plan's segments together, each with a rest before and motors off after it."""
+def driven_timeline(
+    plan: Plan, interruptions: Sequence[Interruption] = (), zero_s: float = 0.0
+) -> Timeline:
+    """String a plan's segments together, each with a rest before and motors off after it.
+
+    At both ends the motors are off for ``zero_s`` more.
+    """
     names = ("opening", "rate", "advance", "mode", "stroke", "sheet", "gap_s")
     columns: dict[str, list[NDArray[np.float64]]] = {name: [] for name in names}
+    last = len(plan.segments) - 1
     for number, segment in enumerate(plan.segments):
         reference, sheet = segment.reference, segment.sheet
         order, mode = _order(reference.stroke, interruptions, plan.tick_s)
-        lead, idle = round(LEAD_S / plan.tick_s), round(IDLE_S / plan.tick_s)
+        zero = round(zero_s / plan.tick_s)
+        lead = round(LEAD_S / plan.tick_s) + (zero if number == 0 else 0)
+        idle = round(IDLE_S / plan.tick_s) + (zero if number == last else 0)
         padded = np.concatenate([np.zeros(lead, int), order, np.full(idle, order[-1])])
         modes = np.concatenate([np.full(lead, SERVO), mode, np.full(idle, OFF)])
+        modes[: zero if number == 0 else 0] = OFF
         still = np.full(len(padded), False)
         still[:lead] = still[len(padded) - idle :] = True
         stroke = np.where(still | (modes != SERVO), -1, reference.stroke[padded])

@@ -8,7 +8,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Realtime, Seed, Yes
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import ScissorcalError
 
@@ -53,6 +53,7 @@ def friction(
     realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
@@ -66,7 +67,7 @@ def friction(
       80 of 80 cells filled
       ...
     """
-    rig = _Rig(device, seed, realtime)
+    rig = _Rig(device, seed, realtime, baud)
     return _capture("friction", rig, hand=False, yes=yes, folder=folder)
 
 
@@ -79,6 +80,7 @@ def cut(
     realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
@@ -92,7 +94,8 @@ def cut(
       24 of 24 cells filled
       ...
     """
-    return _capture("cut", _Rig(device, seed, realtime), hand=hand, yes=yes, folder=folder)
+    rig = _Rig(device, seed, realtime, baud)
+    return _capture("cut", rig, hand=hand, yes=yes, folder=folder)
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,7 @@ class _Rig:
     device: str
     seed: int
     realtime: bool
+    baud: int | None
 
 
 def _capture(
@@ -118,9 +122,11 @@ def _capture(
                 rig.device,
                 hand=hand,
                 seed=rig.seed,
+                baud=rig.baud,
                 realtime=rig.realtime,
                 progress=view.show,
                 confirm=view.confirm,
+                say=note,
             )
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
@@ -155,6 +161,9 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
             f"reply to a frame: {latency.p50:.0f} us (p50), {latency.p99:.0f} us (p99), "
             f"{latency.worst:.0f} us (worst)"
         )
+    lines.append(report.motion.lag.sentence)
+    if report.motion.rights is not None:
+        lines.append(report.motion.rights.sentence)
     return "\n".join(lines)
 
 

@@ -6,6 +6,7 @@ from scissorcal.cli.output import Answer, command
 _COMMANDS = {
     "list": ("scissorcal.cli.device:list_", "The serial ports of this machine."),
     "doctor": ("scissorcal.cli.doctor:doctor", "Measure port, timer and scheduler; name remedies."),
+    "probe": ("scissorcal.cli.probe:probe", "Check a rig before its motors run."),
     "simulate": ("scissorcal.cli.simulate:simulate", "Serve a virtual rig on a pseudo-terminal."),
 }
 

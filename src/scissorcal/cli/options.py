@@ -28,6 +28,11 @@ Device = Annotated[
     ),
 ]
 
+Baud = Annotated[
+    int | None,
+    typer.Option("--baud", min=9600, max=12_000_000, help="Baud rate, if not the recipe's."),
+]
+
 Realtime = Annotated[
     bool,
     typer.Option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def render(
     realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
+    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
@@ -64,9 +65,11 @@ def render(
             strokes=VirtualStrokes(strokes, rate_rad_per_s),
             record=not no_record,
             seed=seed,
+            baud=baud,
             realtime=realtime,
             progress=view.show,
             confirm=view.confirm,
+            say=note,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts
@@ -83,6 +86,9 @@ def _text(rendered: "Rendered") -> str:
         rows = [["latency (us)", "p50", "p99", "p99.9", "worst"]]
         rows.append(["", *(f"{value:.0f}" for value in (at.p50, at.p99, at.p999, at.worst))])
         lines += ["", table(rows, right=[1, 2, 3, 4])]
+    lines += ["", result.lag.sentence]
+    if result.rights is not None:
+        lines.append(result.rights.sentence)
     lines += [
         "",
         f"{result.misses} frames missed, {result.garbled} garbled, {result.stalls} stalls, "

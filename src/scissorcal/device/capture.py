@@ -7,6 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from scissorcal.device.capture_gains import (
+    ADVANCE_ERROR_M,
+    OPENING_ERROR_RAD,
+    CaptureGains,
+    Probed,
+    capture_gains,
+)
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_strokes, hand_travel
@@ -21,18 +28,17 @@ from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
+from scissorcal.recording.probe import PROBE_KEY, ProbeResult
 
 CaptureProgress = Callable[[float, str, Recorder], None]
 """Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
-SUPERVISOR_S = 1.0
-RATE_CUTOFF_HZ = 120.0
+SUPERVISOR_S = 0.3
+"""Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
-OPENING_ERROR_RAD = 0.3
-ADVANCE_ERROR_M = 0.02
 IDLE_S = 1.5
-"""Time with the motors off at the end of a cut capture, from which sensor zeros are measured."""
+"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
 
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they open, and the sledge "
@@ -55,12 +61,19 @@ class CaptureReport:
 
 
 def open_writer(
-    path: Path, kind: Kind, link: Link, recipe: Recipe, recipe_toml: str, *, hand: bool = False
+    path: Path,
+    kind: Kind,
+    link: Link,
+    recipe: Recipe,
+    recipe_toml: str,
+    *,
+    hand: bool = False,
+    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a capture and write all that is known before it starts.
 
-    ``recipe_toml`` is the recipe's text, as it stands in its file. Raises as RecordingWriter
-    does, and as the plan of the capture does.
+    ``recipe_toml`` is the recipe's text, as it stands in its file; ``probe`` what a probe of this
+    rig found. Raises as RecordingWriter does, and as the plan of the capture does.
     """
     identity = link.identity
     strokes: tuple[Stroke, ...] = ()
@@ -72,7 +85,7 @@ def open_writer(
         kind,
         Joint(recipe.rig.joint),
         recipe_toml,
-        identity_facts(identity),
+        rig_facts(identity, recipe.rig.motor_sign, probe),
         identity.handle_radius,
         strokes,
         min_travel=hand_travel(recipe, identity) if hand else None,
@@ -86,21 +99,26 @@ def capture_friction(
     progress: CaptureProgress | None = None,
     *,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. What was
+    ``confirm`` asks a person to clear the blades; a simulator clears them itself. The gains follow
+    from ``probe`` where there is one; DeviceError where none could follow the plan. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
     faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
     """
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    with _motion_for(link, recipe, plan) as motion:
+    gains = _gains(link, recipe, "friction", probe, writer)
+    with _motion_for(link, recipe, plan, gains) as motion:
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         drive.follow(plan.segments[0])
+        drive.idle()
         return _finish(recorder, motion)
 
 
@@ -111,6 +129,7 @@ def capture_cut(
     hand: bool = False,
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
 ) -> CaptureReport:
     """Drive strokes through sheets (or presses), or record those of a hand.
 
@@ -122,8 +141,9 @@ def capture_cut(
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
+    gains = _gains(link, recipe, "cut", probe, writer)
     if hand:
-        with _motion_for(link, recipe, None) as motion:
+        with _motion_for(link, recipe, None, gains) as motion:
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
@@ -131,10 +151,11 @@ def capture_cut(
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan) as motion:
+    with _motion_for(link, recipe, plan, gains) as motion:
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
+        drive.idle()
         for segment in plan.segments:
             loader.retract()
             drive.go_to_start(segment)
@@ -144,27 +165,35 @@ def capture_cut(
         return _finish(recorder, motion)
 
 
-def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) -> ServoConfig:
+def servo_config(
+    recipe: Recipe,
+    identity: Identity,
+    duration_s: float = 0.0,
+    gains: CaptureGains | None = None,
+) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
+
+    ``gains`` are those of `capture_gains`, by default those of a rig that nobody probed.
 
     A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
     samples only, so the fault is cleared, unless there are more than one per second.
     """
-    limits, control = recipe.limits, recipe.rig.control
+    limits = recipe.limits
     torque_limit = min(limits.torque_Nm, identity.torque_limit)
+    control = gains or capture_gains(recipe, identity, "cut", None)
     return ServoConfig(
         torque_limit=torque_limit,
         torque_slew=limits.torque_slew_Nm_per_s,
         force_limit=min(limits.force_N, identity.force_limit),
         force_slew=limits.force_slew_N_per_s,
         ramp_s=limits.engagement_ramp_s,
-        rate_cutoff_Hz=RATE_CUTOFF_HZ,
-        opening_kp=control.opening_kp_Nm_per_rad,
-        opening_kd=control.opening_kd_Nm_s_per_rad,
-        opening_ki=control.opening_ki_Nm_per_rad_s,
-        advance_kp=control.advance_kp_N_per_m,
-        advance_kd=control.advance_kd_N_s_per_m,
-        advance_ki=control.advance_ki_N_per_m_s,
+        rate_cutoff_Hz=control.rate_cutoff_Hz,
+        opening_kp=control.opening.kp,
+        opening_kd=control.opening.kd,
+        opening_ki=control.opening.ki,
+        advance_kp=control.advance.kp,
+        advance_kd=control.advance.kd,
+        advance_ki=control.advance.ki,
         opening_error_limit=OPENING_ERROR_RAD,
         advance_error_limit=ADVANCE_ERROR_M,
         opening_low=identity.opening_min - STOP_MARGIN_RAD,
@@ -172,6 +201,7 @@ def servo_config(recipe: Recipe, identity: Identity, duration_s: float = 0.0) ->
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
+        motor_sign=recipe.rig.motor_sign,
         watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
     )
 
@@ -181,6 +211,19 @@ def identity_facts(identity: Identity) -> dict[str, Any]:
     facts = identity._asdict()
     del facts["nonce_echo"]
     return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
+
+
+def rig_facts(identity: Identity, motor_sign: int, probe: ProbeResult | None) -> dict[str, Any]:
+    """What a recording holds of its rig: the identity, a motor sign of -1, and the probe.
+
+    Torques in the recording are of the corrected sign.
+    """
+    facts = identity_facts(identity)
+    if motor_sign != 1:
+        facts["motor_sign"] = motor_sign
+    if probe is not None:
+        facts[PROBE_KEY] = probe.as_dict()
+    return facts
 
 
 def identity_of(facts: Mapping[str, Any]) -> Identity:
@@ -248,14 +291,38 @@ class _Drive:
         return f"{stroke.kind}{speed} ({of})"
 
 
-def _motion_for(link: Link, recipe: Recipe, plan: Plan | None) -> Motion:
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0)
+def _gains(
+    link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
+) -> CaptureGains:
+    """Gains by what the probe found; what is said of them is noted."""
+    probed = None
+    if probe and probe.inertia_kg_m2 and probe.delay_s and probe.coulomb_Nm:
+        viscous = probe.viscous_Nm_s_per_rad
+        probed = Probed(
+            inertia_kg_m2=probe.inertia_kg_m2.mean,
+            inertia_sd_kg_m2=probe.inertia_kg_m2.sd,
+            viscous_Nm_s_per_rad=viscous.mean if viscous else 0.0,
+            coulomb_Nm=probe.coulomb_Nm.mean,
+            delay_s=max(probe.delay_s.mean, 0.0),
+            delay_sd_s=probe.delay_s.sd,
+        )
+    gains = capture_gains(recipe, link.identity, kind, probed)
+    for verdict in gains.verdicts if probe else ():
+        writer.note(verdict.why)
+    return gains
+
+
+def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
 
 
 def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     report = motion.report()
+    recorder.writer.note(report.lag.sentence)
+    if report.rights:
+        recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)
     return CaptureReport(
         recorder.sample_count, recorder.coverage, recorder.tally, report, tuple(recorder.empty)

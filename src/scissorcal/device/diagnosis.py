@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from scissorcal.device.motion import Percentiles
+from scissorcal.device.timing import Percentiles
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 ROUND_TRIP_LIMIT_TICKS = 4.0
@@ -15,6 +15,7 @@ DRIFT_LIMIT_PPM = 500.0
 TIMER_LIMIT_NS = 1000.0
 ADAPTER_LIMIT_MS = 1.0
 LEAST_PRIORITY = 1.0
+LEAST_BRAKE_MS, MOST_BRAKE_MS = 10.0, 1000.0
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,18 @@ def diagnose(m: Measurements, port: str) -> tuple[Verdict, ...]:
         _scheduler(m),
         _rights(m),
     )
+
+
+def brake_after_ms(m: Measurements) -> float:
+    """Shortest BRAKE_AFTER_MS that this computer, as loaded as now, is unlikely to miss.
+
+    Twice the worst wake-up and round trip that were measured, since a longer run meets worse ones
+    than 500 waits do, and a tick; rounded up to 5 ms, between 10 (below which a desktop system
+    brakes for nothing) and 1000.
+    """
+    late = [value for value in (m.lateness.worst, m.round_trip.worst) if math.isfinite(value)]
+    needed = 2.0 * sum(late) + m.tick_ms
+    return min(max(5.0 * math.ceil(needed / 5.0), LEAST_BRAKE_MS), MOST_BRAKE_MS)
 
 
 def adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:

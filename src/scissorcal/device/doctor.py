@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.diagnosis import Measurements, adapter_timer_path, diagnose
+from scissorcal.device.diagnosis import Measurements, adapter_timer_path, brake_after_ms, diagnose
 from scissorcal.device.link import PortLink
-from scissorcal.device.motion import Percentiles
+from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
 from scissorcal.recording.summarising import missing_frames
@@ -28,6 +28,7 @@ ROUND_TRIPS = 100
 SLEEPS = 500
 DRIFT_CHUNKS = 24
 U32 = 2**32
+KEEP_STREAMING_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,11 @@ class Examination:
 
     measurements: Measurements
     verdicts: tuple[Verdict, ...]
+
+    @property
+    def brake_after_ms(self) -> float:
+        """What the device should wait for a command until it brakes, by these measurements."""
+        return brake_after_ms(self.measurements)
 
 
 def examine(link: PortLink, seconds: float = 5.0, progress: Progress | None = None) -> Examination:
@@ -112,7 +118,8 @@ def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, 
     end = time.perf_counter() + seconds
     try:
         while (left := end - time.perf_counter()) > 0:
-            for message in link.receive(min(left, 0.5)):
+            link.keep_streaming()
+            for message in link.receive(min(left, KEEP_STREAMING_S)):
                 if isinstance(message, State):
                     arrivals.append(time.perf_counter())
                     states.append(message)

@@ -156,6 +156,10 @@ class PortLink(AbstractContextManager["PortLink"]):
                 return time.perf_counter() - sent
         return math.nan
 
+    def keep_streaming(self) -> None:
+        """Say HELLO: a device stops streaming to a host of which it hears nothing for 5 s."""
+        self.send(Hello(self._nonce()))
+
     def state(self, timeout: float = 1.0) -> State:
         """Return the next state the device sends (it must be streaming)."""
         for message in self.receive(timeout):

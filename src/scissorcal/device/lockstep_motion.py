@@ -9,6 +9,7 @@ import numpy as np
 from scissorcal.device.link import Link
 from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples
 from scissorcal.device.paths import Reference
+from scissorcal.device.timing import FeltLag
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     SAMPLE_DTYPE,
@@ -50,8 +51,10 @@ class LockstepMotion(Motion):
         self._last_sequence = -1
         self._silent_s = 0.0
         self._garbled_before = link.garbled
-        self._passed_ns = round(1e9 * link.virtual_time)
+        before_s = link.virtual_time
+        self._passed_ns = round(1e9 * before_s)
         link.configure(ConfigKey.STREAM, 1.0)
+        self._round_trip_s = link.virtual_time - before_s
         self.step()
 
     @property
@@ -103,6 +106,8 @@ class LockstepMotion(Motion):
             overrun=0,
             latency=None,
             interval=None,
+            lag=FeltLag.of(self._servo.lag, self.tick_s, self._round_trip_s),
+            rights=None,
             watched=self._servo.watched,
         )
 

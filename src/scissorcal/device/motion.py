@@ -4,17 +4,16 @@ A motion idles (motors off), tracks a reference, renders, or damps. In each mode
 in blocks, as they arrive.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.paths import Reference
+from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
@@ -26,29 +25,10 @@ from scissorcal.kernel import (
 )
 
 Samples = NDArray[np.void]
-QuantileMethod = Literal["linear", "inverted_cdf"]
 
 BLOCK_S = 0.05
 STOP_MARGIN_RAD = 0.05
 """Openings are usable up to so far beyond the stops that a device states."""
-
-
-@dataclass(frozen=True)
-class Percentiles:
-    """Middle and tail of a set of times, in the unit that its holder states; NaN if unknown."""
-
-    p50: float
-    p99: float
-    p999: float
-    worst: float
-
-    @classmethod
-    def of(cls, times: NDArray[np.float64], method: QuantileMethod = "linear") -> "Percentiles":
-        """Of times (n,); ``method`` as `numpy.quantile` has it."""
-        if len(times) == 0:
-            return cls(math.nan, math.nan, math.nan, math.nan)
-        quantiles = np.quantile(times, [0.5, 0.99, 0.999, 1.0], method=method)
-        return cls(*(float(value) for value in quantiles))
 
 
 @dataclass(frozen=True)
@@ -58,8 +38,10 @@ class MotionReport:
     ``counters`` count frames and limits; ``garbled`` frames were discarded, ``stalls`` are
     pauses of more than five ticks between frames by the host's clock, ``overrun`` samples were
     overwritten before they were read. ``latency`` (arrival of a frame to departure of its
-    command) and ``interval`` (between frames) are in microseconds, None in virtual time.
-    ``watched`` is the largest value that each watch has seen, as a share of what stops.
+    command) and ``interval`` (between frames) are in microseconds, None in virtual time. ``lag`` is
+    what a hand feels of all delays; ``rights`` are what the system granted the loop, None in
+    virtual time. ``watched`` is the largest value that each watch has seen, as a share of what
+    stops.
     """
 
     counters: ServoCounters
@@ -71,6 +53,8 @@ class MotionReport:
     overrun: int
     latency: Percentiles | None
     interval: Percentiles | None
+    lag: FeltLag
+    rights: LoopRights | None
     watched: Mapping[str, float] = field(default_factory=dict)
 
 

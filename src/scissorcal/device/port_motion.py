@@ -5,14 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import Motion, MotionReport, Percentiles, Samples
+from scissorcal.device.motion import Motion, MotionReport, Samples
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
+from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     Command,
     ConfigKey,
-    Histogram,
     LoopBlock,
     Mode,
     ModelTables,
@@ -27,7 +27,10 @@ FIRST_POSITION_TIMEOUT_S = 2.0
 
 
 class PortMotion(Motion):
-    """Controls a ServoProcess through its shared memory block; made by open_motion."""
+    """Controls a ServoProcess through its shared memory block; made by open_motion.
+
+    The heartbeat comes from a thread, as long as :meth:`step` is called: see Heartbeat.
+    """
 
     def __init__(
         self, link: PortLink, config: ServoConfig, tables: ModelTables | None, capacity: int
@@ -99,9 +102,9 @@ class PortMotion(Motion):
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Motors off; a thread sends the heartbeat, and samples of this time are dropped."""
+        """Motors off; the heartbeat goes on, and samples of this time are dropped."""
         self._go_idle()
-        with self._process.kept_alive():
+        with self._process.heartbeat.held():
             yield
         self._block.read()
         self._drain_at = 0.0
@@ -118,8 +121,10 @@ class PortMotion(Motion):
             stalls=line.stalls,
             unsent=line.unsent,
             overrun=line.lost_samples,
-            latency=_percentiles(block.latency),
-            interval=_percentiles(block.interval),
+            latency=Percentiles.counted(block.latency),
+            interval=Percentiles.counted(block.interval),
+            lag=FeltLag.of(block.lag, self.tick_s, self._process.round_trip_s),
+            rights=LoopRights(*block.rights),
             watched=block.watched,
         )
 
@@ -136,11 +141,11 @@ class PortMotion(Motion):
 
     def _pass_time(self) -> Samples:
         """Wait until 50 ms after the last call, or the end of the loop; empty the ring buffer."""
-        self._block.beat()
+        self._process.heartbeat.seen()
         self._drain_at = max(self._drain_at + DRAIN_S, time.monotonic())
-        while (left := self._drain_at - time.monotonic()) > 0 and self._process.alive:
-            time.sleep(min(left, 0.01))
-            self._block.beat()
+        left = self._drain_at - time.monotonic()
+        if left > 0 and self._process.alive:
+            time.sleep(left)  # in one piece: each time this process wakes may delay the loop
         return self._block.read()
 
     def _why_lost(self) -> DeviceError | None:
@@ -156,18 +161,9 @@ class PortMotion(Motion):
         self.engage(Mode.IDLE)
         until = time.monotonic() + IDLE_TIMEOUT_S
         while self.mode is not Mode.IDLE:
-            self._block.beat()
+            self._process.heartbeat.seen()
             if self.stop_reason is not StopReason.NONE:
                 raise self._stopped()
             if time.monotonic() > until:
                 raise DeviceError(f"{self._link.name} sends no frames: restart the device.")
             time.sleep(0.002)
-
-
-def _percentiles(histogram: Histogram) -> Percentiles:
-    return Percentiles(
-        histogram.quantile(0.5),
-        histogram.quantile(0.99),
-        histogram.quantile(0.999),
-        histogram.largest_us if histogram.total else float("nan"),
-    )

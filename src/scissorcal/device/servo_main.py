@@ -10,9 +10,8 @@ import os
 import signal
 import sys
 import threading
-from contextlib import suppress
 
-from scissorcal.kernel import LoopBlock, run_loop
+from scissorcal.kernel import LoopBlock, ask_for_short_slice, lock_memory, run_loop
 
 PRIORITY = 10
 """Under SCHED_FIFO, where that is allowed: above all that is not real-time, below drivers."""
@@ -23,12 +22,21 @@ def main(arguments: list[str]) -> int:
     line, memory = (int(argument) for argument in arguments)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent requests the stop
     block = LoopBlock.attach(memory)
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     threading.Thread(target=_stop_with_parent, args=(block,), daemon=True).start()
     gc.freeze()
+    block.rights = (_ask_for_priority(), lock_memory())  # whether granted is stated in each run
     run_loop(line, block)
     return 0
+
+
+def _ask_for_priority() -> bool:
+    """Ask for real-time priority, for a short time slice where it is refused; which it was."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except (OSError, AttributeError):
+        ask_for_short_slice()
+        return False
+    return True
 
 
 def _stop_with_parent(block: LoopBlock) -> None:

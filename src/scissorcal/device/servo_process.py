@@ -1,13 +1,12 @@
 """The servo loop in a separate process: started, monitored and ended."""
 
+import math
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
+from scissorcal.device.heartbeat import Heartbeat
 from scissorcal.device.link import PortLink
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Config, ConfigKey, LoopBlock, StopReason
@@ -16,7 +15,7 @@ START_TIMEOUT_S = 30.0
 STREAM_TIMEOUT_S = 2.0
 STOP_TIMEOUT_S = 2.0
 ASK_AGAIN_S = 0.2
-BEAT_S = 0.02
+ROUND_TRIPS = 8
 
 
 class ServoProcess:
@@ -24,7 +23,8 @@ class ServoProcess:
 
     The process owns the port from :meth:`start` to :meth:`close`. It runs in its own session, so
     Ctrl-C does not reach it. It stops when this process dies (the end of a pipe) or hangs (the
-    missing heartbeat).
+    missing heartbeat). ``round_trip_s`` is the shortest round trip of the line before the start,
+    NaN if none was answered.
     """
 
     def __init__(self, link: PortLink, block: LoopBlock) -> None:
@@ -32,6 +32,8 @@ class ServoProcess:
         self._block = block
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close()
         self._process: subprocess.Popen[bytes] | None = None
+        self.heartbeat = Heartbeat(block.beat)
+        self.round_trip_s = math.nan
 
     @property
     def pid(self) -> int | None:
@@ -50,6 +52,7 @@ class ServoProcess:
         """
         self._link.configure(ConfigKey.STREAM, 0.0)
         self._link.flush()
+        self.round_trip_s = _shortest_round_trip(self._link)
         line, memory = self._link.fileno(), self._block.fileno()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "scissorcal.device.servo_main", str(line), str(memory)],
@@ -60,10 +63,12 @@ class ServoProcess:
             start_new_session=True,
         )
         self._await_loop()
+        self.heartbeat.start()
         self._begin_streaming()
 
     def close(self) -> None:
         """Ask the loop to release the motors and end; kill it if it does not. Idempotent."""
+        self.heartbeat.close()
         process, self._process = self._process, None
         if process is not None:
             self._block.stop()
@@ -75,23 +80,6 @@ class ServoProcess:
             if process.stdin is not None:
                 process.stdin.close()
         self._errors.close()
-
-    @contextmanager
-    def kept_alive(self) -> Iterator[None]:
-        """Send the heartbeat from a thread while the caller is busy."""
-        over = threading.Event()
-
-        def beat() -> None:
-            while not over.wait(BEAT_S):
-                self._block.beat()
-
-        thread = threading.Thread(target=beat, name="servo-heartbeat", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            over.set()
-            thread.join()
 
     def why_dead(self) -> DeviceError:
         """The error where the process ended by itself: how, and its last words."""
@@ -115,7 +103,7 @@ class ServoProcess:
                     f"The servo process did not start within {START_TIMEOUT_S:g} s: close programs "
                     "that load the processor, and start again."
                 )
-            self._block.beat()
+            self.heartbeat.seen()
             time.sleep(0.002)
 
     def _begin_streaming(self) -> None:
@@ -132,5 +120,13 @@ class ServoProcess:
                 raise DeviceError(
                     f"{self._link.name} sends no state after STREAM = 1: restart the device."
                 )
-            self._block.beat()
+            self.heartbeat.seen()
             time.sleep(0.002)
+
+
+def _shortest_round_trip(link: PortLink) -> float:
+    """Shortest of some, in seconds: it has the least of the device's own waiting in it."""
+    trips: list[float] = []
+    while len(trips) < ROUND_TRIPS and not math.isnan(trip := link.round_trip()):
+        trips.append(trip)
+    return min(trips, default=math.nan)

@@ -7,7 +7,15 @@ from scissorcal.kernel.cut_fit import (
     cut_log_likelihood,
     cut_log_likelihoods,
 )
-from scissorcal.kernel.loop import Histogram, LoopBlock, LoopCounters, run_loop
+from scissorcal.kernel.lag import LagCounts
+from scissorcal.kernel.loop import (
+    Histogram,
+    LoopBlock,
+    LoopCounters,
+    ask_for_short_slice,
+    lock_memory,
+    run_loop,
+)
 from scissorcal.kernel.messages import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -64,6 +72,7 @@ __all__ = [
     "Histogram",
     "Identity",
     "Kernel",
+    "LagCounts",
     "LoopBlock",
     "LoopCounters",
     "Message",
@@ -80,6 +89,7 @@ __all__ = [
     "StopReason",
     "Table",
     "WatchConfig",
+    "ask_for_short_slice",
     "c_sources",
     "crc16",
     "cut_log_likelihood",
@@ -87,6 +97,7 @@ __all__ = [
     "decode",
     "encode",
     "encode_frame",
+    "lock_memory",
     "presliding_path",
     "run_loop",
     "walk_crack",

@@ -43,6 +43,19 @@ def run_loop(fd: int, block: "LoopBlock") -> StopReason:
     return StopReason(lib.sc_loop_run(fd, block.pointer))
 
 
+def lock_memory() -> bool:
+    """Keep this process's memory from being paged out; whether the system grants it."""
+    return bool(lib.sc_rights_lock_memory())
+
+
+def ask_for_short_slice() -> bool:
+    """Ask that this thread interrupts others when it wakes, without real-time priority.
+
+    Needs no right, and Linux 6.12 or newer; whether the call is known. It ends real-time priority.
+    """
+    return bool(lib.sc_rights_short_slice())
+
+
 @dataclass(frozen=True)
 class LoopCounters:
     """What happened on the line.
@@ -189,7 +202,7 @@ class LoopBlock(ServoView):
         for row, array in enumerate(arrays):
             at = start + row * capacity * 4
             self._memory[at : at + 4 * n] = array.tobytes()
-        block.reference_size = n
+        lib.sc_block_set_reference_size(block, n)
 
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
@@ -229,6 +242,15 @@ class LoopBlock(ServoView):
         place = ffi.from_buffer("sc_sample[]", samples, require_writable=True)
         count = lib.sc_block_read(self.pointer, self._cursor, place, len(samples), self._lost)
         return samples[:count]
+
+    @property
+    def rights(self) -> tuple[bool, bool]:
+        """Whether the loop has real-time priority, and whether its memory is locked."""
+        return bool(self.pointer.realtime), bool(self.pointer.memory_locked)
+
+    @rights.setter
+    def rights(self, granted: tuple[bool, bool]) -> None:
+        self.pointer.realtime, self.pointer.memory_locked = (int(each) for each in granted)
 
     @property
     def running(self) -> bool:
@@ -271,8 +293,10 @@ def _store_tables(block: Any, tables: ModelTables) -> None:
     for name in ("edge", "response", "friction_opening", "friction_closing", "friction_angle"):
         _store_table(getattr(block, name), getattr(tables, name))
     block.has_model = 1
-    if not lib.sc_block_model(block, ffi.new("sc_model *")):
+    model = ffi.new("sc_model *")
+    if not lib.sc_block_model(block, model):
         raise ValueError("The kernel refuses these tables: their numbers do not fit float32.")
+    block.model.release_falls = lib.sc_model_release_falls(model)
 
 
 def _store_table(store: Any, table: Table) -> None:

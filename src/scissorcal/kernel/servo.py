@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.stop_reason import StopReason
@@ -73,6 +74,7 @@ class ServoConfig:
     A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
     mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
     usable, nor are places that would need twice as fast a motion.
+    ``motor_sign = -1`` turns the motor's torque round on the wire, commanded and measured.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
     more stops. ``watch`` has the thresholds of the watches, by default none.
@@ -101,11 +103,14 @@ class ServoConfig:
     supervisor_ms: int = 200
     fault_clearings: int = 3
     tick_us: int = 1000
+    motor_sign: int = 1
     watch: WatchConfig = NO_WATCHES
 
     def __post_init__(self) -> None:
         for field in self._numbers():
             value = getattr(self, field.name)
+            if field.name == "motor_sign":
+                continue
             least = -WIDEST_OPENING if field.name in ("opening_low", "opening_high") else 0
             if not least <= value <= U32:  # NaN and infinity fail this too
                 raise ValueError(
@@ -114,6 +119,8 @@ class ServoConfig:
         for name in _ABOVE_ZERO:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0.")
+        if self.motor_sign not in (1, -1):
+            raise ValueError("motor_sign must be 1 or -1.")
         if not self.opening_low < self.opening_high:
             raise ValueError("opening_low must be below opening_high.")
 
@@ -205,6 +212,11 @@ class ServoView:
     def ledger(self) -> EnergyLedger:
         ledger = self._servo.ledger
         return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
+
+    @property
+    def lag(self) -> LagCounts:
+        """Lags so far, by the mode in force."""
+        return LagCounts.of(self._servo.lag)
 
     @property
     def watched(self) -> dict[str, float]:

@@ -6,7 +6,8 @@ from pathlib import Path
 def c_sources() -> Path:
     """Directory of the C core: ``sc_*.c`` and ``sc_*.h``.
 
-    All but ``sc_block`` and ``sc_loop``, which need POSIX, is portable C99 without allocation.
+    All but ``sc_block``, ``sc_loop`` and ``sc_rights``, which need POSIX, is portable C99 without
+    allocation.
 
     >>> sorted(path.name for path in c_sources().glob("*.h"))[:2]
     ['sc_block.h', 'sc_bytes.h']

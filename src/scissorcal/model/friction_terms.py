@@ -314,6 +314,12 @@ ADOPTED = Prior(
     "adopted",
 )
 """Prior of what an adopted term adds at :data:`REFERENCE`."""
+ZERO = Prior(
+    (0.0, 3e-3, "a force sensor that was tared some time ago is off by 0.05 N, at 60 mm"),
+    (0.0, 1.0, "a force sensor of 1 kN is off by 0.1 % of its range"),
+    "zero",
+)
+"""Prior of the drive that the sensors show at idle, where no idle second of a recording does."""
 REFERENCE = {"rotary": Motion(1.0, 1.0, 0.0, 0.1), "linear": Motion(0.1, 0.1, 0.0, 100.0)}
 """Motion at which the prior of an adopted term is stated: 1 rad, 1 rad/s and 0.1 N m, or 0.1 m,
 0.1 m/s and 100 N."""

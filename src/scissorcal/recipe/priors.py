@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from scissorcal.model.friction_terms import ADOPTED, PARAMETERS
+from scissorcal.model.friction_terms import ADOPTED, PARAMETERS, ZERO
 from scissorcal.model.terms import JointKind, Prior, Term
 from scissorcal.model.transforms import IDENTITY, LOG, LOGIT, Transform
 
@@ -83,10 +83,20 @@ class FrictionPriors(Section):
         prior: NormalPrior = getattr(self, adopted_key(kind))
         return prior.sd
 
+    def zero(self, kind: JointKind) -> float:
+        """Standard deviation of the drive's zero where no idle second shows it."""
+        prior: NormalPrior = getattr(self, zero_key(kind))
+        return prior.sd
+
 
 def adopted_key(kind: JointKind) -> str:
     """The recipe's name of the prior that adopted terms share."""
     return "adopted_Nm" if kind == "rotary" else "adopted_N"
+
+
+def zero_key(kind: JointKind) -> str:
+    """The recipe's name of the prior of the drive's zero."""
+    return "zero_Nm" if kind == "rotary" else "zero_N"
 
 
 def _section(name: str, kind: JointKind) -> type[FrictionPriors]:
@@ -96,6 +106,8 @@ def _section(name: str, kind: JointKind) -> type[FrictionPriors]:
         if term.prior is not None:
             fields[term.prior_key(kind)] = _field(term.transform, term.prior, kind, term.meaning)
     fields[adopted_key(kind)] = _field(IDENTITY, ADOPTED, kind, "effort of an adopted term")
+    zero = "zero of the drive without an idle second"
+    fields[zero_key(kind)] = _field(IDENTITY, ZERO, kind, zero)
     made = create_model(name, __base__=FrictionPriors, **fields)
     made.__doc__ = f"Priors of a friction fit to a {kind} joint."
     return made

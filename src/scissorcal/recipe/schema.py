@@ -72,19 +72,55 @@ class Edge(Section):
 
 
 class Control(Section):
-    """Gains by which a motor-driven capture tracks its trajectory."""
+    """Gains by which a motor-driven capture tracks its trajectory.
 
-    opening_kp_Nm_per_rad: Positive = 6.0
-    opening_kd_Nm_s_per_rad: NonNegative = 0.06
-    opening_ki_Nm_per_rad_s: NonNegative = 20.0
-    advance_kp_N_per_m: Positive = 3000.0
-    advance_kd_N_s_per_m: NonNegative = 40.0
-    advance_ki_N_per_m_s: NonNegative = 10000.0
+    "auto" takes them from the inertia, the friction and the delay that the probe of the rig found.
+    Numbers are used as they are, and refused where the loop would be unstable.
+    """
+
+    opening_kp_Nm_per_rad: Positive | Literal["auto"] = "auto"
+    opening_kd_Nm_s_per_rad: NonNegative | Literal["auto"] = "auto"
+    opening_ki_Nm_per_rad_s: NonNegative | Literal["auto"] = "auto"
+    advance_kp_N_per_m: Positive | Literal["auto"] = "auto"
+    advance_kd_N_s_per_m: NonNegative | Literal["auto"] = "auto"
+    advance_ki_N_per_m_s: NonNegative | Literal["auto"] = "auto"
+
+
+class Line(Section):
+    """The serial line to the device, and how long it waits for this computer.
+
+    ``baud`` is the rate that the device is built for (USB devices ignore it). ``brake_after_ms``:
+    without a command for so long the device brakes and latches a fault. Blades that nobody holds
+    gain torque x time / inertia meanwhile, so the shortest that this computer keeps is the best:
+    10 ms where the loop has real-time priority; elsewhere 'scissorcal device doctor' recommends
+    one from what it measures (a computer that is late by 20 ms when it is busy needs 25 to 50).
+    """
+
+    baud: Annotated[int, Field(ge=9600, le=12_000_000)] = 921600
+    brake_after_ms: Annotated[float, Field(ge=1, le=1000, allow_inf_nan=False)] = 10.0
+
+
+class Probe(Section):
+    """How far the probe may go before the first motor run, and how long it counts.
+
+    The blades are pushed by growing torques up to ``largest_torque_Nm`` until they move, never
+    farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. ``creep`` lets it
+    move slowly to both stops, which shows whether the encoder counts the whole range. A probe of
+    the same rig counts for ``max_age_h``.
+    """
+
+    largest_torque_Nm: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.05
+    largest_angle_deg: Annotated[float, Field(gt=0, le=30, allow_inf_nan=False)] = 2.0
+    largest_rate_rad_per_s: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 1.5
+    creep: bool = False
+    max_age_h: Annotated[float, Field(ge=0, le=168, allow_inf_nan=False)] = 4.0
 
 
 class Rig(Section):
     """The device: which blades move, the handle, and the blade.
 
+    ``motor_sign = -1`` turns the motor's torque round, commanded and measured, for a motor whose
+    wires are swapped.
     ``opening_zero_sd_deg`` says how well the zero of the opening (where the centrelines of the
     blades meet) is known, as by a homing switch; half a millimetre at each tip where not given.
     """
@@ -95,6 +131,9 @@ class Rig(Section):
     opening_zero_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] | None = None
     edge: Edge
     control: Control = Control()
+    line: Line = Line()
+    motor_sign: Literal[1, -1] = 1
+    probe: Probe = Probe()
 
     @property
     def moving_blades(self) -> int:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scissorcal.recording.recovering import Recovered, recover
     from scissorcal.recording.scan import Attachment
     from scissorcal.recording.schema import recording_schema
-    from scissorcal.recording.strokes import StrokeLabels, label_strokes
+    from scissorcal.recording.strokes import StrokeLabels, TurningPoints, label_strokes
     from scissorcal.recording.summarising import RecordingSummary, summary
     from scissorcal.recording.writer import RecordingWriter, write_recording
 
@@ -37,6 +37,7 @@ __all__ = [
     "Stroke",
     "StrokeKind",
     "StrokeLabels",
+    "TurningPoints",
     "content_hash",
     "export_table",
     "import_table",
@@ -60,7 +61,7 @@ _HOMES = {
     "recovering": ("Recovered", "recover"),
     "scan": ("Attachment",),
     "schema": ("recording_schema",),
-    "strokes": ("StrokeLabels", "label_strokes"),
+    "strokes": ("StrokeLabels", "TurningPoints", "label_strokes"),
     "summarising": ("RecordingSummary", "summary"),
     "writer": ("RecordingWriter", "write_recording"),
 }

@@ -54,7 +54,9 @@ def label_strokes(
 
     stroke_of_sample = np.full(position.shape, -1, dtype=np.int32)
     strokes: list[Stroke] = []
-    turns = _turning_points(position, min_travel)
+    finder = TurningPoints(min_travel)
+    finder.feed(position)
+    turns = finder.so_far
     for start, end in itertools.pairwise(turns):
         first, last = _without_rest(position, seconds, start, end, REST_SHARE * min_travel)
         stroke_of_sample[first : last + 1] = len(strokes)
@@ -64,30 +66,79 @@ def label_strokes(
     return StrokeLabels(tuple(strokes), stroke_of_sample)
 
 
-def _turning_points(position: NDArray[np.float64], min_travel: float) -> list[int]:
-    """Return the indices of the first sample, every turning point, and the last extreme."""
-    values = position.tolist()
-    if not values:
-        return []
-    turns: list[int] = []
-    low = high = extreme = 0
-    direction = 0
-    for index, value in enumerate(values):
-        if direction == 0:
-            low = index if value < values[low] else low
-            high = index if value > values[high] else high
-            if values[high] - values[low] >= min_travel:
-                direction = 1 if high > low else -1
-                turns.append(min(low, high))
-                extreme = index
-        elif (value - values[extreme]) * direction > 0:
-            extreme = index
-        elif (values[extreme] - value) * direction >= min_travel:
-            turns.append(extreme)
-            direction, extreme = -direction, index
-    if direction != 0:
-        turns.append(extreme)
-    return turns
+class TurningPoints:
+    """Finds the turning points of a motion that arrives in pieces.
+
+    A turning point is an extreme from which the motion returns by at least ``min_travel``. The
+    pieces' sizes make no difference, the time for a piece does not depend on what came before,
+    and memory grows by a number for each turning point, not for each sample.
+
+    >>> points = TurningPoints(0.1)
+    >>> points.feed([1.0, 0.5, 0.2, 0.21])
+    >>> points.feed([0.9, 1.0])
+    >>> points.so_far, points.closings, points.openings
+    ([0, 2, 5], 1, 1)
+    """
+
+    def __init__(self, min_travel: float) -> None:
+        self._min_travel = min_travel
+        self._count = 0
+        self._turns: list[int] = []
+        self._direction = 0
+        self._low = self._high = self._extreme = (0, 0.0)
+
+    @property
+    def so_far(self) -> list[int]:
+        """Indices of the first extreme, every turning point, and the last extreme so far."""
+        return [*self._turns, self._extreme[0]] if self._direction else []
+
+    @property
+    def closings(self) -> int:
+        """Legs of a falling opening so far: as many closing strokes has `label_strokes`."""
+        return (len(self._turns) + (self._direction < 0)) // 2
+
+    @property
+    def openings(self) -> int:
+        """Legs of a growing opening so far."""
+        return (len(self._turns) + (self._direction > 0)) // 2
+
+    def feed(self, values: ArrayLike) -> None:
+        """Take the next values (n,), in order; all finite."""
+        numbers = np.asarray(values, dtype=np.float64).tolist()
+        if not self._count and numbers:
+            self._low = self._high = (0, numbers[0])
+        first = self._count
+        self._count += len(numbers)
+        if not self._direction:
+            first = self._find_direction(numbers, first)
+        self._follow(numbers[first - self._count + len(numbers) :], first)
+
+    def _find_direction(self, values: list[float], first: int) -> int:
+        """Take values until they span ``min_travel``; return the index of the next one."""
+        low, high = self._low, self._high
+        for index, value in enumerate(values, first):
+            low = (index, value) if value < low[1] else low
+            high = (index, value) if value > high[1] else high
+            if high[1] - low[1] >= self._min_travel:
+                self._direction = 1 if high[0] > low[0] else -1
+                self._turns.append(min(low[0], high[0]))
+                self._extreme = (index, value)
+                first = index + 1
+                break
+        else:
+            first += len(values)
+        self._low, self._high = low, high
+        return first
+
+    def _follow(self, values: list[float], first: int) -> None:
+        direction, (extreme, reached) = self._direction, self._extreme
+        for index, value in enumerate(values, first):
+            if (value - reached) * direction > 0:
+                extreme, reached = index, value
+            elif (reached - value) * direction >= self._min_travel:
+                self._turns.append(extreme)
+                direction, extreme, reached = -direction, index, value
+        self._direction, self._extreme = direction, (extreme, reached)
 
 
 def _without_rest(

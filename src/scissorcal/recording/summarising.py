@@ -74,7 +74,7 @@ def summary(recording: Recording) -> RecordingSummary:
         duration_s=recording.duration_s,
         rate_Hz=1e6 / step_us if step_us > 0 else 0.0,
         gaps=find_gaps(samples),
-        strokes=tuple(_stroke(recording, stroke) for stroke in recording.strokes),
+        strokes=_strokes(recording),
         ranges=tuple(_range(recording, channel) for channel in MEASURED),
         notes=recording.notes,
     )
@@ -121,10 +121,22 @@ def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
     )
 
 
-def _stroke(recording: Recording, stroke: Stroke) -> StrokeSummary:
-    opening = recording.samples["opening"][recording.samples["stroke"] == stroke.index]
-    travel = float(opening.max() - opening.min()) if len(opening) else 0.0
-    return StrokeSummary(stroke, len(opening), travel)
+def _strokes(recording: Recording) -> tuple[StrokeSummary, ...]:
+    """Samples and travel of each stroke, in one pass over the samples, sorted by stroke."""
+    labels = recording.samples["stroke"]
+    order = np.argsort(labels, kind="stable")
+    opening, labels = recording.samples["opening"][order], labels[order]
+    numbers = [stroke.index for stroke in recording.strokes]
+    first = np.searchsorted(labels, numbers, side="left")
+    after = np.searchsorted(labels, numbers, side="right")
+    return tuple(
+        StrokeSummary(stroke, int(end - start), _travel(opening[start:end]))
+        for stroke, start, end in zip(recording.strokes, first, after, strict=True)
+    )
+
+
+def _travel(opening: NDArray[np.float64]) -> float:
+    return float(opening.max() - opening.min()) if len(opening) else 0.0
 
 
 def _range(recording: Recording, channel: str) -> ChannelRange:

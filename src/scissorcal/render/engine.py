@@ -1,30 +1,28 @@
 """Render a package on a rig within limits, record it, and judge it."""
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scissorcal.device.capture import identity_facts
+from scissorcal.device.capture import rig_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, Samples
+from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
-from scissorcal.kernel import ConfigKey, Identity, SampleFlag, ServoConfig
+from scissorcal.kernel import ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
-from scissorcal.recording import Joint, RecordingWriter, label_strokes
-from scissorcal.render.result import AppliedLimits, RenderResult, latency_of, render_verdicts
-
-Progress = Callable[[float, str], None]
+from scissorcal.recording import Joint, RecordingWriter
+from scissorcal.recording.probe import ProbeResult
+from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
 
 SUPERVISOR_S = 0.2
-"""Time without heartbeat after which only damping is left; after five times as much it stops."""
+"""Time without heartbeat after which only damping is left; after five times as much it stops.
+The heartbeat ends where the supervisor takes no block for a second: see Heartbeat."""
 
 RATE_CUTOFF_HZ = 100.0
 FALLBACK_DAMPING = 0.02
@@ -33,9 +31,6 @@ FAULT_CLEARINGS_PER_S = 0.2
 """Faults that are cleared, each with a new ramp from zero; one more stops the loop."""
 
 TRAVEL_SHARE = 0.2
-THINNED_S = 0.01
-LOOK_EVERY_S = 0.25
-AT_REST_S = 0.5
 LIMITED_WARNING = 0.01
 
 REQUEST = (
@@ -58,6 +53,7 @@ def render(
     *,
     seconds: float = 30.0,
     limits: Limits | None = None,
+    motor_sign: int = 1,
     strokes: VirtualStrokes | None = None,
     writer: RecordingWriter | None = None,
     progress: Progress | None = None,
@@ -66,10 +62,11 @@ def render(
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
     The loop runs in a separate process, paced by the device's frames, or frame by frame in
-    virtual time on a LockstepLink. It keeps to the tightest of three limits: ``limits`` (a
-    recipe's), the package's own, the device's. Force is ramped up from zero, also after a fault.
-    On a simulator the virtual hand makes ``strokes`` (four, unless given), and the rendering ends
-    with them; on a real rig ``confirm`` asks a person to clear the blades before any force.
+    virtual time on a LockstepLink; ``motor_sign`` is the recipe's. It keeps to the tightest of
+    three limits: ``limits`` (a recipe's), the package's own, the device's. Force is ramped up from
+    zero, also after a fault. On a simulator the virtual hand makes ``strokes`` (four, unless
+    given), and the rendering ends with them; on a real rig ``confirm`` asks a person to clear the
+    blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
@@ -80,11 +77,11 @@ def render(
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
     warnings = package.warnings + _mismatches(package, identity)
-    config = _servo_config(applied, identity, seconds)
+    config = replace(_servo_config(applied, identity, seconds), motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
             writer.note(sentence)
-    watch = _Watch(package, writer, progress or _silent, seconds)
+    watch = Watch(_travel(package), writer, progress or _silent, seconds)
     with open_motion(link, config, package.tables) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
         motion.fresh_sheet(0.0)
@@ -96,7 +93,7 @@ def render(
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
     report = motion.report()
-    latency = latency_of(np.concatenate(watch.latency)) if watch.latency else None
+    latency = watch.latency
     limited = watch.limited / max(1, watch.frames)
     result = RenderResult(
         seconds=watch.frames * motion.tick_s,
@@ -104,6 +101,8 @@ def render(
         strokes=watch.strokes,
         latency=latency,
         interval=report.interval,
+        lag=report.lag,
+        rights=report.rights,
         misses=report.counters.misses,
         garbled=report.garbled,
         stalls=report.stalls,
@@ -125,91 +124,31 @@ def render(
 
 
 def open_writer(
-    path: Path, link: Link, package: ModelPackage, recipe_toml: str = ""
+    path: Path,
+    link: Link,
+    package: ModelPackage,
+    recipe_toml: str = "",
+    *,
+    motor_sign: int = 1,
+    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a rendering; the package's manifest travels in it.
 
-    ``recipe_toml`` is the recipe's text as it stands in its file. Raises as RecordingWriter does.
+    ``recipe_toml`` is the recipe's text as it stands in its file, ``probe`` what a probe of this
+    rig found. Raises as RecordingWriter does.
     """
     writer = RecordingWriter(
         path,
         "render",
         Joint("rotary"),
         recipe_toml,
-        identity_facts(link.identity),
+        rig_facts(link.identity, motor_sign, probe),
         link.identity.handle_radius,
         min_travel=_travel(package),
     )
     manifest = package.manifest.model_dump_json(indent=2).encode("utf-8")
     writer.attach("package-manifest.json", manifest, "application/json")
     return writer
-
-
-class _Watch:
-    """Records what is rendered, and decides when it is finished."""
-
-    def __init__(
-        self, package: ModelPackage, writer: RecordingWriter | None, tell: Progress, seconds: float
-    ) -> None:
-        self.wanted: int | None = None
-        self.frames = 0
-        self.limited = 0
-        self.strokes = 0
-        self.largest_torque = 0.0
-        self.latency: list[NDArray[np.uint32]] = []
-        self._travel = _travel(package)
-        self._writer = writer
-        self._tell = tell
-        self._seconds = seconds
-        self._time: list[NDArray[np.float64]] = []
-        self._opening: list[NDArray[np.float64]] = []
-        self._looked_at = 0.0
-
-    def take(self, samples: Samples) -> bool:
-        """Take a block of the rendering; True once all strokes are done."""
-        self.record(samples)
-        if len(samples) == 0:
-            return False
-        self.frames += len(samples)
-        met = int(SampleFlag.TORQUE_LIMITED | SampleFlag.FORCE_LIMITED)
-        self.limited += int(np.count_nonzero(samples["flags"] & met))
-        self.largest_torque = max(
-            self.largest_torque, float(np.max(np.abs(samples["torque_command"])))
-        )
-        self.latency.append(samples["latency_ns"].copy())
-        time_s = samples["device_time_us"] * 1e-6
-        every = max(1, round(THINNED_S * len(samples) / max(float(np.ptp(time_s)), THINNED_S)))
-        self._time.append(time_s[::every])
-        self._opening.append(samples["opening"][::every].copy())
-        if time_s[-1] - self._looked_at < LOOK_EVERY_S:
-            return False
-        self._looked_at = float(time_s[-1])
-        return self._look()
-
-    def record(self, samples: Samples) -> None:
-        """Record a block of any mode."""
-        if self._writer is None:
-            return
-        if len(samples):
-            self._writer.append(samples)
-        else:
-            self._writer.poll(time.time_ns())
-
-    def _look(self) -> bool:
-        """Count the strokes so far; True once the last one is made and the blades rest."""
-        at, opening = np.concatenate(self._time), np.concatenate(self._opening)
-        found = label_strokes(opening, at, self._travel).strokes
-        self.strokes = sum(stroke.kind == "closing" for stroke in found)
-        passed = float(at[-1] - at[0]) / self._seconds
-        if self.wanted is None:
-            self._tell(min(passed, 1.0), f"rendering, {self.strokes} strokes so far")
-            return False
-        share = max(passed, self.strokes / max(1, self.wanted))
-        self._tell(min(share, 1.0), f"rendering, stroke {self.strokes} of {self.wanted}")
-        recent = opening[at > at[-1] - AT_REST_S]
-        resting = float(np.ptp(recent)) < 0.1 * self._travel
-        opened = opening[-1] > opening.min() + 0.5 * float(np.ptp(opening))
-        return self.strokes >= self.wanted and resting and bool(opened)
 
 
 def _refuse_impossible(identity: Identity, seconds: float, confirm: Confirm | None) -> None:
@@ -318,6 +257,9 @@ def _limited_warning(share: float, applied: AppliedLimits) -> tuple[str, ...]:
 def _note(writer: RecordingWriter, result: RenderResult, late: tuple[str, ...]) -> None:
     """Note how it went, with the warnings that were not known (and noted) at the start."""
     writer.note(f"Rendered package {result.package_hash} for {result.seconds:.1f} s.")
+    writer.note(result.lag.sentence)
+    if result.rights:
+        writer.note(result.rights.sentence)
     for sentence in late:
         writer.note(sentence)
     for count, words in (

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scissorcal.device.motion import MotionReport, Percentiles
+from scissorcal.device.motion import MotionReport
+from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.kernel import EnergyLedger
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
@@ -37,7 +38,8 @@ class RenderResult:
     """Figures of a rendering. Counts are frames, ``seconds`` the device's time spent rendering.
 
     ``latency`` (us) runs from a frame's arrival to the command's departure, ``interval`` (us)
-    between frames by the host's clock; both None in virtual time.
+    between frames by the host's clock; both None in virtual time. ``lag`` is what the hand feels
+    of all delays, ``rights`` what the system granted the loop (None in virtual time).
     ``misses`` are lost frames, ``garbled`` garbled ones, ``stalls`` pauses
     of more than five ticks, ``unsent`` commands that the line did not accept, ``overrun`` samples
     that this process read too late. ``limited_share`` is the share of rendering frames in which
@@ -51,6 +53,8 @@ class RenderResult:
     strokes: int
     latency: Percentiles | None
     interval: Percentiles | None
+    lag: FeltLag
+    rights: LoopRights | None
     misses: int
     garbled: int
     stalls: int

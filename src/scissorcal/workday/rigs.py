@@ -8,23 +8,32 @@ from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scissorcal.device.link import Link, PortLink
+    from scissorcal.recipe.schema import Line, Recipe
 
 SIM = "sim"
 
 
 @contextmanager
 def open_rig(
-    device: str, specimen: str | None, seed: int = 0, *, run: int = 0, realtime: bool = False
+    device: str,
+    specimen: str | None,
+    seed: int = 0,
+    *,
+    run: int = 0,
+    realtime: bool = False,
+    line: "Line | None" = None,
 ) -> "Iterator[Link]":
     """Open a link to ``device``; "sim" starts a virtual rig with ``specimen`` between its blades.
 
     The virtual rig runs in this process, in virtual time: as fast as the computer can, and never
     late. ``run`` numbers the runs of one ``seed``, so that each has another noise. With
-    ``realtime`` it is as `open_port`. Raises InputError where there is no specimen to simulate,
-    DeviceError where the rig cannot be reached.
+    ``realtime`` it is as `open_port`. ``line`` has the baud rate, and how long the device waits for
+    commands until it brakes; without it the rate is the default and the device keeps its own time.
+    Raises InputError where there is no specimen to simulate, DeviceError where the rig cannot be
+    reached.
     """
     if device != SIM or realtime:
-        with open_port(device, specimen, seed) as port:
+        with open_port(device, specimen, seed, line=line) as port:
             yield port
         return
     import numpy as np
@@ -32,24 +41,29 @@ def open_rig(
     from scissorcal.device.lockstep import LockstepLink
 
     with LockstepLink(_named(specimen), np.random.default_rng((seed, run))) as link:
+        set_line(link, line)
         yield link
 
 
 @contextmanager
-def open_port(device: str, specimen: str | None, seed: int = 0) -> "Iterator[PortLink]":
+def open_port(
+    device: str, specimen: str | None, seed: int = 0, *, line: "Line | None" = None
+) -> "Iterator[PortLink]":
     """Open the port ``device``; "sim" serves a virtual rig on a pseudo-terminal, in real time.
 
     It runs in a separate process, and ends with the block. Raises as `open_rig` does.
     """
-    from scissorcal.device.link import open_link
+    from scissorcal.device.link import DEFAULT_BAUD, open_link
 
     if device != SIM:
-        with open_link(device) as link:
+        with open_link(device, line.baud if line else DEFAULT_BAUD) as link:
+            set_line(link, line)
             yield link
         return
     from scissorcal.device.sim.process import SimProcess
 
     with SimProcess(_named(specimen), seed) as sim, open_link(sim.port) as link:
+        set_line(link, line)
         yield link
 
 
@@ -60,3 +74,17 @@ def _named(specimen: str | None) -> str:
             'specimen = "office-paper" at its top, or name a port with --device.'
         )
     return specimen
+
+
+def set_line(link: "Link", line: "Line | None") -> None:
+    """Tell the device how long it waits for commands until it brakes; nothing without a line."""
+    from scissorcal.kernel import ConfigKey
+
+    if line is not None:
+        link.configure(ConfigKey.BRAKE_AFTER_MS, line.brake_after_ms)
+
+
+def line_of(recipe: "Recipe", baud: int | None) -> "Line":
+    """The recipe's line, at another baud rate where one is given."""
+    line = recipe.rig.line
+    return line if baud is None else line.model_copy(update={"baud": baud})

@@ -48,6 +48,11 @@ class Workspace:
         return self.captures_dir / "excluded.json"
 
     @property
+    def probe_path(self) -> Path:
+        """What the last probe of a rig found."""
+        return self.root / "device-probe.json"
+
+    @property
     def report_html(self) -> Path:
         return self.root / "report" / "report.html"
 

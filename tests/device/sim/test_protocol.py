@@ -181,6 +181,22 @@ def test_silence_brakes_and_latches_until_the_fault_is_cleared(host: Host) -> No
     assert state.flags == StateFlag.MOTOR_ENABLED
 
 
+def test_a_host_that_died_is_streamed_to_for_five_seconds(host: Host) -> None:
+    host.set(ConfigKey.STREAM, 1.0)
+    heard = 0
+    for _ in range(7000):
+        host.device.tick()
+        heard += len(host.hear())
+    assert 4990 <= heard <= 5000
+    assert isinstance(host.say(Hello(5))[0], Identity)
+    host.set(ConfigKey.STREAM, 1.0)
+    for tick in range(12_000):
+        if tick % 4000 == 0:
+            host.say(Hello(6))
+        host.device.tick()
+        assert len(host.hear()) == 1
+
+
 def test_without_enable_silence_is_no_fault(host: Host) -> None:
     host.tick(Command(ENABLE, 0, 0.01, 0.0))
     host.tick(Command(0, 0, 0.0, 0.0))
@@ -221,7 +237,9 @@ def test_dropped_and_garbled_frames_have_their_stated_share() -> None:
         pass
     count = 10_000
     heard = 0
-    for _ in range(count):
+    for tick in range(count):
+        if tick % 500 == 0:  # a silent host is not streamed to for long
+            host.device.receive(encode(Command(0, 0, 0.0, 0.0)))
         host.device.tick()
         heard += len(host.hear())
     # a garbled frame is lost too; one that loses its delimiter takes the next one with it

@@ -40,6 +40,7 @@ from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop, infer
@@ -83,7 +84,8 @@ class _Data:
         geometry = belief_geometry(recipe, edge or edge_of(recipe))
         known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
         sensors = inspect_sensors(recordings, "fit.cut")
-        motions = path_motion(recordings, known.inertia, sensors.usable)
+        cleaned, known = _cleaned(recordings, recipe, friction, known)
+        motions = path_motion(cleaned, known.inertia, sensors.usable)
         return cls(recordings, recipe, friction, geometry, known, sensors, motions)
 
     @property
@@ -161,6 +163,23 @@ def cut_experiment(
     return make_experiment(
         scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.accepted_line
     )
+
+
+def _cleaned(
+    recordings: tuple[Recording, ...], recipe: Recipe, friction: FitResult, known: KnownFriction
+) -> tuple[tuple[Recording, ...], KnownFriction]:
+    """The recordings without their sensors' zeros, if friction was fitted without them.
+
+    Recordings of a study of simulated data have none.
+    """
+    before = DriveZero.from_dict(friction.diagnostics)
+    if before is None:
+        return recordings, known
+    kind = recordings[0].joint.kind
+    unmeasured_sd = recipe.fit.friction.priors.of(kind).zero(kind)
+    cleaned, own = without_zeros(recordings, unmeasured_sd, before)
+    simulated = known.prior is not None
+    return (recordings if simulated else cleaned), known.with_zero(own, before)
 
 
 def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:

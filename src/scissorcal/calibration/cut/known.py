@@ -1,6 +1,6 @@
 """What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from scissorcal.calibration.cut.path import (
 )
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.calibration.signals.zeros import DriveZero
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.recipe.priors import CutPriors
@@ -70,6 +71,21 @@ class KnownFriction:
             closing_sd=closing,
             opening_sd=opening,
             stroke_sd=max(floor, stroke),
+        )
+
+    def with_zero(self, own: DriveZero | None, before: DriveZero | None) -> "KnownFriction":
+        """Friction for a cut with a zero of its own: errors of both zeros are in its offsets.
+
+        ``before`` is the zero of the empty sweeps; levels and offset of that fit hold together,
+        whatever is left of it, but not with another zero.
+        """
+        if own is None or before is None:
+            return self
+        rest = float(np.hypot(own.sd, before.sd))
+        return replace(
+            self,
+            closing_sd=float(np.hypot(self.closing_sd, rest)),
+            opening_sd=float(np.hypot(self.opening_sd, rest)),
         )
 
     def material(self, motion: PathMotion) -> Material:

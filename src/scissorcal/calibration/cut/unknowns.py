@@ -9,6 +9,7 @@ from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
+from scissorcal.calibration.signals.zeros import DriveZero
 from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at
 from scissorcal.recipe.schema import Recipe
@@ -158,6 +159,13 @@ def _torque_zero(
     """The torque sensor's zero: it matters where friction with unequal levels is rendered."""
     if not recipe.scene.render_friction:
         return 0.0, "friction, which contains the torque's zero, is not rendered.", ""
+    zero = DriveZero.from_dict(friction.diagnostics)
+    if zero is not None and zero.measured:
+        said = (
+            f"zeros were measured at idle ({zero.drive:.2g} N m at the joint) and subtracted; what "
+            f"is left of them (sd {zero.sd:.1g} N m) is in the intervals."
+        )
+        return SURE * zero.sd, said, ""
     levels = [p.mean for p in friction.parameters if p.name in ("coulomb_pos", "coulomb_neg")]
     if len(levels) < 2:
         return 0.0, "the friction fit has an offset parameter, which is not rendered.", ""

@@ -45,13 +45,17 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
 
 
 def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
-    """Judge whether the search moved every parameter from where it began."""
+    """Judge whether the search moved every parameter from where it began.
+
+    What is left of the sensors' zeros is known from idle seconds: data in motion need not move it.
+    """
     layout, starts = experiment.layout, experiment.candidate(experiment.observed).starts
     apart = np.abs(starts - point) / layout.sd
-    stuck = [
-        name for name, far in zip(layout.names, apart.min(axis=0), strict=True) if far < UNMOVED
-    ]
-    value = float(apart.min())
+    judged = [not parameter.believed for parameter in layout.parameters]
+    names = [name for name, own in zip(layout.names, judged, strict=True) if own]
+    least = apart.min(axis=0)[judged]
+    stuck = [name for name, far in zip(names, least, strict=True) if far < UNMOVED]
+    value = float(least.min())
     bad = (
         f"The search did not move {', '.join(stuck)}, so the data hold no information on it: "
         "record motion that depends on it, or choose a law without it."
@@ -126,7 +130,8 @@ def _freed(experiment: FrictionExperiment, values: dict[str, float], share: floa
     if side_of("viscous_pos", values) is None:
         sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
         offered = [f"viscous{side}" for side in sides]
-    names = [*(name for name in layout.names if name != "noise"), *offered]
+    fixed = ("noise", *(one.name for one in layout.parameters if one.believed))
+    names = [*(name for name in layout.names if name not in fixed), *offered]
     columns = np.stack([_slope(experiment, values, name) for name in names], axis=1)
     residuals = experiment.observed - experiment.mean_at(_arrays(values))
     size = np.sqrt(np.mean(columns**2, axis=0))

@@ -38,6 +38,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
+from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, Stop, infer, tails_of
@@ -88,11 +89,12 @@ def fit_friction(
     tell = progress or (lambda done, sentence: None)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
-    again = partial(weigh, recordings, settings.cutoff_Hz, sensors.usable)
+    cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
+    again = partial(weigh, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
     _refuse(recordings, settings, every, windows, sensors)
-    every_law, cogging = _laws(windows, settings, joint, prior)
+    every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     compared, chosen = _compare(laws, stop, tell)
     law = next(design for design in laws if design.name == chosen.candidate.name)
@@ -123,6 +125,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
+            *zero_verdicts("fit.friction", zero, recordings, _rms(law.observed)),
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(
@@ -133,7 +136,10 @@ def fit_friction(
             usage.sentence,
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
-        extra_diagnostics=_diagnostics(law, chosen, between),
+        extra_diagnostics={
+            **_diagnostics(law, chosen, between),
+            **(zero.as_dict() if zero else {}),
+        },
     )
 
 
@@ -146,14 +152,42 @@ def friction_experiment(
     ``fit.structure``.
     """
     joint = recordings[0].joint
-    every = weigh(recordings, settings.cutoff_Hz, inspect_sensors(recordings).usable)
+    cleaned, zero = _cleaned(recordings, settings, simulated=False)
+    every = weigh(cleaned, settings.cutoff_Hz, inspect_sensors(recordings).usable)
     windows = every.where(every.bins.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
     strokes = _strokes(windows.bins)
-    found = design(windows, strokes, law, symmetric, joint, settings.priors, adopt, cogging)
+    found = design(
+        windows,
+        strokes,
+        law,
+        symmetric,
+        joint,
+        settings.priors,
+        adopt,
+        cogging,
+        zero_sd=zero.sd if zero and _has_offset(fit) else None,
+    )
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+
+
+def _cleaned(
+    recordings: tuple[Recording, ...], settings: FitFriction, *, simulated: bool
+) -> tuple[tuple[Recording, ...], DriveZero | None]:
+    """The recordings without the zeros of their sensors; those of a study have none."""
+    kind = recordings[0].joint.kind if recordings else "rotary"
+    cleaned, zero = without_zeros(recordings, settings.priors.of(kind).zero(kind))
+    return (recordings if simulated else cleaned), zero
+
+
+def _has_offset(fit: FitResult) -> bool:
+    return any(parameter.name == "offset" for parameter in fit.parameters)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _compare(
@@ -361,14 +395,18 @@ def _strokes(bins: Bins) -> NDArray[np.int64]:
 
 
 def _laws(
-    windows: Windows, settings: FitFriction, joint: Joint, prior: StatedPrior | None
+    windows: Windows,
+    settings: FitFriction,
+    joint: Joint,
+    prior: StatedPrior | None,
+    zero: DriveZero | None,
 ) -> tuple[list[FrictionExperiment], Cogging]:
     """The candidate laws, simplest first, over columns that they share, and the cogging found.
 
-    Laws of the load only where one was measured; each symmetric or not. An asymmetric law has no
-    offset: unequal Coulomb levels contain it. Where both explain the data alike, a linear joint
-    gets the offset, and scissors the unequal levels: those are felt through the handles, and an
-    offset of a sensor is not.
+    Laws of the load only where one was measured; each symmetric or not. The offset of an asymmetric
+    law is what is left of the sensors' zeros: unequal Coulomb levels contain any other. Where both
+    explain the data alike, a linear joint gets the offset, and scissors the unequal levels: those
+    are felt through the handles, and an offset of a sensor is not.
     """
     names = [law for law in CANDIDATES if windows.bears_load or not needs_load(law)]
     names = names if settings.rung == "auto" else [settings.rung]
@@ -378,7 +416,8 @@ def _laws(
 
     def one(law: str, symmetric: bool, periods: float = 0.0) -> FrictionExperiment:
         priors, adopt = settings.priors, settings.adopt
-        return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior)
+        sd = zero.sd if zero else None
+        return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior, sd)
 
     plain = one(names[0], False)
     cogging = NO_COGGING if joint.kind == "linear" else find_cogging(_clear_of_turns(plain).moments)

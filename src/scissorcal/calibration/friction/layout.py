@@ -17,11 +17,13 @@ class Drive:
 
     ``cogging`` adds the two parameters of a torque that repeats over the opening. ``held_tick_s``
     is the sampling interval where the drive is held by commands, so that it is measured late; None
-    where it is not.
+    where it is not. ``zero_sd`` is how well the sensors' zeros are known that were subtracted, None
+    where nothing shows them.
     """
 
     cogging: bool = False
     held_tick_s: float | None = None
+    zero_sd: float | None = None
 
 
 def friction_layout(
@@ -34,11 +36,12 @@ def friction_layout(
 ) -> Layout:
     """Lay out the parameters of a law and of the terms that it adopts; ``noise`` stands last.
 
-    An asymmetric law has no offset: its unequal Coulomb levels contain it.
+    The offset of a symmetric law is free. Unequal Coulomb levels contain one: that of an asymmetric
+    law is what is left of the sensors' zeros, and has their standard deviation as its prior.
     """
     drive = drive or Drive()
     left_out = {
-        "offset": not symmetric,
+        "offset": not symmetric and drive.zero_sd is None,
         "cogging_cos": not drive.cogging,
         "cogging_sin": not drive.cogging,
         "delay": drive.held_tick_s is None,
@@ -51,6 +54,10 @@ def friction_layout(
         if term.nuisance and adopt:
             rows += _adopted(adopt, joint, priors)
             adopt = ()
+        if term.name == "offset" and not symmetric:
+            assert drive.zero_sd is not None
+            rows.append(_zero(term, joint, drive.zero_sd))
+            continue
         rows += _rows(term, symmetric, joint, priors, drive.held_tick_s or 1.0)
     return Layout(tuple(rows))
 
@@ -68,6 +75,12 @@ def _rows(
         )
         for name in term.names(symmetric)
     ]
+
+
+def _zero(term: Term, joint: Joint, sd: float) -> Parameter:
+    unit = term.unit(joint.position_unit, joint.effort_unit)
+    meaning = "what is left of the sensors' zeros"
+    return Parameter(term.name, unit, term.transform, 0.0, sd, meaning, believed=True)
 
 
 def _adopted(names: tuple[str, ...], joint: Joint, priors: FrictionPriors) -> list[Parameter]:

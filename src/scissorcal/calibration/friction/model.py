@@ -176,7 +176,7 @@ class FrictionExperiment:
             for parameter in layout.parameters:
                 stem = side_of(parameter.name, begin)
                 start = parameter.mean
-                if stem is not None:
+                if stem is not None and not parameter.believed:
                     value = begin[stem] * (factor if stem in SCALES else 1.0)
                     start = float(parameter.transform.unconstrained(np.asarray(value)))
                 point.append(start)
@@ -213,10 +213,12 @@ def design(
     adopt: tuple[str, ...] = (),
     cogging: float = 0.0,
     prior: StatedPrior | None = None,
+    zero_sd: float | None = None,
 ) -> FrictionExperiment:
     """One law over windows, with the recipe's priors, or those of ``prior`` where it states them.
 
-    ``cogging`` is the number of its periods a turn, 0 where there is none.
+    ``cogging`` is the number of its periods a turn, 0 where there is none; ``zero_sd`` how well the
+    sensors' zeros are known.
     """
     opening = windows.bins.opening
     center = float(np.round(np.mean([opening.min(), opening.max()]), 3))
@@ -228,7 +230,7 @@ def design(
     }
     if cogging:
         key["cogging_periods_per_turn"] = cogging
-    drive = Drive(bool(cogging), windows.tick_s if windows.held else None)
+    drive = Drive(bool(cogging), windows.tick_s if windows.held else None, zero_sd)
     layout = friction_layout(law, symmetric, joint, priors.of(joint.kind), adopt, drive)
     precision = None
     if prior is not None:

@@ -12,6 +12,7 @@ from scissorcal.calibration.friction.search import search_from
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
+from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.errors import InputError
 from scissorcal.model.friction_terms import terms_of
 from scissorcal.recording.recording import Recording
@@ -145,7 +146,9 @@ def predict_effort(
     effort (all zero) have ``measured`` NaN. At rest friction may be anything up to its level: no
     band is given there.
     """
-    windows = weigh(recordings, cutoff_Hz)
+    known = DriveZero.from_dict(fit.diagnostics)
+    cleaned = recordings if known is None else without_zeros(recordings, known.sd, known)[0]
+    windows = weigh(cleaned, cutoff_Hz)
     bins = windows.bins
     adopt = tuple(fit.structure.get("adopt", ()))
     basis = FrictionBasis(

@@ -1,4 +1,4 @@
-"""The drive's zero from idle periods: motors off and blades at rest."""
+"""Sensors' zeros from idle periods: motors off and blades at rest."""
 
 from dataclasses import dataclass
 
@@ -15,6 +15,8 @@ IDLE_S = 1.0
 """Least duration of an idle period."""
 STILL_STEPS = 2.0
 """Steps of the encoder by which an opening at rest may differ."""
+BLOCKS_PER_S = 10.0
+"""The standard error of a mean is that of blocks so short, which slow noise leaves independent."""
 
 
 @dataclass(frozen=True)
@@ -26,35 +28,80 @@ class Zero:
     seconds: float
 
 
-def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
-    """The drive (N m) over idle periods; None without any.
+@dataclass(frozen=True)
+class IdlePeriod:
+    """Means over one idle period, around ``time_s`` on the device's clock.
 
-    Idle means no command, blades at rest and no stroke for ``IDLE_S``. Recordings without any
-    command do not show when motors were off, and are skipped.
+    ``force_N`` is 0 where no handle force is measured; ``drive`` (N m or N) is both together,
+    with its standard error ``drive_sd``.
     """
-    found: list[Array] = []
-    seconds = 0.0
-    for recording in recordings:
-        samples = recording.samples
-        command = np.asarray(samples["torque_command"], dtype=np.float64)
-        if not np.any(command):
-            continue
-        opening = np.asarray(samples["opening"], dtype=np.float64)
-        still = resolution_of(opening)
-        still = STILL_STEPS * still if np.isfinite(still) else 0.0
-        quiet = (command == 0.0) & (np.asarray(samples["stroke"]) < 0)
-        tick = float(np.median(np.diff(recording.device_time_s)))
-        for first, last in pieces_of(recording):
-            for low, high in zip(*stretches(quiet[first:last]), strict=True):
-                part = slice(first + int(low), first + int(high))
-                long = (high - low) * tick >= IDLE_S
-                if not long or np.ptp(opening[part]) > still:
-                    continue
-                found.append(np.asarray(recording.drive_effort[part], dtype=np.float64))
-                seconds += float((high - low) * tick)
-    if not found:
+
+    time_s: float
+    torque: float
+    force_N: float
+    drive: float
+    drive_sd: float
+    seconds: float
+
+
+def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
+    """The drive (N m) over the idle periods of recordings; None without any."""
+    spans = [(recording, span) for recording in recordings for span in idle_spans(recording)]
+    if not spans:
         return None
-    every = np.concatenate(found)
-    blocks = np.array_split(every, max(2, int(10 * seconds)))
+    every = np.concatenate([recording.drive_effort[span] for recording, span in spans])
+    seconds = sum(_tick(recording) * (span.stop - span.start) for recording, span in spans)
+    return Zero(float(every.mean()), _standard_error(every, seconds), seconds)
+
+
+def idle_periods(recording: Recording) -> tuple[IdlePeriod, ...]:
+    """Means over each idle period of a recording, in order of time."""
+    found = []
+    has_force = bool(np.isfinite(recording.handle_radius_m))
+    for span in idle_spans(recording):
+        samples = recording.samples[span]
+        drive = np.asarray(recording.drive_effort[span], dtype=np.float64)
+        seconds = _tick(recording) * len(drive)
+        found.append(
+            IdlePeriod(
+                time_s=float(recording.device_time_s[span].mean()),
+                torque=float(samples["motor_torque"].mean()),
+                force_N=float(samples["handle_force"].mean()) if has_force else 0.0,
+                drive=float(drive.mean()),
+                drive_sd=_standard_error(drive, seconds),
+                seconds=seconds,
+            )
+        )
+    return tuple(found)
+
+
+def idle_spans(recording: Recording) -> list[slice]:
+    """Samples of idle periods: no command, blades at rest and no stroke for ``IDLE_S``.
+
+    A recording without any command does not show when motors were off: it has none.
+    """
+    samples = recording.samples
+    command = np.asarray(samples["torque_command"], dtype=np.float64)
+    if not np.any(command):
+        return []
+    opening = np.asarray(samples["opening"], dtype=np.float64)
+    still = resolution_of(opening)
+    still = STILL_STEPS * still if np.isfinite(still) else 0.0
+    quiet = (command == 0.0) & (np.asarray(samples["stroke"]) < 0)
+    tick, found = _tick(recording), []
+    for first, last in pieces_of(recording):
+        for low, high in zip(*stretches(quiet[first:last]), strict=True):
+            part = slice(first + int(low), first + int(high))
+            if (high - low) * tick >= IDLE_S and np.ptp(opening[part]) <= still:
+                found.append(part)
+    return found
+
+
+def _tick(recording: Recording) -> float:
+    return float(np.median(np.diff(recording.device_time_s)))
+
+
+def _standard_error(values: Array, seconds: float) -> float:
+    blocks = np.array_split(values, max(2, int(BLOCKS_PER_S * seconds)))
     means = np.array([float(block.mean()) for block in blocks])
-    return Zero(float(every.mean()), float(means.std(ddof=1) / np.sqrt(len(means))), seconds)
+    return float(means.std(ddof=1) / np.sqrt(len(means)))

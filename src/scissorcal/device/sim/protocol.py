@@ -10,6 +10,8 @@ Its behaviour, beyond the messages themselves:
   fault: COMMANDS_LOST is set until the next COMMAND, FAULT_LATCHED until a COMMAND has
   CLEAR_FAULT. While the fault is latched the motors brake, whatever is commanded. A host
   that disconnects first sends a COMMAND without ENABLE.
+* A host that died without farewell is noticed by its silence: UNHEARD_S without a valid frame end
+  the stream.
 * Commands beyond the motors' limits are clipped and flagged TORQUE_SATURATED.
 * MATERIAL = 1 puts in a fresh sheet with its near edge at advance + contact = 0. It is refused
   (VALUE_REFUSED) while the blades block it: open them or retract first.
@@ -47,6 +49,7 @@ DEVICE_NAME = "scissorcal-sim"
 FIRMWARE_VERSION = 1
 DEFAULT_BRAKE_AFTER_MS = 10.0
 ENCODER_CHECK_MS = 100
+UNHEARD_S = 5.0
 TICK_US = round(TICK_S * 1e6)
 U32 = 0xFFFFFFFF
 FASTEST_HAND_rad_per_s = 5.0
@@ -87,6 +90,7 @@ class RigProtocol:
         self._values[int(ConfigKey.HAND_STROKES)] = float(rig.hand.strokes)
         self._command = Command(0, 0, 0.0, 0.0)
         self._silent_ticks = 0
+        self._unheard_ticks = 0
         self._fault = False
         self._lost = False
         self._stuck_at: float | None = None
@@ -102,6 +106,7 @@ class RigProtocol:
         for payload in self._decoder.feed(self._line.garbled(data)):
             if self._line.drops():
                 continue
+            self._unheard_ticks = 0
             try:
                 message = decode(payload)
             except ValueError:
@@ -112,6 +117,7 @@ class RigProtocol:
         """Advance one tick: move, measure, check for faults, and send STATE if streaming."""
         self._watch_commands()
         self._watch_faults()
+        self._watch_host()
         command = self._command
         enabled = bool(command.flags & _ENABLE) and not self._fault
         measured = self.rig.tick(command.torque, command.force, enabled, self._fault)
@@ -206,6 +212,11 @@ class RigProtocol:
         if (self._silent_ticks - 1) * TICK_US * 1e-3 >= self._values[ConfigKey.BRAKE_AFTER_MS]:
             self._lost = True
             self._fault = True
+
+    def _watch_host(self) -> None:
+        self._unheard_ticks += 1
+        if self._unheard_ticks * TICK_S >= UNHEARD_S:
+            self._values[int(ConfigKey.STREAM)] = 0.0
 
     def _watch_faults(self) -> None:
         if self._encoder_noticed():

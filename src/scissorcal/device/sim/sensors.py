@@ -51,7 +51,15 @@ class NoiseChannel:
 class SensorSet:
     """All sensors of one rig, with one stream of random numbers."""
 
-    __slots__ = ("_advance_step", "_force", "_force_limit", "_opening_step", "_torque")
+    __slots__ = (
+        "_advance_step",
+        "_force",
+        "_force_limit",
+        "_force_zero",
+        "_opening_step",
+        "_torque",
+        "_torque_zero",
+    )
 
     def __init__(self, sensors: Sensors, tick_s: float, rng: np.random.Generator) -> None:
         drawn = standard_normals(rng)
@@ -59,6 +67,8 @@ class SensorSet:
         self._opening_step = sensors.opening_step_rad
         self._advance_step = sensors.advance_step_um * 1e-6
         self._force_limit = sensors.handle_force_limit_N
+        self._torque_zero = sensors.torque_zero_Nm
+        self._force_zero = sensors.force_zero_N
         self._torque = NoiseChannel(
             sensors.torque_white_Nm, sensors.torque_slow_Nm, sensors.noise_time_ms, tick_ms, drawn
         )
@@ -76,7 +86,7 @@ class SensorSet:
         torque_saturated: bool,
     ) -> Measured:
         """Turn true values into measured ones."""
-        force = handle_force + self._force.next()
+        force = handle_force + self._force_zero + self._force.next()
         limit = self._force_limit
         saturated = not -limit < force < limit
         if saturated:
@@ -84,7 +94,7 @@ class SensorSet:
         return Measured(
             self._opening_step * math.floor(opening / self._opening_step + 0.5),
             self._advance_step * math.floor(advance / self._advance_step + 0.5),
-            motor_torque + self._torque.next(),
+            motor_torque + self._torque_zero + self._torque.next(),
             force,
             at_stop,
             torque_saturated,

@@ -143,7 +143,7 @@ class Motor(Section):
 
 
 class Sensors(Section):
-    """Steps, noise and clock of the measurements.
+    """Steps, zeros, noise and clock of the measurements.
 
     Torque and handle force carry white noise plus a slow first-order autoregressive part, each
     given by its standard deviation; ``noise_time_ms`` is the latter's time constant.
@@ -151,8 +151,10 @@ class Sensors(Section):
 
     opening_step_rad: Positive = 2.0 * math.pi / 131072
     advance_step_um: Positive = 1.0
+    torque_zero_Nm: Finite = 0.0
     torque_white_Nm: NonNegative = 8.0e-4
     torque_slow_Nm: NonNegative = 5.0e-4
+    force_zero_N: Finite = 0.0
     force_white_N: NonNegative = 0.010
     force_slow_N: NonNegative = 0.006
     noise_time_ms: Annotated[float, Field(ge=1.0, le=1e4)] = 12.0

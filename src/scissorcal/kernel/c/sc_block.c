@@ -84,9 +84,33 @@ void sc_block_stop(sc_block *block)
 
 uint32_t sc_block_request(sc_block *block, uint32_t key, float value)
 {
-    block->mailbox.key = key;
-    block->mailbox.value = value;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    __atomic_store_n(&block->mailbox.content, ((uint64_t)bits << 32) | key, __ATOMIC_RELAXED);
     return __atomic_add_fetch(&block->mailbox.wanted, 1u, __ATOMIC_RELEASE);
+}
+
+/* The content of this request or, where the supervisor gave up on it, of a later one: never a mixture. */
+uint32_t sc_block_wanted(const sc_block *block, uint32_t *key, float *value)
+{
+    const uint32_t wanted = __atomic_load_n(&block->mailbox.wanted, __ATOMIC_ACQUIRE);
+    const uint64_t content = __atomic_load_n(&block->mailbox.content, __ATOMIC_RELAXED);
+    const uint32_t bits = (uint32_t)(content >> 32);
+    *key = (uint32_t)(content & 0xFFFFFFFFu);
+    memcpy(value, &bits, sizeof *value);
+    return wanted;
+}
+
+void sc_block_answer(sc_block *block, uint32_t request, uint32_t status, float value)
+{
+    block->mailbox.status = status;
+    block->mailbox.value_in_force = value;
+    __atomic_store_n(&block->mailbox.answered, request, __ATOMIC_RELEASE);
+}
+
+void sc_block_set_reference_size(sc_block *block, uint32_t size)
+{
+    __atomic_store_n(&block->reference_size, size, __ATOMIC_RELEASE);
 }
 
 int sc_block_answered(const sc_block *block, uint32_t request)
@@ -105,12 +129,39 @@ void sc_block_read_orders(const sc_block *block, sc_orders *orders)
     orders->stop = __atomic_load_n(&shared->stop, __ATOMIC_ACQUIRE);
 }
 
+/* Writer and reader may be at one sample of the ring at the same time, so that its words are atomic; the
+ * reader finds out afterwards and drops what it read. */
+typedef uint64_t __attribute__((may_alias)) sc_word;
+
+enum { SC_WORDS = sizeof(sc_sample) / sizeof(sc_word) };
+
+/* Fails to compile where a sample is no whole number of words. */
+typedef char sc_words_fill_a_sample[sizeof(sc_sample) % sizeof(sc_word) == 0 ? 1 : -1];
+
+static void write_words(sc_sample *shared, const sc_sample *sample)
+{
+    sc_word *to = (sc_word *)(void *)shared;
+    const sc_word *from = (const sc_word *)(const void *)sample;
+    for (size_t i = 0; i < SC_WORDS; i++) {
+        __atomic_store_n(&to[i], from[i], __ATOMIC_RELAXED);
+    }
+}
+
+static void read_words(const sc_sample *shared, sc_sample *sample)
+{
+    const sc_word *from = (const sc_word *)(const void *)shared;
+    sc_word *to = (sc_word *)(void *)sample;
+    for (size_t i = 0; i < SC_WORDS; i++) {
+        to[i] = __atomic_load_n(&from[i], __ATOMIC_RELAXED);
+    }
+}
+
 void sc_block_push(sc_block *block, const sc_sample *sample)
 {
     /* No part of this sample may be seen before the count of those before it, or a reader on
      * another core would take an overwritten sample for a whole one. */
     __atomic_thread_fence(__ATOMIC_RELEASE);
-    block->ring[block->written % SC_RING_SAMPLES] = *sample;
+    write_words(&block->ring[block->written % SC_RING_SAMPLES], sample);
     __atomic_store_n(&block->written, block->written + 1, __ATOMIC_RELEASE);
 }
 
@@ -132,7 +183,7 @@ uint64_t sc_block_read(const sc_block *block, uint64_t *cursor, sc_sample *sampl
     }
     uint64_t count = 0;
     while (count < n && *cursor + count < written) {
-        samples[count] = block->ring[(*cursor + count) % SC_RING_SAMPLES];
+        read_words(&block->ring[(*cursor + count) % SC_RING_SAMPLES], &samples[count]);
         count++;
     }
     __atomic_thread_fence(__ATOMIC_ACQUIRE);

@@ -12,7 +12,7 @@
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 2, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 4, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
     SC_HISTOGRAM_BINS = 192,
     SC_BINS_PER_OCTAVE = 8
@@ -38,8 +38,7 @@ typedef struct {
 typedef struct {
     uint32_t wanted;   /* counts requests */
     uint32_t answered; /* number of the request that the echo below answers */
-    uint32_t key;
-    float value;
+    uint64_t content;  /* key, and above it the bits of the value: no half of a request is ever sent */
     uint32_t status;
     float value_in_force;
 } sc_mailbox;
@@ -56,6 +55,8 @@ typedef struct {
     uint32_t exit_reason; /* SC_STOP_... once the loop has ended */
     int32_t exit_errno;
     uint32_t garbled;
+    uint32_t realtime;      /* 1 if the loop has real-time priority ... */
+    uint32_t memory_locked; /* ... and its memory is never paged out */
     uint64_t bytes_received;
     uint64_t other_frames; /* valid, but no STATE */
     uint64_t answers;      /* commands written */
@@ -91,6 +92,7 @@ void sc_block_order(sc_block *block, uint32_t mode);
 void sc_block_fresh_sheet(sc_block *block, float crack);
 void sc_block_beat(sc_block *block);
 void sc_block_stop(sc_block *block);
+void sc_block_set_reference_size(sc_block *block, uint32_t size); /* once the arrays are filled */
 uint32_t sc_block_request(sc_block *block, uint32_t key, float value);
 int sc_block_answered(const sc_block *block, uint32_t request);
 
@@ -101,6 +103,8 @@ uint64_t sc_block_read(const sc_block *block, uint64_t *cursor, sc_sample *sampl
 /* The loop's side. */
 void sc_block_read_orders(const sc_block *block, sc_orders *orders);
 void sc_block_push(sc_block *block, const sc_sample *sample);
+uint32_t sc_block_wanted(const sc_block *block, uint32_t *key, float *value);
+void sc_block_answer(sc_block *block, uint32_t request, uint32_t status, float value);
 
 void sc_histogram_add(sc_histogram *histogram, int64_t time_ns);
 

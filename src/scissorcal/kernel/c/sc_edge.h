@@ -14,20 +14,29 @@ typedef struct {
 } sc_turn;
 
 /* One place of the edge: station on the blade, where it stands (x, y), its slope tan(psi) against
- * the cut and its taper e'(s) against the blade's centreline. */
+ * the cut, its taper e'(s) against the blade's centreline, its bend e''(s), and its rise dy/ds and run
+ * dx/ds along the blade. `knot` names its interval; before a look-up, where to look first. */
 typedef struct {
+    int32_t knot;
     float station;
     float x;
     float y;
     float slope;
     float taper;
+    float bend;
+    float rise;
+    float run;
 } sc_edge_point;
 
 /* The edge at a station; 0 if it stands too steeply against the cut there (psi > 87 deg). */
 int sc_edge_at_station(const sc_table *edge, sc_turn turn, float station, sc_edge_point *point);
 
-/* The edge over x: a guarded Newton solve for the station, closed form beyond the table's ends,
- * where the edge goes on straight. 0 if no edge of bearable steepness stands there. */
+/* The same at a knot, without a look-up; the bend is left out. */
+int sc_edge_at_knot(const sc_table *edge, sc_turn turn, int32_t knot, sc_edge_point *point);
+
+/* The edge over x, looked for first at point->knot: one search for the interval and one cubic in it,
+ * closed form beyond the table's ends, where the edge goes on straight. 0 if no edge of bearable
+ * steepness stands there. */
 int sc_edge_over(const sc_table *edge, sc_turn turn, float x, sc_edge_point *point);
 
 #endif

@@ -1,160 +1,228 @@
 #include "sc_fracture.h"
 
 #include <math.h>
-#include <stddef.h>
 
 static const float RESPONSE_CAP = 1e6f; /* N: far beyond any rig, keeps all that follows finite */
 static const float PARALLEL = 1e-6f;    /* tan(psi) up to which edges count as parallel */
-static const float CLOSE_ENOUGH = 2e-6f;  /* of the target */
-static const float RESOLUTION = 1e-7f;      /* of a station: about the resolution of float */
+static const float RESOLUTION = 1e-7f;  /* of a station: about the resolution of float */
 
-enum { MOST_STEPS = 75 }; /* 25 bisections: the whole blade down to float's resolution */
+/* Up to this change of the force that is borne, its indentation is taken along the tangent: an error
+ * of less than its square, 1e-6. */
+static const float SMALL_CHANGE = 1e-3f;
 
-float sc_response_at(const sc_model *model, float indentation)
+/* Up to this share of the station, a step that is left is made along the tangent of the edge. */
+static const float SHORT_STEP = 1e-4f;
+
+void sc_sit(const sc_model *model, sc_bite *bite)
 {
-    if (!(indentation > 0.0f)) {
-        return 0.0f;
-    }
-    const float force = sc_table_at(&model->response, indentation, NULL);
-    return fminf(fmaxf(force, 0.0f), RESPONSE_CAP);
-}
-
-float sc_stored_energy(const sc_model *model, float indentation)
-{
-    if (!(indentation > 0.0f)) {
-        return 0.0f;
-    }
     const sc_table *response = &model->response;
-    const int32_t last = response->size - 1;
-    const float away = indentation - response->x[last];
-    float energy = sc_table_area(response, indentation);
-    if (away > 0.0f) {
-        const float excess = sc_table_at(response, indentation, NULL) - RESPONSE_CAP;
-        if (excess > 0.0f && response->slope[last] > 0.0f) {
-            energy -= 0.5f * excess * (excess / response->slope[last]);
-        }
+    sc_place at = {bite->knot, 0.0f, 0.0f, 0.0f, 0.0f};
+    bite->indentation = model->upper_face - bite->point.y;
+    bite->force = bite->stored = 0.0f;
+    if (!(bite->indentation > 0.0f)) {
+        return;
     }
-    return (float)model->moving_blades * energy;
+    sc_table_look(response, bite->indentation, &at);
+    const float excess = at.y - RESPONSE_CAP;
+    if (excess > 0.0f && at.index == response->size - 1 && at.slope > 0.0f) {
+        at.area -= 0.5f * excess * (excess / at.slope);
+    }
+    bite->knot = at.index;
+    bite->force = at.y > RESPONSE_CAP ? RESPONSE_CAP : at.y;
+    bite->force = bite->force > 0.0f ? bite->force : 0.0f;
+    bite->stored = (float)model->moving_blades * at.area;
 }
 
-float sc_release_at(const sc_model *model, const sc_edge_point *point)
+float sc_release(const sc_model *model, const sc_bite *bite)
 {
-    if (!(point->slope > PARALLEL)) {
-        return 0.0f;
-    }
-    const float force = sc_response_at(model, model->upper_face - point->y);
-    return (float)model->moving_blades * force * point->slope;
+    const float slope = bite->point.slope;
+    return slope > PARALLEL ? (float)model->moving_blades * bite->force * slope : 0.0f;
 }
 
-/* Release at a station, less the target; a place too steep to evaluate releases nothing. */
-static float excess_at(const sc_model *model, sc_turn turn, float target, float station,
-                       sc_edge_point *point)
+/* What a place of the edge would bear, and how much deeper it sits. */
+typedef struct {
+    sc_place response; /* at the force whose release is the target */
+    float gap;         /* indentation beyond that: positive where the crack still runs */
+    float grade;       /* how fast the gap closes outwards along the blade */
+} bearing;
+
+/* An edge that is parallel or opens outwards, or stands too steep, releases nothing. */
+static void bear(const sc_model *model, float target, const sc_edge_point *point, int stands,
+                 bearing *at)
 {
-    if (!sc_edge_at_station(&model->edge, turn, station, point)) {
-        return -target;
+    at->gap = -INFINITY;
+    at->grade = 1.0f;
+    if (!stands || !(point->slope > PARALLEL)) {
+        return;
     }
-    return sc_release_at(model, point) - target;
+    const float force = target / ((float)model->moving_blades * point->slope);
+    if (!(force < RESPONSE_CAP)) {
+        return;
+    }
+    sc_table_inverse(&model->response, force, &at->response);
+    at->gap = model->upper_face - point->y - at->response.x;
+    at->grade = point->rise;
+    const float deeper = 1.0f + at->gap / at->response.x;
+    const float turns = point->bend * force * deeper;
+    const float yields = at->response.slope * point->run * point->run * point->slope;
+    if (turns < yields * point->rise) {
+        at->grade -= turns / yields;
+    }
 }
 
-/* How far a Newton step goes from a point: the release falls as the edge rises out of the material
- * (its change of slope matters less, and the bracket makes up for it). Infinite where the response
- * stands at its cap. */
-static float newton_step(const sc_model *model, sc_turn turn, const sc_edge_point *point,
-                         float excess)
+/* After a step so short that the force changes little, what is borne follows the tangent, and what is
+ * left of the gap is closed along it. 1 if that is as good as another round. */
+static int follow(const sc_model *model, float target, float low, bearing *at, sc_edge_point *point)
 {
-    float stiffness;
-    const float force =
-        sc_table_at(&model->response, model->upper_face - point->y, &stiffness);
-    const float rise = turn.sine + point->taper * turn.cosine;
-    if (force >= RESPONSE_CAP) {
-        return INFINITY;
+    const float force = target / ((float)model->moving_blades * point->slope);
+    const float change = force - at->response.y;
+    if (!(point->slope > PARALLEL) || !(fabsf(change) <= SMALL_CHANGE * force) ||
+        !(at->response.slope > 0.0f)) {
+        return 0;
     }
-    return excess / ((float)model->moving_blades * stiffness * rise * point->slope);
+    const float deeper = change / at->response.slope;
+    const float step = (model->upper_face - point->y - at->response.x - deeper) / at->grade;
+    if (!(fabsf(step) <= SHORT_STEP * fabsf(point->station)) ||
+        !(fabsf(point->bend * step) <= RESOLUTION * point->rise) ||
+        !(point->station + step > low && point->station + step < model->tip_station)) {
+        return 0;
+    }
+    at->response.area += deeper * (at->response.y + 0.5f * change);
+    at->response.x += deeper;
+    at->response.y = force;
+    point->station += step;
+    point->x += point->run * step;
+    point->y += point->rise * step;
+    return 1;
 }
 
-/* The excess changes sign between low, where *point stands, and high. Newton steps that stay inside
- * the shrinking bracket, every third step a bisection, so that it shrinks whatever the shape. Done
- * when the next step would be below the resolution of float; such a step back from
- * the far side is lengthened to as much, to bracket the root. */
-static void close_bracket(const sc_model *model, sc_turn turn, float target, float high,
-                          float excess, sc_edge_point *point)
-{
-    float low = point->station;
-    for (int i = 0; i < MOST_STEPS; i++) {
-        const float shortest = RESOLUTION * fabsf(point->station);
-        float step = newton_step(model, turn, point, excess);
-        if (fabsf(step) < shortest) {
-            if (excess > 0.0f) {
-                return;
-            }
-            step = -shortest;
-        }
-        float station = point->station + step;
-        if (i % 3 == 2 || !(station > low && station < high)) {
-            station = 0.5f * (low + high);
-        }
-        if (!(station > low && station < high)) {
-            break;
-        }
-        excess = excess_at(model, turn, target, station, point);
-        if (fabsf(excess) <= CLOSE_ENOUGH * target) {
-            return;
-        }
-        if (excess > 0.0f) {
-            low = station;
-        } else {
-            high = station;
-        }
-    }
-    (void)excess_at(model, turn, target, high, point);
-}
-
-/* Next station at which to look for a change of sign: the next knot, or, on the straight
- * continuation, where the edge leaves the material. */
-static float next_stop(const sc_model *model, sc_turn turn, int32_t *knot, float station)
+/* Where nothing more is released: the blade's tip or, on the straight continuation of an edge
+ * without one, where it leaves the material. */
+static float farthest(const sc_model *model, sc_turn turn)
 {
     const sc_table *edge = &model->edge;
     const int32_t last = edge->size - 1;
-    while (*knot <= last && edge->x[*knot] <= station) {
-        (*knot)++;
+    sc_edge_point end;
+    if (model->tip_station <= edge->x[last]) {
+        return model->tip_station;
     }
-    if (*knot <= last) {
-        return edge->x[*knot];
-    }
-    const float rise = turn.sine + edge->slope[last] * turn.cosine;
-    const float end = edge->x[last] * turn.sine + edge->y[last] * turn.cosine;
-    if (!(rise > 0.0f)) {
-        return station;
-    }
-    const float leaves = edge->x[last] + (model->upper_face - end) / rise;
-    return leaves > station ? leaves : station;
+    (void)sc_edge_at_knot(edge, turn, last, &end);
+    const float beyond = end.rise > 0.0f ? (model->upper_face - end.y) / end.rise : 0.0f;
+    const float leaves = end.station + (beyond > 0.0f ? beyond : 0.0f);
+    return leaves < model->tip_station ? leaves : model->tip_station;
 }
 
-int sc_run_out(const sc_model *model, sc_turn turn, float target, sc_edge_point *point)
+/* The crack rests where the gap is closed. */
+static int rest(const sc_model *model, const bearing *at, sc_bite *bite)
 {
-    int32_t knot = 0;
-    float excess = sc_release_at(model, point) - target;
-    if (!(excess > 0.0f)) {
-        return 1;
-    }
-    for (int i = 0; i <= SC_TABLE_MAX; i++) {
-        float high = next_stop(model, turn, &knot, point->station);
-        const int at_tip = high >= model->tip_station;
-        if (at_tip) {
-            high = model->tip_station;
-        }
-        sc_edge_point far_end;
-        const float far_excess = excess_at(model, turn, target, high, &far_end);
-        if (!(far_excess > 0.0f)) {
-            close_bracket(model, turn, target, high, excess, point);
-            return 1;
-        }
-        const int ends = !(high > point->station); /* rounding at the material's very end */
-        *point = far_end;
-        excess = far_excess;
-        if (at_tip || ends) {
-            return !at_tip;
-        }
-    }
+    bite->indentation = at->response.x;
+    bite->force = at->response.y;
+    bite->stored = (float)model->moving_blades * at->response.area;
+    bite->knot = at->response.index;
     return 1;
+}
+
+typedef enum { SC_AT_TIP, SC_RESTS, SC_OPEN } ending;
+
+/* Where nothing is found in between: the near side of what holds, or of what is past the tip. */
+static ending hold_at(const sc_model *model, sc_turn turn, float target, float station, sc_bite *bite)
+{
+    (void)sc_edge_at_station(&model->edge, turn, station, &bite->point);
+    sc_sit(model, bite);
+    return station < model->tip_station || !(sc_release(model, bite) > target) ? SC_RESTS : SC_AT_TIP;
+}
+
+/* The place between low, where *bite stands and the gap is open, and high, where it is closed; an
+ * infinite high stands for the end of what the blade reaches, which is looked at only if the rounds
+ * lead there. Where they do not close the gap, *bite stays where it is known to be open. */
+static ending close_gap(const sc_model *model, sc_turn turn, float target, float *high, int most,
+                        sc_bite *bite)
+{
+    sc_edge_point *point = &bite->point;
+    bearing at = {{bite->knot, 0.0f, 0.0f, 0.0f, 0.0f}, 0.0f, 1.0f};
+    float low = point->station;
+    int stands = 1;
+    for (int i = 0; i < most; i++) {
+        bear(model, target, point, stands, &at);
+        const float step = at.gap / at.grade;
+        if (fabsf(step) <= RESOLUTION * fabsf(point->station)) {
+            return rest(model, &at, bite);
+        }
+        if (at.gap > 0.0f) {
+            low = point->station;
+        } else {
+            *high = point->station;
+        }
+        float next = point->station + step;
+        if (!isfinite(*high) && !(next < model->tip_station)) {
+            *high = next = farthest(model, turn);
+            if (!(next > low)) {
+                return next < model->tip_station ? SC_RESTS : SC_AT_TIP;
+            }
+        } else if (!(next > low && next < *high)) {
+            next = 0.5f * (low + *high);
+            if (!(next > low && next < *high)) {
+                return hold_at(model, turn, target, *high, bite);
+            }
+        }
+        stands = sc_edge_at_station(&model->edge, turn, next, point);
+        if (stands && follow(model, target, low, &at, point)) {
+            return rest(model, &at, bite);
+        }
+    }
+    (void)sc_edge_at_station(&model->edge, turn, low, point);
+    return SC_OPEN;
+}
+
+/* Move *bite to the last knot before the place sought and give the next one's station, or the end of
+ * what the blade reaches, not yet looked at. Where the release falls the knots are halved, else tried
+ * one by one, so that it is the first such place. */
+static float between_knots(const sc_model *model, sc_turn turn, int falls, float target,
+                           sc_bite *bite)
+{
+    const sc_table *edge = &model->edge;
+    const float end = farthest(model, turn);
+    int32_t open = bite->point.knot, closed = edge->size;
+    while (open + 1 < closed && edge->x[open + 1] <= bite->point.station) {
+        open++;
+    }
+    while (closed > 0 && edge->x[closed - 1] >= end) {
+        closed--;
+    }
+    const int32_t beyond = closed;
+    while (closed - open > 1) {
+        sc_bite next = *bite;
+        const int32_t knot = falls ? open + (closed - open) / 2 : open + 1;
+        const int stands = sc_edge_at_knot(edge, turn, knot, &next.point);
+        sc_sit(model, &next);
+        if (stands && sc_release(model, &next) > target) {
+            *bite = next;
+            open = knot;
+        } else {
+            closed = knot;
+        }
+    }
+    return closed < beyond ? edge->x[closed] : end;
+}
+
+int sc_run_out(const sc_model *model, sc_turn turn, int falls, float target, sc_bite *bite)
+{
+    float high = INFINITY;
+    ending how = SC_OPEN;
+    if (falls) {
+        how = close_gap(model, turn, target, &high, SC_RUN_ROUNDS, bite);
+    }
+    if (how == SC_OPEN) {
+        high = between_knots(model, turn, falls, target, bite);
+        sc_bite there = *bite;
+        if (hold_at(model, turn, target, high, &there) == SC_AT_TIP || !(high > bite->point.station)) {
+            *bite = there;
+            return high < model->tip_station;
+        }
+        how = close_gap(model, turn, target, &high, SC_CLOSE_ROUNDS, bite);
+    }
+    if (how == SC_OPEN) {
+        how = hold_at(model, turn, target, high, bite);
+    }
+    return how == SC_RESTS;
 }

@@ -125,14 +125,15 @@ static void say_farewell(loop *self)
 /* Send a requested CONFIG, and repeat it until its echo arrives. */
 static void serve_mailbox(loop *self)
 {
-    const sc_mailbox *mailbox = &self->block->mailbox;
-    const uint32_t wanted = __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE);
-    if (wanted == mailbox->answered ||
+    uint32_t key;
+    float value;
+    const uint32_t wanted = sc_block_wanted(self->block, &key, &value);
+    if (wanted == self->block->mailbox.answered ||
         (wanted == self->asked && ++self->asked_frames < FRAMES_UNTIL_ASKED_AGAIN)) {
         return;
     }
     uint8_t payload[SC_SIZE_CONFIG];
-    const sc_config config = {(uint16_t)mailbox->key, wanted, mailbox->value};
+    const sc_config config = {(uint16_t)key, wanted, value};
     self->asked = wanted;
     self->asked_frames = 0;
     (void)send_payload(self, payload, sc_pack_config(&config, payload));
@@ -140,15 +141,14 @@ static void serve_mailbox(loop *self)
 
 static void take_other(loop *self, const uint8_t *payload, size_t size)
 {
-    sc_mailbox *mailbox = &self->block->mailbox;
     sc_config_echo echo;
+    uint32_t key;
+    float value;
     self->block->other_frames++;
     if (sc_unpack_config_echo(payload, size, &echo) &&
-        echo.nonce == __atomic_load_n(&mailbox->wanted, __ATOMIC_ACQUIRE) &&
-        echo.nonce != mailbox->answered && echo.key == mailbox->key) {
-        mailbox->status = echo.status;
-        mailbox->value_in_force = echo.value;
-        __atomic_store_n(&mailbox->answered, echo.nonce, __ATOMIC_RELEASE);
+        echo.nonce == sc_block_wanted(self->block, &key, &value) &&
+        echo.nonce != self->block->mailbox.answered && echo.key == key) {
+        sc_block_answer(self->block, echo.nonce, echo.status, echo.value);
     }
 }
 

@@ -32,6 +32,12 @@ static sc_turn turn_of(const sc_model *model, float opening)
     return turn;
 }
 
+/* Whether the release is known to fall outwards along the blade at this opening. */
+static int falls_at(const sc_model *model, float opening)
+{
+    return model->release_falls && opening >= model->opening_min && opening <= model->opening_max;
+}
+
 float sc_model_friction(const sc_model *model, float opening, float rate)
 {
     const float speed = fabsf(rate);
@@ -59,18 +65,21 @@ static float damped(const sc_model *model, const sc_edge_point *point, float res
 {
     const float lever = point->x + point->y * point->slope;
     const float deepening = -lever * rate / (float)model->moving_blades;
-    return response * fmaxf(1.0f + model->rate_damping * deepening, 0.0f);
+    const float factor = 1.0f + model->rate_damping * deepening;
+    return factor > 0.0f ? response * factor : 0.0f;
 }
 
 /* The material leaves the blade; what it stored is lost. */
-static void detach(const sc_model *model, sc_crack *state, float indentation, sc_step_output *out)
+static void detach(sc_crack *state, float stored, sc_step_output *out)
 {
     state->detached = 1;
-    out->arrest_J += sc_stored_energy(model, indentation);
+    out->arrest_J += stored;
 }
 
-static void book_advance(sc_crack *state, float crack, float per_metre, sc_step_output *out)
+/* The crack moves on; an advance below float's resolution is none. */
+static void book_advance(sc_crack *state, float moved, float per_metre, sc_step_output *out)
 {
+    const float crack = state->crack + moved;
     if (crack > state->crack) {
         out->fracture_J += per_metre * (crack - state->crack);
         out->flags |= SC_STEP_ADVANCED;
@@ -78,88 +87,95 @@ static void book_advance(sc_crack *state, float crack, float per_metre, sc_step_
     }
 }
 
-/* Smooth fracture: the crack keeps the release at J_c h.
- *
- * Rippled: each run starts at J_c h and stops at kappa J_c h, which takes one length; several runs
- * may fall into one step. The crack advances by as many whole lengths as bring the release down
- * to J_c h, so the phase of the ripple, and with it the mean force, does not depend on the step. */
-static void fracture(const sc_model *model, sc_crack *state, sc_turn turn, float advance,
-                     sc_edge_point *point, sc_step_output *out)
+/* Rippled fracture: each run starts at J_c h and stops at kappa J_c h, which takes one length; several
+ * runs may fall into one step. The crack advances by as many whole lengths as bring the release down
+ * to J_c h, so the phase of the ripple, and with it the mean force, does not depend on the step.
+ * 0 where a length is too short for float: then it is as smooth. */
+static int ripple(const sc_model *model, sc_crack *state, sc_turn turn, int falls,
+                  const sc_bite *start, sc_bite *bite, sc_step_output *out)
 {
-    const float indentation = model->upper_face - point->y;
-    const float contact = point->x;
-    sc_edge_point start = *point;
-    if (!sc_run_out(model, turn, model->fracture_energy, &start)) {
-        book_advance(state, advance + start.x, model->kappa * model->fracture_energy, out);
-        detach(model, state, indentation, out);
-        *point = start;
-        return;
-    }
-    sc_edge_point stop = start;
-    if (model->kappa < 1.0f) {
-        (void)sc_run_out(model, turn, model->kappa * model->fracture_energy, &stop);
-    }
-    const float length = stop.x - start.x;
+    const float contact = bite->point.x;
+    const float kept = model->kappa * model->fracture_energy;
+    sc_bite stop = *start;
+    (void)sc_run_out(model, turn, falls, kept, &stop);
+    const float length = stop.point.x - start->point.x;
     if (!(length > SHORTEST_RUN)) {
-        book_advance(state, advance + start.x, model->fracture_energy, out);
-        *point = start;
+        return 0;
+    }
+    const float runs = ceilf((start->point.x - contact) / length);
+    const float lost = start->stored - stop.stored - kept * length;
+    book_advance(state, runs * length, kept, out);
+    out->arrest_J += lost > 0.0f ? runs * lost : 0.0f;
+    if (sc_edge_over(&model->edge, turn, contact + runs * length, &bite->point)) {
+        sc_sit(model, bite);
+    } else {
+        *bite = *start;
+    }
+    return 1;
+}
+
+/* The crack runs: smoothly, so that it keeps the release at J_c h, or in ripples. */
+static void fracture(const sc_model *model, sc_crack *state, sc_turn turn, int falls, sc_bite *bite,
+                     sc_step_output *out)
+{
+    sc_bite start = *bite;
+    if (!sc_run_out(model, turn, falls, model->fracture_energy, &start)) {
+        book_advance(state, start.point.x - bite->point.x, model->kappa * model->fracture_energy,
+                     out);
+        detach(state, bite->stored, out);
+        *bite = start;
         return;
     }
-    const float runs = ceilf((start.x - contact) / length);
-    const float taken = model->kappa * model->fracture_energy * length;
-    const float released = sc_stored_energy(model, model->upper_face - start.y) -
-                           sc_stored_energy(model, model->upper_face - stop.y);
-    book_advance(state, advance + contact + runs * length, taken / length, out);
-    out->arrest_J += runs * fmaxf(released - taken, 0.0f);
-    if (!sc_edge_over(&model->edge, turn, contact + runs * length, point)) {
-        *point = start;
+    if (model->kappa < 1.0f && ripple(model, state, turn, falls, &start, bite, out)) {
+        return;
     }
+    book_advance(state, start.point.x - bite->point.x, model->fracture_energy, out);
+    *bite = start;
 }
 
 /* Whether the blade reaches the material. Once it left at the tip, it is met again only from
  * outside: so no stored energy appears from nothing. */
-static int in_reach(const sc_model *model, sc_crack *state, const sc_edge_point *point,
+static int in_reach(const sc_model *model, sc_crack *state, const sc_bite *bite,
                     sc_step_output *out)
 {
-    const float indentation = model->upper_face - point->y;
-    if (point->station >= model->tip_station) {
+    if (bite->point.station >= model->tip_station) {
         if (!state->detached) {
-            detach(model, state, indentation, out);
+            detach(state, bite->stored, out);
         }
         return 0;
     }
-    if (state->detached && !(indentation > 0.0f)) {
+    if (state->detached && !(bite->indentation > 0.0f)) {
         state->detached = 0;
     }
     return !state->detached;
 }
 
-static void press(const sc_model *model, sc_crack *state, sc_turn turn, float rate, float advance,
-                  sc_edge_point *point, sc_step_output *out)
+static void press(const sc_model *model, sc_crack *state, sc_turn turn, int falls, float rate,
+                  sc_bite *bite, sc_step_output *out)
 {
-    if (!in_reach(model, state, point, out)) {
+    if (!in_reach(model, state, bite, out)) {
         out->flags |= SC_STEP_BEYOND_TIP;
         return;
     }
-    if (!(model->upper_face - point->y > 0.0f)) {
+    if (!(bite->indentation > 0.0f)) {
         return;
     }
-    const float release = sc_release_at(model, point);
+    const float release = sc_release(model, bite);
     if (release == 0.0f) {
         out->flags |= SC_STEP_NOT_CUTTING;
     } else if (model->fracture_energy > 0.0f && release > model->fracture_energy) {
-        fracture(model, state, turn, advance, point, out);
+        fracture(model, state, turn, falls, bite, out);
         if (state->detached) {
             out->flags |= SC_STEP_BEYOND_TIP;
             return;
         }
     }
     out->flags |= SC_STEP_TOUCHING;
-    out->response = sc_response_at(model, model->upper_face - point->y);
-    out->stored_J = sc_stored_energy(model, model->upper_face - point->y);
-    const float force = damped(model, point, out->response, rate);
-    out->torque = torque_of(model, point, force);
-    out->force = -(float)model->moving_blades * force * point->slope;
+    out->response = bite->force;
+    out->stored_J = bite->stored;
+    const float force = damped(model, &bite->point, bite->force, rate);
+    out->torque = torque_of(model, &bite->point, force);
+    out->force = -(float)model->moving_blades * force * bite->point.slope;
 }
 
 void sc_model_step(const sc_model *model, sc_crack *state, float opening, float rate, float advance,
@@ -167,19 +183,24 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
 {
     const sc_crack before = *state;
     const sc_turn turn = turn_of(model, opening);
-    sc_edge_point point;
+    sc_bite bite;
+    bite.point.knot = state->edge_knot;
+    bite.knot = state->response_knot;
     memset(out, 0, sizeof *out);
     if (!is_usable(opening, rate, state->crack - advance) ||
-        !sc_edge_over(&model->edge, turn, state->crack - advance, &point)) {
+        !sc_edge_over(&model->edge, turn, state->crack - advance, &bite.point)) {
         refuse(out);
         return;
     }
-    press(model, state, turn, rate, advance, &point, out);
-    out->contact = point.x;
-    out->height = point.y;
-    out->indentation = model->upper_face - point.y;
+    sc_sit(model, &bite);
+    press(model, state, turn, falls_at(model, opening), rate, &bite, out);
+    state->edge_knot = bite.point.knot;
+    state->response_knot = bite.knot;
+    out->contact = bite.point.x;
+    out->height = bite.point.y;
+    out->indentation = bite.indentation;
     if (opening < model->opening_min || opening > model->opening_max ||
-        point.x < model->contact_min || point.x > model->contact_max) {
+        bite.point.x < model->contact_min || bite.point.x > model->contact_max) {
         out->flags |= SC_STEP_OUT_OF_RANGE;
     }
     if (model->render_friction) {
@@ -195,19 +216,21 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
 float sc_model_settled_torque(const sc_model *model, float opening, float rate, float contact)
 {
     const sc_turn turn = turn_of(model, opening);
-    sc_edge_point point;
+    sc_bite bite;
+    bite.point.knot = bite.knot = 0;
     if (!is_usable(opening, rate, contact) ||
-        !sc_edge_over(&model->edge, turn, contact, &point)) {
+        !sc_edge_over(&model->edge, turn, contact, &bite.point)) {
         return 0.0f;
     }
+    sc_sit(model, &bite);
     float torque = 0.0f;
-    int reached = point.station < model->tip_station;
-    if (reached && model->fracture_energy > 0.0f) {
-        reached = sc_run_out(model, turn, model->fracture_energy, &point);
+    int reached = bite.point.station < model->tip_station;
+    if (reached && model->fracture_energy > 0.0f &&
+        sc_release(model, &bite) > model->fracture_energy) {
+        reached = sc_run_out(model, turn, falls_at(model, opening), model->fracture_energy, &bite);
     }
     if (reached) {
-        const float response = sc_response_at(model, model->upper_face - point.y);
-        torque = torque_of(model, &point, damped(model, &point, response, rate));
+        torque = torque_of(model, &bite.point, damped(model, &bite.point, bite.force, rate));
     }
     if (model->render_friction) {
         torque -= sc_model_friction(model, opening, rate);
@@ -229,20 +252,4 @@ void sc_model_torque_many(const sc_model *model, int64_t n, const float *opening
     for (int64_t i = 0; i < n; i++) {
         torque[i] = sc_model_settled_torque(model, opening[i], rate[i], contact[i]);
     }
-}
-
-int sc_model_is_sound(const sc_model *model)
-{
-    const sc_table *response = &model->response;
-    return sc_table_is_sound(&model->edge) && sc_table_is_sound(response) &&
-           sc_table_is_sound(&model->friction_opening) &&
-           sc_table_is_sound(&model->friction_closing) &&
-           sc_table_is_sound(&model->friction_angle) && response->area != NULL &&
-           (model->moving_blades == 1 || model->moving_blades == 2) &&
-           (model->closure == SC_CLOSURE_WORK || model->closure == SC_CLOSURE_EQ4) &&
-           isfinite(model->upper_face) && isfinite(model->fracture_energy) &&
-           model->fracture_energy >= 0.0f && model->kappa > 0.0f && model->kappa <= 1.0f &&
-           isfinite(model->rate_damping) && model->rate_damping >= 0.0f &&
-           isfinite(model->friction_rate_eps) && model->friction_rate_eps > 0.0f &&
-           model->tip_station > 0.0f;
 }

@@ -48,6 +48,7 @@ typedef struct {
     int32_t moving_blades;   /* m: 1 or 2 */
     int32_t closure;
     int32_t render_friction;
+    int32_t release_falls; /* sc_model_release_falls: how a run finds its end */
     float upper_face;      /* y_top [m] */
     float fracture_energy; /* J_c h [N]; 0: nothing is cut */
     float kappa;           /* in (0, 1] */
@@ -62,6 +63,7 @@ typedef struct {
 typedef struct {
     float crack;      /* X [m] */
     int32_t detached; /* the material left the blade at its tip; until the blades open again */
+    int32_t edge_knot, response_knot; /* where to look first; any value is right */
 } sc_crack;
 
 typedef struct {
@@ -93,7 +95,13 @@ void sc_model_step_many(const sc_model *model, sc_crack *state, int64_t n, const
 void sc_model_torque_many(const sc_model *model, int64_t n, const float *opening, const float *rate,
                           const float *contact, float *torque);
 
-/* 1 if all tables and numbers are valid. */
+/* 1 if all tables and numbers are valid: friction and its factor nowhere below 0, a response from
+ * (0, 0) whose values never fall. */
 int sc_model_is_sound(const sc_model *model);
+
+/* 1 if at every opening of the range the release falls outwards along the blade, once it has passed its
+ * largest value, as far as it decides where a crack stops. Then a run needs no scan of the edge's
+ * knots. Store the answer in release_falls, once; 0 there is always right, and slower. */
+int sc_model_release_falls(const sc_model *model);
 
 #endif

@@ -33,7 +33,8 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->advance_error_limit > 0.0f && config->tick_us > 0 &&
            isfinite(config->opening_low) && isfinite(config->opening_high) &&
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
-           config->advance_rate_limit > 0.0f && sc_watch_config_is_sound(&config->watch);
+           config->advance_rate_limit > 0.0f && isfinite(config->motor_sign) &&
+           sc_watch_config_is_sound(&config->watch);
 }
 
 /* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
@@ -281,9 +282,9 @@ static void repeat_command(const sc_servo_config *config, sc_servo *servo, sc_co
     write_command(servo, (uint16_t)servo->command_flags, command);
 }
 
-int sc_servo_step(const sc_servo_config *config, const sc_model *model,
-                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
-                  const sc_state *state, sc_command *command)
+static int step(const sc_servo_config *config, const sc_model *model,
+                const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                const sc_state *state, sc_command *command)
 {
     sc_servo_obey(orders, servo);
     if (servo->started && state->sequence == servo->sequence) {
@@ -295,6 +296,7 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     begin_sample(servo, state);
     count_frame(servo, state);
     servo->stale_us = 0;
+    sc_lag_state(&servo->lag, servo->mode, state->sequence);
     const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
     float dt = 0.0f;
     if (valid) {
@@ -329,11 +331,24 @@ int sc_servo_step(const sc_servo_config *config, const sc_model *model,
     return 1;
 }
 
+int sc_servo_step(const sc_servo_config *config, const sc_model *model,
+                  const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
+                  const sc_state *state, sc_command *command)
+{
+    const float sign = config->motor_sign < 0.0f ? -1.0f : 1.0f;
+    sc_state corrected = *state;
+    corrected.motor_torque *= sign;
+    const int fresh = step(config, model, reference, orders, servo, &corrected, command);
+    command->torque *= sign;
+    return fresh;
+}
+
 void sc_servo_sent(sc_servo *servo)
 {
     servo->sent_torque = servo->torque;
     servo->sent_force = servo->force;
     servo->slew_us = 0;
+    sc_lag_sent(&servo->lag, servo->sequence);
 }
 
 void sc_servo_not_sent(sc_servo *servo)

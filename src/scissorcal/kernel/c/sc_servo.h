@@ -14,6 +14,7 @@
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
 
+#include "sc_lag.h"
 #include "sc_model.h"
 #include "sc_motion.h"
 #include "sc_watch.h"
@@ -70,6 +71,8 @@ typedef struct {
                                   the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
+    float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
+                                  measured; everything else here is of corrected signs */
     sc_watch_config watch;
 } sc_servo_config;
 
@@ -169,6 +172,7 @@ typedef struct {
     uint64_t device_saturated;
     uint64_t fallback_frames;
     uint64_t faults;
+    sc_lag lag;
 } sc_servo;
 
 /* Let time pass, by the host's clock: call it before the states that arrived then, also when none

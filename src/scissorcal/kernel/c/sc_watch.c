@@ -225,7 +225,7 @@ static int compare_torques(const sc_watch_config *config, sc_watch *watch, const
     if (watch->driven_s < SETTLED_S) {
         return SC_WATCH_NOTHING;
     }
-    const float kept = expf(-in->time_s / FORGET_S);
+    const float kept = FORGET_S / (FORGET_S + in->time_s);
     watch->sum_cc = kept * watch->sum_cc + in->time_s * watch->smooth_torque * watch->smooth_torque;
     watch->sum_cm =
         kept * watch->sum_cm + in->time_s * watch->smooth_torque * watch->smooth_measured;

@@ -14,6 +14,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.probe import PROBE_KEY
 from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
 from scissorcal.report.numbers import display, scalar
 from scissorcal.report.panel import Panel, Row, Value, count, number, words
@@ -176,7 +177,9 @@ def _source_row(source: Source, summary: RecordingSummary | None) -> Row:
     if summary is None:
         note = "The recording was not handed to this report."
         return Row(source.source, tuple(values), note)
-    device = ", ".join(f"{key} {display(scalar(v))}" for key, v in summary.device.items())
+    device = ", ".join(
+        f"{key} {display(scalar(v))}" for key, v in summary.device.items() if key != PROBE_KEY
+    )
     values += [
         words("kind", f"{summary.kind}, {summary.joint} joint"),
         number("length", summary.duration_s, "s", digits=4),

@@ -20,6 +20,7 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
+from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace, create_workspace
 
@@ -225,10 +226,13 @@ def _capture(root: Path, seed: int) -> None:
     recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
     specimen, streams = _drawn(recipe, seed)
     link = LockstepLink(specimen, streams[0])
-    with open_writer(workspace.new_recording("friction"), "friction", link, recipe, text) as writer:
-        capture_friction(link, recipe, writer)
-    with open_writer(workspace.new_recording("cut"), "cut", link, recipe, text) as writer:
-        capture_cut(link, recipe, writer)
+    probe = ensure_probed(workspace, link, recipe)
+    path = workspace.new_recording("friction")
+    with open_writer(path, "friction", link, recipe, text, probe=probe) as writer:
+        capture_friction(link, recipe, writer, probe=probe)
+    path = workspace.new_recording("cut")
+    with open_writer(path, "cut", link, recipe, text, probe=probe) as writer:
+        capture_cut(link, recipe, writer, probe=probe)
     link.close()
 
 
@@ -241,6 +245,7 @@ def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
         if not fit.structure["symmetric"]:
             sides["coulomb_pos"] += sides["offset"]
             sides["coulomb_neg"] -= sides["offset"]
+            sides["offset"] = 0.0
             return sides
         truth = true_parameters(specimen, angle_center=center, symmetric=True)
         truth["offset"] += 0.5 * (sides["coulomb_pos"] - sides["coulomb_neg"])
@@ -274,8 +279,10 @@ def _render(
     from scissorcal.render import open_writer, render
 
     package = open_package(workspace.package_path(recipe), warn=False)
+    probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("render")
-    with open_writer(path, link, package, read_text(workspace.recipe_path)) as writer:
+    text = read_text(workspace.recipe_path)
+    with open_writer(path, link, package, text, probe=probe) as writer:
         result = render(link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer)
     return package, result, path
 

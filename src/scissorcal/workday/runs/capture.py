@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.requirements import CaptureKind, requirements
-from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.runs.probe import Say, ensure_probed, last_probe
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -31,17 +32,21 @@ def capture_into(
     *,
     hand: bool = False,
     seed: int = 0,
+    baud: int | None = None,
     realtime: bool = False,
     progress: "CaptureProgress | None" = None,
     confirm: "Confirm | None" = None,
+    say: "Say | None" = None,
 ) -> Captured:
     """Record friction or cuts from ``device`` into captures/<kind>-<stamp>.mcap.
 
     ``device`` is a port, or "sim" for a virtual rig with the recipe's specimen, in virtual time
-    unless ``realtime``; each of its recordings of one ``seed`` has another noise. ``hand`` (cuts
+    unless ``realtime``; each of its recordings of one ``seed`` has another noise. ``baud`` takes
+    the place of the recipe's rate. ``hand`` (cuts
     only): motors off, a person or the virtual hand moves the handles. ``confirm`` asks a person to
-    load material; a virtual rig loads by itself. Whatever was recorded before an error stays in
-    the file.
+    load material; a virtual rig loads by itself. A rig without a probe that counts is probed first
+    (`ensure_probed`), and ``say`` tells so; a hand's capture needs none. Whatever was recorded
+    before an error stays in the file.
 
     Raises InputError where the scene needs no such capture, and what the capture itself raises.
     """
@@ -51,12 +56,19 @@ def capture_into(
     if not requirements(recipe).needs_capture(kind):
         raise InputError(f"{workspace.recipe_path}: this scene needs no capture of {kind}.")
     text = read_text(workspace.recipe_path)
+    line = line_of(recipe, baud)
     run = len(workspace.recordings(kind))
-    with open_rig(device, recipe.specimen, seed, run=run, realtime=realtime) as link:
+    with open_rig(device, recipe.specimen, seed, run=run, realtime=realtime, line=line) as link:
+        if hand:
+            probe = last_probe(workspace, link)
+        else:
+            probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording(kind)
-        with open_writer(path, kind, link, recipe, text, hand=hand) as writer:
+        with open_writer(path, kind, link, recipe, text, hand=hand, probe=probe) as writer:
             if kind == "friction":
-                report = capture_friction(link, recipe, writer, progress, confirm=confirm)
+                report = capture_friction(
+                    link, recipe, writer, progress, confirm=confirm, probe=probe
+                )
             else:
-                report = capture_cut(link, recipe, writer, hand, progress, confirm)
+                report = capture_cut(link, recipe, writer, hand, progress, confirm, probe)
         return Captured(path, report, f"{link.identity.name} {link.identity.serial}")

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import open_rig
+from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.runs.probe import Say, ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
     from scissorcal.render import RenderResult, VirtualStrokes
-    from scissorcal.render.engine import Progress
+    from scissorcal.render.watch import Progress
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,18 @@ def render_workspace(
     strokes: "VirtualStrokes | None" = None,
     record: bool = True,
     seed: int = 0,
+    baud: int | None = None,
     realtime: bool = False,
     progress: "Progress | None" = None,
     confirm: "Confirm | None" = None,
+    say: "Say | None" = None,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
     ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``, in
-    virtual time unless ``realtime``. The samples go to captures/render-<stamp>.mcap unless
-    ``record`` is False. Raises MissingError
+    virtual time unless ``realtime``; ``baud`` takes the place of the recipe's rate. The samples go
+    to captures/render-<stamp>.mcap unless ``record`` is False. A rig without a probe that counts is
+    probed first (`ensure_probed`), and ``say`` tells so. Raises MissingError
     where there is no package, and what opening it, the rig and the rendering raise.
     """
     from scissorcal.package import open_package
@@ -51,17 +55,25 @@ def render_workspace(
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
-    with open_rig(device, recipe.specimen, seed, realtime=realtime) as link:
+    line = line_of(recipe, baud)
+    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
         rig = f"{link.identity.name} {link.identity.serial}"
+        probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording("render") if record else None
         text = read_text(workspace.recipe_path)
-        recording = open_writer(path, link, package, text) if path else nullcontext()
+        sign = recipe.rig.motor_sign
+        recording = (
+            open_writer(path, link, package, text, motor_sign=sign, probe=probe)
+            if path
+            else nullcontext()
+        )
         with recording as writer:
             done = render(
                 link,
                 package,
                 seconds=seconds,
                 limits=recipe.limits,
+                motor_sign=sign,
                 strokes=strokes,
                 writer=writer,
                 progress=progress,

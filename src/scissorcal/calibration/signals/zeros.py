@@ -1,0 +1,192 @@
+"""Zeros of torque and force sensor: measured at idle, subtracted, and known to within an sd."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.signals.idle import IdlePeriod, idle_periods
+from scissorcal.recording.recording import Recording
+from scissorcal.verdicts import Verdict, judge, not_evaluated
+
+Array = NDArray[np.float64]
+
+SURE = 2.0
+"""Standard deviations of what is left of a zero that a verdict counts."""
+LARGEST = 1.0
+"""A zero beyond all that drives the joint (rms) is no zero: a sensor is loaded or damaged."""
+FELT = 0.07
+"""Share of the drive that people can just notice: about 7 % of a force (docs/how-to-choose.md)."""
+BRIDGE = 1.0 / np.sqrt(12.0)
+"""A random walk that is known at both ends and differs by d there has a mean within d / sqrt(12) of
+the straight line between them (variance of a Brownian bridge's mean)."""
+FINEST = 1e-3
+"""Least sd of a zero, as a share of that of one that nobody measured."""
+
+
+@dataclass(frozen=True)
+class DriveZero:
+    """What the sensors show while nothing drives the joint, over one or more recordings.
+
+    ``torque`` (N m or N) and ``force_N`` are means, ``drive`` is both together at the joint and
+    ``sd`` is how well that is known over a recording, with ``drift`` between its beginning and end
+    (NaN where only one end shows it). ``seconds`` of idle time show them, 0 for none.
+    """
+
+    torque: float
+    force_N: float
+    drive: float
+    sd: float
+    drift: float
+    seconds: float
+
+    @property
+    def measured(self) -> bool:
+        """Whether any idle period shows it."""
+        return self.seconds > 0.0
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Plain numbers, for the diagnostics of a fit."""
+        return {
+            "zero_torque": self.torque,
+            "zero_force_N": self.force_N,
+            "zero_drive": self.drive,
+            "zero_drive_sd": self.sd,
+            "zero_drift": self.drift if np.isfinite(self.drift) else None,
+            "zero_idle_s": self.seconds,
+        }
+
+    @classmethod
+    def from_dict(cls, plain: Any) -> "DriveZero | None":
+        """Read what `as_dict` gave; None for a fit that knew no zeros."""
+        if "zero_drive_sd" not in plain:
+            return None
+        drift = plain["zero_drift"]
+        return cls(
+            float(plain["zero_torque"]),
+            float(plain["zero_force_N"]),
+            float(plain["zero_drive"]),
+            float(plain["zero_drive_sd"]),
+            float("nan") if drift is None else float(drift),
+            float(plain["zero_idle_s"]),
+        )
+
+
+def without_zeros(
+    recordings: tuple[Recording, ...], unmeasured_sd: float, known: DriveZero | None = None
+) -> tuple[tuple[Recording, ...], DriveZero | None]:
+    """Subtract each recording's zeros from its torque and force; say what is left.
+
+    A zero runs straight from one idle period to the next. ``unmeasured_sd`` is that of a recording
+    without any; ``known``, if given, is then taken for it, as of a fit before. The zero is None
+    where no recording has commands: such files (imports) do not show when motors were off, and
+    stay as they are.
+    """
+    if not any(np.any(recording.samples["torque_command"]) for recording in recordings):
+        return recordings, None
+    cleaned, zeros = [], []
+    for recording in recordings:
+        periods = idle_periods(recording)
+        zero = _zero_of(periods, unmeasured_sd)
+        if not zero.measured and known is not None:
+            zero = replace(known, sd=max(known.sd, abs(known.drive) * BRIDGE), seconds=0.0)
+        zeros.append(zero)
+        cleaned.append(_subtracted(recording, periods, zero))
+    return tuple(cleaned), _joined(zeros)
+
+
+def zero_verdicts(
+    scope: str, zero: DriveZero | None, recordings: tuple[Recording, ...], drive_rms: float
+) -> tuple[Verdict, ...]:
+    """Judge size and drift of the zeros against what drives the joint (rms)."""
+    if zero is None:
+        why = (
+            "No recording says when motors were off, so nothing shows the sensors' zeros; they are "
+            "taken as 0."
+        )
+        return (not_evaluated(scope, "sensor zeros", why, LARGEST),)
+    unit = recordings[0].joint.effort_unit
+    rest = SURE * zero.sd / drive_rms if drive_rms > 0.0 else float("inf")
+    if not zero.measured:
+        why = (
+            f"No idle second shows the sensors' zeros: they are taken as {zero.drive:.2g} {unit} "
+            f"with an sd of {zero.sd:.2g} {unit}, which is in the intervals of friction's levels. "
+            "Record one second at idle, motors and hands off, at the beginning and at the end."
+        )
+        return (not_evaluated(scope, "sensor zeros", why, FELT, rest),)
+    share = abs(zero.drive) / drive_rms if drive_rms > 0.0 else float("inf")
+    radius = recordings[0].handle_radius_m
+    parts = {"the torque sensor": zero.torque, "the force sensor": -radius * zero.force_N}
+    worst = max(parts, key=lambda name: abs(parts[name]) if np.isfinite(parts[name]) else 0.0)
+    shown = f"{zero.torque:.2g} {unit}"
+    if np.isfinite(radius):
+        shown += f" of torque and {zero.force_N:.2g} N of force"
+    said = (
+        f"At idle ({zero.seconds:.2g} s) the sensors show {shown}, {zero.drive:.2g} {unit} at the "
+        f"joint ({share:.0%} of the drive). It is subtracted."
+    )
+    large = f" That is no zero: unload {worst}, check its mounting, tare it and record again."
+    if np.isfinite(zero.drift):
+        moved = f"Zeros moved by {zero.drift:.2g} {unit} from beginning to end"
+    else:
+        moved = "Only one end of the recording shows zeros"
+    moved += f"; what is left of them has an sd of {zero.sd:.2g} {unit}, which is in the intervals."
+    warm = f" Let {worst} warm up for half an hour, tare it and record again."
+    return (
+        judge(scope, "sensor zeros", share, LARGEST, said, said + large),
+        judge(scope, "zero drift", rest, FELT, moved, moved + warm),
+    )
+
+
+def _zero_of(periods: tuple[IdlePeriod, ...], unmeasured_sd: float) -> DriveZero:
+    """The zero of one recording from its idle periods.
+
+    With a single period it may have come from 0, at which sensors are tared, during the recording.
+    """
+    if not periods:
+        return DriveZero(0.0, 0.0, 0.0, unmeasured_sd, float("nan"), 0.0)
+    drive = np.array([period.drive for period in periods])
+    errors = np.array([period.drive_sd for period in periods])
+    steps, drift = drive, float("nan")
+    if len(periods) > 1:
+        steps, drift = np.diff(drive), float(drive[-1] - drive[0])
+    share = float(np.sqrt(np.mean(steps**2)) / np.sqrt(len(steps)))
+    sd = np.hypot(np.sqrt(np.mean(errors**2) / len(periods)), BRIDGE * share)
+    return DriveZero(
+        torque=float(np.mean([period.torque for period in periods])),
+        force_N=float(np.mean([period.force_N for period in periods])),
+        drive=float(drive.mean()),
+        sd=max(float(sd), FINEST * unmeasured_sd),
+        drift=drift,
+        seconds=float(sum(period.seconds for period in periods)),
+    )
+
+
+def _subtracted(
+    recording: Recording, periods: tuple[IdlePeriod, ...], zero: DriveZero
+) -> Recording:
+    """The recording less its zeros, on a line between idle periods."""
+    samples = recording.samples.copy()
+    time = [period.time_s for period in periods] or [0.0]
+    at = recording.device_time_s
+    torque = [period.torque for period in periods] or [zero.torque]
+    samples["motor_torque"] -= np.interp(at, time, torque)
+    if np.isfinite(recording.handle_radius_m):
+        force = [period.force_N for period in periods] or [zero.force_N]
+        samples["handle_force"] -= np.interp(at, time, force)
+    return replace(recording, samples=samples)
+
+
+def _joined(zeros: list[DriveZero]) -> DriveZero:
+    """One zero for all recordings: means, and the worst of what is left."""
+    worst = max(zeros, key=lambda zero: zero.sd)
+    drifts = [zero.drift for zero in zeros if np.isfinite(zero.drift)]
+    return DriveZero(
+        torque=float(np.mean([zero.torque for zero in zeros])),
+        force_N=float(np.mean([zero.force_N for zero in zeros])),
+        drive=float(np.mean([zero.drive for zero in zeros])),
+        sd=worst.sd,
+        drift=max(drifts, key=abs) if len(drifts) == len(zeros) else float("nan"),
+        seconds=min(zero.seconds for zero in zeros),
+    )

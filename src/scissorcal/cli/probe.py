@@ -1,0 +1,102 @@
+"""``scissorcal device probe``"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
+from scissorcal.cli.output import Answer, command, note, table
+
+if TYPE_CHECKING:
+    from scissorcal.device.probe.result import ProbeResult
+
+_ROWS = (
+    ("torque zero", "torque_zero_Nm", 1e3, "mN m"),
+    ("force zero", "force_zero_N", 1.0, "N"),
+    ("delay", "delay_s", 1e3, "ms"),
+    ("measured over commanded torque", "torque_gain", 1.0, ""),
+    ("inertia", "inertia_kg_m2", 1e6, "kg mm^2"),
+    ("dry friction", "coulomb_Nm", 1e3, "mN m"),
+    ("viscous friction", "viscous_Nm_s_per_rad", 1e3, "mN m s/rad"),
+)
+_FACTS = (
+    ("breakaway", "breakaway_Nm", 1e3, "mN m"),
+    ("encoder step", "encoder_step_rad", 1e6, "urad"),
+    ("command to flag", "command_lag_ticks", 1.0, "ticks"),
+    ("torque noise (sd)", "torque_noise_Nm", 1e3, "mN m"),
+    ("force noise (sd)", "force_noise_N", 1.0, "N"),
+    ("largest torque used", "largest_torque_Nm", 1e3, "mN m"),
+    ("largest rate seen", "largest_rate_rad_per_s", 1.0, "rad/s"),
+)
+
+
+@command
+def probe(
+    device: Device,
+    recipe: Annotated[
+        Path | None,
+        typer.Option(
+            "--recipe", dir_okay=False, help="A recipe file, where there is no workspace."
+        ),
+    ] = None,
+    realtime: Realtime = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    baud: Baud = None,
+    folder: Folder = None,
+) -> Answer:
+    """Check a rig before its motors run: line, sensors, watchdog, signs, delay, inertia, friction.
+
+    It listens for a second, then pushes the blades by a few encoder steps each way, within
+    rig.probe. Keep the space between the blades empty and let go of the handles. What it finds is
+    kept in device-probe.json; captures and renderings probe by themselves where that is missing or
+    old. What no motor may run with is refused with its cause (exit code 4).
+
+    \b
+    Example:
+      $ scissorcal device probe --device sim
+      scissorcal-sim office-paper: fit to run
+      ...
+    """
+    from scissorcal.cli.live_view import LiveView
+    from scissorcal.cli.opening import open_workspace
+    from scissorcal.device.probe.probe import ProbeRefusedError
+    from scissorcal.recipe.load import load_recipe
+    from scissorcal.workday.runs.probe import probe_device
+
+    workspace = None if recipe else open_workspace(folder)
+    given = workspace.recipe() if workspace else load_recipe(recipe or Path())
+    try:
+        with LiveView(ask=not yes) as view:
+            result = probe_device(
+                given,
+                device,
+                workspace=workspace,
+                seed=seed,
+                baud=baud,
+                realtime=realtime,
+                progress=view.show,
+                confirm=view.confirm,
+            )
+    except ProbeRefusedError as error:
+        note(_text(error.result))
+        raise
+    files = [workspace.probe_path] if workspace else []
+    head = f"{result.device}: fit to run\n\n"
+    return Answer(result.as_dict(), head + _text(result), result.verdicts, files)
+
+
+def _text(result: "ProbeResult") -> str:
+    """Estimates with their standard deviation, and the facts that people ask for."""
+    rows = [["", "estimate", "sd", ""]]
+    for label, name, scale, unit in _ROWS:
+        found = getattr(result, name)
+        if found is not None:
+            rows.append([label, f"{scale * found.mean:.4g}", f"{scale * found.sd:.2g}", unit])
+    facts = result.facts
+    for label, name, scale, unit in _FACTS:
+        if math.isfinite(facts.get(name, math.nan)):
+            rows.append([label, f"{scale * facts[name]:.4g}", "", unit])
+    return table(rows, right=[1, 2])

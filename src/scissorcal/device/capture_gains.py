@@ -1,0 +1,215 @@
+"""Gains of a motor-driven capture: from the recipe, from what a probe found, or typical ones."""
+
+import math
+from dataclasses import dataclass
+
+from scissorcal.device.control import Axis, Gains, Margins, PHASE_MARGIN_deg, loop_margins
+from scissorcal.device.control_design import Demand, design_gains
+from scissorcal.device.trajectory import (
+    ADVANCE_ACCELERATION,
+    ADVANCE_SPEED,
+    SWING_ACCELERATION,
+    TURN_ACCELERATION,
+)
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Identity
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import Kind
+from scissorcal.verdicts import Verdict, judge, not_evaluated
+
+OPENING_ERROR_RAD = 0.3
+ADVANCE_ERROR_M = 0.02
+"""A capture stops where the rig falls behind by more."""
+
+CUTOFFS_PER_TICK = (1.0, 0.4, 0.2, 0.1)
+"""Rate filters that are tried, in shares of the sampling rate: the first passes nearly all."""
+LEAST_FACTOR = 1.15
+COUNT_SHARE = 0.01
+"""Share of the motor's limit by which a count of the encoder may change the effort in any case:
+blades without dry friction may buzz so little."""
+SURE = 2.0
+"""Standard deviations by which inertia and delay may be worse than what a probe found."""
+ADVANCE_MASS_KG, ADVANCE_VISCOUS_N_s_per_m, ADVANCE_COULOMB_N = 0.8, 4.0, 0.8
+ADVANCE_FACTOR = 2.0
+"""A sledge with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half or
+double."""
+
+
+@dataclass(frozen=True)
+class Probed:
+    """What a probe found of the opening axis, with standard deviations.
+
+    ``delay_s``: from a measurement to the torque that answers it, through line, host and motor.
+    """
+
+    inertia_kg_m2: float
+    inertia_sd_kg_m2: float
+    viscous_Nm_s_per_rad: float
+    coulomb_Nm: float
+    delay_s: float
+    delay_sd_s: float
+
+
+@dataclass(frozen=True)
+class CaptureGains:
+    """Gains of both axes and the rate filter; ``verdicts`` say how far they are from swinging."""
+
+    opening: Gains
+    advance: Gains
+    rate_cutoff_Hz: float
+    verdicts: tuple[Verdict, ...]
+
+
+TYPICAL = CaptureGains(
+    opening=Gains(6.0, 0.06, 20.0),
+    advance=Gains(3000.0, 40.0, 10000.0),
+    rate_cutoff_Hz=120.0,
+    verdicts=(
+        not_evaluated(
+            "device",
+            "control margin",
+            "The gains are those of a typical rig, which is answered within 1 ms: nothing was "
+            "measured. Run 'scissorcal device probe', and they follow from the rig.",
+        ),
+    ),
+)
+"""Where no probe tells inertia, friction and delay: for 2e-4 kg m^2, 0.8 kg and up to 1 ms, which
+leaves 21 degrees of phase margin."""
+
+
+def capture_gains(
+    recipe: Recipe, identity: Identity, kind: Kind, probed: Probed | None
+) -> CaptureGains:
+    """Gains of a capture: numbers of the recipe first, then by design, else the typical ones.
+
+    With ``probed``, gains keep 45 degrees and a factor of 2 at any inertia within two standard
+    deviations (``design_gains``); numbers of the recipe are judged by the same margins. Raises
+    DeviceError where gains of the recipe would make the loop swing, or where no gains can follow
+    the plan because of the delay.
+    """
+    stated = _stated(recipe)
+    if probed is None:
+        opening, advance = (
+            _merged(own, typical)
+            for own, typical in zip(stated, (TYPICAL.opening, TYPICAL.advance), strict=True)
+        )
+        return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, TYPICAL.verdicts)
+    axes = _axes(recipe, identity, probed)
+    demands = _demands(recipe, kind)
+    cutoffs = tuple(share * 1e6 / identity.tick_us for share in CUTOFFS_PER_TICK)
+    found: list[Gains] = []
+    margins: list[Margins] = []
+    for name, axis, demand, own in zip(("opening", "advance"), axes, demands, stated, strict=True):
+        if all(value is not None for value in own):
+            gains, at = Gains(*(float(value or 0.0) for value in own)), cutoffs[:1]
+        else:
+            design = design_gains(axis, demand, cutoffs, name)
+            gains, at = _merged(own, design.gains), (design.axis.rate_cutoff_Hz,)
+        cutoffs = at if name == "opening" else cutoffs
+        margins.append(_checked(axis.filtered(at[0]), gains, name))
+        found.append(gains)
+    return CaptureGains(found[0], found[1], cutoffs[0], (_verdict(margins, axes[0].delay_s),))
+
+
+def _stated(recipe: Recipe) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
+    """Numbers of the recipe for kp, kd and ki of opening and advance; None where it says "auto"."""
+    control = recipe.rig.control
+    rows = (
+        (
+            control.opening_kp_Nm_per_rad,
+            control.opening_kd_Nm_s_per_rad,
+            control.opening_ki_Nm_per_rad_s,
+        ),
+        (control.advance_kp_N_per_m, control.advance_kd_N_s_per_m, control.advance_ki_N_per_m_s),
+    )
+    opening, advance = (
+        tuple(None if value == "auto" else float(value) for value in row) for row in rows
+    )
+    return opening, advance
+
+
+def _merged(own: tuple[float | None, ...], other: Gains) -> Gains:
+    kp, kd, ki = (
+        there if value is None else value
+        for value, there in zip(own, (other.kp, other.kd, other.ki), strict=True)
+    )
+    return Gains(kp, kd, ki)
+
+
+def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axis]:
+    """Opening and advance as the controller meets them; the filter of the rate is still open."""
+    torque = COUNT_SHARE * min(recipe.limits.torque_Nm, identity.torque_limit)
+    force = COUNT_SHARE * min(recipe.limits.force_N, identity.force_limit)
+    tick, delay = identity.tick_us * 1e-6, probed.delay_s + SURE * probed.delay_sd_s
+    factor = 1.0 + SURE * probed.inertia_sd_kg_m2 / probed.inertia_kg_m2
+    opening = Axis(
+        inertia=probed.inertia_kg_m2,
+        viscous=max(0.0, probed.viscous_Nm_s_per_rad),
+        coulomb=probed.coulomb_Nm,
+        delay_s=delay,
+        tick_s=tick,
+        step=identity.opening_resolution,
+        rate_cutoff_Hz=0.0,
+        most_per_count=max(probed.coulomb_Nm, torque),
+        inertia_factor=max(LEAST_FACTOR, factor),
+    )
+    advance = Axis(
+        inertia=ADVANCE_MASS_KG,
+        viscous=ADVANCE_VISCOUS_N_s_per_m,
+        coulomb=ADVANCE_COULOMB_N,
+        delay_s=delay,
+        tick_s=tick,
+        step=identity.advance_resolution,
+        rate_cutoff_Hz=0.0,
+        most_per_count=max(ADVANCE_COULOMB_N, force),
+        inertia_factor=ADVANCE_FACTOR,
+    )
+    return opening, advance
+
+
+def _demands(recipe: Recipe, kind: Kind) -> tuple[Demand, Demand]:
+    """What the plan asks of opening and advance."""
+    advance = Demand(ADVANCE_SPEED, ADVANCE_ACCELERATION, 0.0, ADVANCE_ERROR_M)
+    if kind == "friction":
+        fastest = max(recipe.capture.friction.speeds_rad_per_s)
+        return Demand(fastest, SWING_ACCELERATION, 0.0, OPENING_ERROR_RAD), advance
+    fastest = max(recipe.capture.cut.speeds_rad_per_s)
+    return Demand(fastest, TURN_ACCELERATION, _load(recipe), OPENING_ERROR_RAD), advance
+
+
+def _load(recipe: Recipe) -> float:
+    """Torque that the material may take: by the medians of the recipe's priors.
+
+    A straight edge through the pivot cuts at J_c h (x + phi tan(psi)) / (m tan(psi)), with psi the
+    blade's angle (docs/model.md); a sheet that is only pressed takes force times lever.
+    """
+    settings = recipe.fit.cut
+    contact = 1e-3 * max(recipe.scene.contact_mm)
+    toughness = settings.toughness_J_per_m2
+    if not recipe.scene.cut or toughness is None:
+        return settings.response_force_N.median * contact
+    energy = toughness.median * recipe.material.thickness_mm * 1e-3
+    blade = min(recipe.scene.opening_rad) / recipe.rig.moving_blades
+    slope = math.tan(max(blade, math.radians(1.0)))
+    return energy * contact * (1.0 + slope**2) / (recipe.rig.moving_blades * slope)
+
+
+def _checked(axis: Axis, gains: Gains, name: str) -> Margins:
+    margins = loop_margins(axis, gains)
+    if margins.stable:
+        return margins
+    raise DeviceError(
+        f"The gains of the {name} in the recipe's rig.control would make the rig swing: an effort "
+        f"acts {1e3 * axis.delay_s:.2g} ms after the measurement that it answers. Lower them, or "
+        'set them to "auto", so that they follow from the probe.'
+    )
+
+
+def _verdict(margins: list[Margins], delay_s: float) -> Verdict:
+    worst = min(margins, key=lambda one: one.phase_deg)
+    said = (
+        f"{worst.phase_deg:.0f} degrees of phase margin and a gain margin of {worst.gain:.1f} at a "
+        f"delay of {1e3 * delay_s:.2g} ms."
+    )
+    remedy = """ Lower the gains in rig.control, or set them to "auto"."""
+    return judge("device", "control margin", worst.phase_deg, PHASE_MARGIN_deg, said, said + remedy)

@@ -1,0 +1,173 @@
+"""Gains of the capture's controller, from what it moves and how late it is answered. Pure."""
+
+import math
+from dataclasses import dataclass, replace
+
+from scissorcal.device.control import (
+    GAIN_MARGIN,
+    Axis,
+    Gains,
+    Margins,
+    PHASE_MARGIN_deg,
+    count_effort,
+    loop_margins,
+    open_loop,
+    sag,
+    spread_of_error,
+)
+from scissorcal.errors import DeviceError
+
+FASTEST_CROSSOVER_rad_per_s = 3.0 * 2.0 * math.pi * 15.0
+"""Three times the excitation's highest tone: a faster loop would follow no planned motion better,
+and would meet resonances of blades and drive that nobody has measured."""
+SLOWEST_CROSSOVER_rad_per_s = 5.0
+STEPS = 40
+LEADS = (2.0, 2.5, 3.0, 4.0)
+"""Crossover over the corner at which the rate takes over from the error: 63 to 76 degrees of lead,
+of which delay, filter and integral take their part."""
+INTEGRALS = (1.25, 2.0, 4.0)
+"""That corner over the integral's."""
+LEAST_DELAY_S = 1e-4
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a capture asks of an axis: it must not fall behind by ``error_limit``.
+
+    ``rate`` and ``acceleration`` are the plan's largest, ``load`` is the effort that material may
+    take beside friction.
+    """
+
+    rate: float
+    acceleration: float
+    load: float
+    error_limit: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """Gains for an axis, with its rate filter, and the margins that they leave."""
+
+    axis: Axis
+    gains: Gains
+    margins: Margins
+
+
+def design_gains(
+    axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...], name: str = "opening"
+) -> Design:
+    """The gains, and one of ``cutoffs_Hz`` for the rate, that follow best with the stated margins.
+
+    Sought is the smallest squared error after a step of friction or load, with a crossover of at
+    most FASTEST_CROSSOVER_rad_per_s. A count of the encoder changes the effort by no more than
+    ``most_per_count``: beyond dry friction the blades would buzz at rest (Diolaiti et al. 2006,
+    doi:10.1109/TRO.2005.862487).
+    Raises DeviceError, with the delay that would do, where the best gains are too weak.
+
+    >>> axis = Axis(2.1e-4, 0.002, 0.015, delay_s=1e-3, tick_s=1e-3, step=4.8e-5,
+    ...             rate_cutoff_Hz=0.0, most_per_count=0.015, inertia_factor=1.2)
+    >>> design = design_gains(axis, Demand(1.5, 20.0, 0.1, 0.3), (400.0, 1000.0))
+    >>> round(design.gains.kp, 1), round(design.margins.phase_deg), design.axis.rate_cutoff_Hz
+    (3.0, 45, 1000.0)
+    """
+    found = _best(axis, cutoffs_Hz)
+    if found is not None and _strong_enough(found, demand):
+        return found
+    raise DeviceError(_refusal(axis, demand, cutoffs_Hz, name, found))
+
+
+def largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
+    """How far the axis may fall behind: at a reversal, accelerating, as the load sets in.
+
+    All of it at once, as a step: simulated captures fall behind by about half of it.
+    """
+    effort = (
+        2.0 * axis.coulomb
+        + axis.viscous * demand.rate
+        + axis.inertia * demand.acceleration
+        + demand.load
+    )
+    return effort * sag(axis, gains)
+
+
+def _strong_enough(found: Design, demand: Demand) -> bool:
+    return largest_deviation(found.axis, found.gains, demand) <= demand.error_limit
+
+
+def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
+    """The design of least error that keeps the margins; None where there is none."""
+    least, found = math.inf, None
+    for cutoff in cutoffs_Hz:
+        filtered = axis.filtered(cutoff)
+        for lead in LEADS:
+            for integral in INTEGRALS:
+                one = _fastest(filtered, lead, integral)
+                error = math.inf if one is None else spread_of_error(filtered, one.gains)
+                if error < least:
+                    least, found = error, one
+    return found
+
+
+def _fastest(axis: Axis, lead: float, integral: float) -> Design | None:
+    """The design of highest crossover of one shape, if any keeps the margins."""
+    ratio = FASTEST_CROSSOVER_rad_per_s / SLOWEST_CROSSOVER_rad_per_s
+    for step in range(STEPS):
+        omega = FASTEST_CROSSOVER_rad_per_s * ratio ** (-step / (STEPS - 1))
+        if omega * axis.tick_s > 0.5 * math.pi:
+            continue
+        gains = _shaped(axis, omega, lead, integral)
+        if count_effort(axis, gains) > axis.most_per_count:
+            continue
+        margins = loop_margins(axis, gains)
+        if margins.enough:
+            return Design(axis, gains, margins)
+    return None
+
+
+def _shaped(axis: Axis, omega: float, lead: float, integral: float) -> Gains:
+    """Gains whose loop crosses one at ``omega``."""
+    corner = omega / lead
+    shape = Gains(corner, 1.0, corner * corner / integral)
+    size = 1.0 / abs(complex(open_loop(axis, shape, omega)))
+    return Gains(size * shape.kp, size, size * shape.ki)
+
+
+def _refusal(
+    axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...], name: str, found: Design | None
+) -> str:
+    enough = _enough_delay(axis, demand, cutoffs_Hz)
+    behind = "and no gains keep that margin"
+    if found is not None:
+        far = largest_deviation(found.axis, found.gains, demand)
+        unit = "m" if name == "advance" else "rad"
+        behind = (
+            f"and the {name} would fall behind by up to {far:.2g} {unit}, beyond the "
+            f"{demand.error_limit:.2g} {unit} at which a capture stops"
+        )
+    told = (
+        f"An effort acts {1e3 * axis.delay_s:.2g} ms after the measurement that it answers. That "
+        f"is too late for this capture: gains with {PHASE_MARGIN_deg:.0f} degrees of phase margin "
+        f"and a gain margin of {GAIN_MARGIN:g} are weak, {behind}."
+    )
+    if enough is not None:
+        return (
+            f"{told} A delay of at most {1e3 * enough:.2g} ms would do: shorten the adapter's "
+            "latency timer, raise the baud rate, or plan slower strokes."
+        )
+    return (
+        f"{told} A shorter delay alone would not do: take a finer encoder or a faster tick, or "
+        "plan slower strokes."
+    )
+
+
+def _enough_delay(axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...]) -> float | None:
+    """The longest delay, below the axis's own, with which the capture can be followed."""
+    low, high, enough = 0.0, axis.delay_s, None
+    while high - low > LEAST_DELAY_S:
+        middle = 0.5 * (low + high)
+        found = _best(replace(axis, delay_s=middle), cutoffs_Hz)
+        if found is not None and _strong_enough(found, demand):
+            enough = low = middle
+        else:
+            high = middle
+    return enough

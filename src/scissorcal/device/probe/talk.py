@@ -1,0 +1,320 @@
+"""Talk with a rig state by state: what is heard, what is answered, and what may never happen.
+
+A stage of the probe is a generator: it yields the command that answers a state and gets the next
+state back, so that it reads from top to bottom. Limits are kept here, whatever a stage asks for.
+"""
+
+import math
+import select
+import time
+from collections.abc import Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.link import Link, PortLink
+from scissorcal.device.lockstep_motion import Exchanging
+from scissorcal.device.motion import STOP_MARGIN_RAD
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag, decode, encode
+from scissorcal.kernel.servo import OPENING_RATE_LIMIT
+
+Done = TypeVar("Done")
+
+SILENCE_S = 1.0
+"""As in the servo: a device that sends nothing for a second is gone."""
+RELEASE_COMMANDS = 3
+RATE_OVER_S = 4e-3
+"""Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
+STALL_TICKS = 5
+"""As in the loop: a longer pause between two states by the host's clock is a stall."""
+STUCK_FRAMES = 20
+"""As in the servo."""
+U32 = 2**32
+
+HEARD = np.dtype(
+    [
+        ("sequence", np.int64),
+        ("device_us", np.int64),
+        ("opening", np.float64),
+        ("advance", np.float64),
+        ("motor_torque", np.float64),
+        ("handle_force", np.float64),
+        ("flags", np.int64),
+        ("host_s", np.float64),
+        ("torque", np.float64),
+        ("force", np.float64),
+        ("answer_flags", np.int64),
+    ]
+)
+"""A state with its answer; ``answer_flags`` is -1 for a state that was not answered. Sequence and
+clock are unwrapped; signs of torque are the corrected ones."""
+
+
+class Answer(NamedTuple):
+    """What the motors shall do: a torque (N m) and a force (N) with ENABLE, or nothing."""
+
+    torque: float = 0.0
+    force: float = 0.0
+    enable: bool = True
+    clear: bool = False
+
+
+RELEASE = Answer(enable=False)
+Stage = Generator[Answer | None, State, Done]
+"""Yields answers, or None to withhold one."""
+
+
+class RunawayError(DeviceError):
+    """The blades or the sledge moved faster or farther than the probe may move them."""
+
+
+class StalledError(RunawayError):
+    """The same, after this computer answered late: it held a torque for too long."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The largest torque (N m), force (N), rates (rad/s, m/s) and way (rad, m) of a probe."""
+
+    torque_Nm: float
+    force_N: float
+    rate_rad_per_s: float
+    speed_m_per_s: float
+    angle_rad: float
+    way_m: float
+
+
+class Talk(AbstractContextManager["Talk"]):
+    """Runs stages on a link; leaving the context releases the motors and ends the stream.
+
+    ``heard`` gives what was heard since a `mark`. ``largest_torque`` (N m) is the largest that was
+    asked for, ``largest_rate`` (rad/s) the largest that was seen while the motors were on.
+    """
+
+    def __init__(self, link: Link, bounds: Bounds, motor_sign: int = 1) -> None:
+        self.link = link
+        self.identity = link.identity
+        self.name = str(getattr(link, "name", "The device"))
+        self.bounds = bounds
+        self.largest_torque = self.largest_rate = 0.0
+        self.duplicates = 0
+        self._sign = motor_sign
+        self._rows: list[tuple[float, ...]] = []
+        self._origin: tuple[float, float] | None = None
+        self._frame: bytes | None = None
+        self._restarted = False
+        link.configure(ConfigKey.STREAM, 1.0)
+
+    @property
+    def tick_s(self) -> float:
+        """Seconds between two states, as the device states it."""
+        return self.identity.tick_us * 1e-6
+
+    def ticks(self, seconds: float) -> int:
+        """Give the number of ticks in a time, at least one."""
+        return max(1, round(seconds / self.tick_s))
+
+    def mark(self) -> int:
+        """Where `heard` may begin later."""
+        return len(self._rows)
+
+    def heard(self, since: int = 0) -> NDArray[np.void]:
+        """What was heard since a mark, shape (n,), HEARD."""
+        return np.array(self._rows[since:], dtype=HEARD)
+
+    def play(self, stage: Stage[Done], *, free: bool = False) -> Done:
+        """Run a stage to its end and return what it returns.
+
+        Torque and force are clipped to the bounds; motion beyond them ends in a RunawayError with
+        the motors off. ``free`` does not bound the way, for a stage that goes far on purpose.
+        Raises DeviceError where the device falls silent.
+        """
+        self._origin = None
+        try:
+            next(stage)
+            while True:
+                state = self._next_state()
+                answer = stage.send(state)
+                if answer is not None and answer.enable:
+                    self._guard(state, free)
+                self._answer(state, answer)
+        except StopIteration as over:
+            return over.value  # type: ignore[no-any-return]
+
+    @contextmanager
+    def allowing(self, torque_Nm: float) -> Iterator[None]:
+        """Allow a larger torque for a stage that has bounded its effect otherwise."""
+        before = self.bounds
+        self.bounds = replace(before, torque_Nm=torque_Nm)
+        try:
+            yield
+        finally:
+            self.bounds = before
+
+    def release(self) -> None:
+        """Switch the motors off, three times, in case a command is lost."""
+        with suppress(DeviceError):
+            for _ in range(RELEASE_COMMANDS):
+                self._answer(self._next_state(), RELEASE)
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+        with suppress(DeviceError):
+            self._pass()
+            self.link.configure(ConfigKey.STREAM, 0.0)
+
+    def _next_state(self) -> State:
+        """Wait for the next state; of several at once the newest, as the protocol asks."""
+        silent_s = 0.0
+        while silent_s < SILENCE_S:
+            began = self._now()
+            states = self._pass()
+            fresh = [state for state in states if self._note(state)]
+            if fresh:
+                return fresh[-1]
+            silent_s += max(self._now() - began, 0.0 if states else 1e-6)
+        raise DeviceError(
+            f"{self.name} stopped sending STATE frames; check its power and the cable, then start "
+            "again."
+        )
+
+    def _pass(self) -> list[State]:
+        """Send what waits to be sent; return what arrives."""
+        link, frame = self.link, self._frame
+        self._frame = None
+        if isinstance(link, PortLink):
+            if not select.select([link], [], [], SILENCE_S)[0]:
+                return []
+            return [found for found in link.receive(0.0) if isinstance(found, State)]
+        assert isinstance(link, Exchanging)
+        found = [decode(payload) for payload in link.exchange(frame)]
+        return [message for message in found if isinstance(message, State)]
+
+    def _note(self, state: State) -> bool:
+        """Keep a state; False for one that repeats the last."""
+        sequence, device_us = state.sequence, state.device_us
+        if self._rows:
+            last = self._rows[-1]
+            passed = (sequence - int(last[0])) % U32
+            if passed == 0:
+                self.duplicates += 1
+                return False
+            sequence = int(last[0]) + passed
+            device_us = int(last[1]) + (device_us - int(last[1])) % U32
+            self._restarted = self._restarted or passed > U32 // 2
+        torque = self._sign * state.motor_torque
+        self._rows.append(
+            (
+                sequence,
+                device_us,
+                state.opening,
+                state.advance,
+                torque,
+                state.handle_force,
+                state.flags,
+                self._now(),
+                0.0,
+                0.0,
+                -1,
+            )
+        )
+        return True
+
+    def _now(self) -> float:
+        """The host's clock in seconds: the virtual one where time is virtual."""
+        link = self.link
+        return link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
+
+    def _answer(self, state: State, answer: Answer | None) -> None:
+        if answer is None:
+            return
+        torque = _clipped(answer.torque, self.bounds.torque_Nm) if answer.enable else 0.0
+        force = _clipped(answer.force, self.bounds.force_N) if answer.enable else 0.0
+        self.largest_torque = max(self.largest_torque, abs(torque))
+        flags = (CommandFlag.ENABLE if answer.enable else 0) | (
+            CommandFlag.CLEAR_FAULT if answer.clear else 0
+        )
+        self._rows[-1] = (*self._rows[-1][:8], torque, force, int(flags))
+        command = Command(int(flags), state.sequence, self._sign * torque, force)
+        if isinstance(self.link, PortLink):
+            self.link.send(command)
+        else:
+            self._frame = encode(command)
+
+    def _guard(self, state: State, free: bool) -> None:
+        """Raise where the blades or the sledge move more than the probe may move them."""
+        place = (state.opening, state.advance)
+        wrong = self._what_is_wrong(state)
+        if wrong:
+            self.release()
+            raise RunawayError(f"{self.name}: {wrong} The motors are off.")
+        if self._origin is None:
+            self._origin = place
+        if state.flags & StateFlag.FAULT_LATCHED:
+            return
+        rate, speed = self._rates()
+        self.largest_rate = max(self.largest_rate, rate)
+        bounds, origin = self.bounds, self._origin
+        far = not free and abs(place[0] - origin[0]) > bounds.angle_rad
+        off = not free and abs(place[1] - origin[1]) > bounds.way_m
+        if rate > bounds.rate_rad_per_s or speed > bounds.speed_m_per_s or far or off:
+            last = max(abs(row[8]) for row in self._rows[-50:])
+            self.release()
+            what = (
+                f"the blades moved by {abs(place[0] - origin[0]):.3g} rad at {rate:.2g} rad/s"
+                if rate > bounds.rate_rad_per_s or far
+                else f"the sledge moved by {1e3 * abs(place[1] - origin[1]):.3g} mm at "
+                f"{speed:.2g} m/s"
+            )
+            late = np.diff([row[7] for row in self._rows[-STUCK_FRAMES:]])
+            stalled = bool(np.any(late > STALL_TICKS * self.tick_s))
+            raise (StalledError if stalled else RunawayError)(
+                f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, which is "
+                "more than rig.probe allows. Check that nothing else moves them (a hand, a spring, "
+                "gravity) and that the encoder's counts are right; the motors are off."
+            )
+
+    def _what_is_wrong(self, state: State) -> str:
+        """What no motor may run with, as a sentence; empty where nothing is."""
+        numbers = (state.opening, state.advance, state.motor_torque)
+        if not all(math.isfinite(number) for number in numbers):
+            return "it sent an opening, advance or torque that is no number; check its sensors."
+        if state.flags & StateFlag.ENCODER_FAULT:
+            return "it reports a fault of its encoder; check the encoder and its cable."
+        low, high = self.identity.opening_min, self.identity.opening_max
+        if not low - STOP_MARGIN_RAD <= state.opening <= high + STOP_MARGIN_RAD:
+            return (
+                f"its opening is {state.opening:.3g} rad, beyond the stops that it states "
+                f"({low:.3g} to {high:.3g}); home the encoder, or correct its scale."
+            )
+        recent = self._rows[-STUCK_FRAMES:]
+        if len(recent) == STUCK_FRAMES and recent[0][1] == recent[-1][1]:
+            return f"its clock (device_us) stood still for {STUCK_FRAMES} frames; restart it."
+        if self._restarted:
+            return "its sequence began again: it restarted. Check its supply."
+        if len(recent) > 1:
+            leap = abs(recent[-1][2] - recent[-2][2])
+            if leap > OPENING_RATE_LIMIT * (recent[-1][0] - recent[-2][0]) * self.tick_s:
+                return (
+                    f"the opening leapt by {leap:.2g} rad within a frame; check the encoder and "
+                    "its cable."
+                )
+        return ""
+
+    def _rates(self) -> tuple[float, float]:
+        """Magnitudes of the rates (rad/s, m/s) over the last few ticks."""
+        now = self._rows[-1]
+        span = max(2, self.ticks(RATE_OVER_S))
+        then = self._rows[-1 - span] if len(self._rows) > span else self._rows[0]
+        time_s = (now[0] - then[0]) * self.tick_s
+        if time_s <= 0.0:
+            return 0.0, 0.0
+        return abs(now[2] - then[2]) / time_s, abs(now[3] - then[3]) / time_s
+
+
+def _clipped(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

@@ -1,0 +1,120 @@
+"""Do the motors answer, how late, and do they brake when commands stop? All at zero torque."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.device.probe.idle import CLEARINGS
+from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import ConfigKey, StateFlag
+
+TOGGLES = 12
+LONGEST_TICKS_S = 0.1
+PAUSES = (7, 11, 5, 13, 9, 6)
+"""Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
+LATER_S = 0.05
+
+
+@dataclass(frozen=True)
+class Watchdog:
+    """What ENABLE and silence do.
+
+    ``lags`` (ticks): from the state that a command answers to the first state that shows it.
+    ``brake_after_ms`` is the value in force, None where the device refuses to tell;
+    ``braked_ms`` the silence after which it braked, None where it did not.
+    """
+
+    lags: tuple[int, ...]
+    never_enabled: bool
+    brake_after_ms: float | None
+    refused: str
+    braked_ms: float | None
+    latched: bool
+    lost_shown: bool
+    lost_cleared: bool
+    fault_cleared: bool
+
+
+def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
+    """Enable and release the motors at zero torque, then withhold commands.
+
+    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays.
+    """
+    lags = talk.play(_toggled(talk))
+    if not lags:
+        return Watchdog((), True, None, "", None, False, False, False, False)
+    refused, in_force = "", brake_after_ms
+    try:
+        in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
+    except DeviceError as error:
+        refused = str(error)
+    braked, latched, shown = talk.play(_silenced(talk, in_force))
+    lost_cleared, fault_cleared = talk.play(_recovered(talk))
+    return Watchdog(
+        tuple(lags),
+        False,
+        None if refused else in_force,
+        refused,
+        braked,
+        latched,
+        shown,
+        lost_cleared,
+        fault_cleared,
+    )
+
+
+def _toggled(talk: Talk) -> Stage[list[int]]:
+    """Switch ENABLE on and off; return after how many ticks each showed, [] where one never did."""
+    lags: list[int] = []
+    on = False
+    state = yield RELEASE
+    for toggle in range(TOGGLES):
+        answer = RELEASE if on else Answer()
+        on = not on
+        asked = state.sequence
+        for _ in range(talk.ticks(LONGEST_TICKS_S)):
+            state = yield answer
+            if bool(state.flags & StateFlag.MOTOR_ENABLED) is on:
+                lags.append((state.sequence - asked) % 2**32)
+                break
+        else:
+            return []
+        for _ in range(PAUSES[toggle % len(PAUSES)]):
+            state = yield answer
+    return lags
+
+
+def _silenced(talk: Talk, after_ms: float) -> Stage[tuple[float | None, bool, bool]]:
+    """Withhold commands; return the silence until the brake (ms), and which flags showed."""
+    state = yield RELEASE
+    for _ in range(talk.ticks(LATER_S)):
+        state = yield Answer()
+    last = state.sequence
+    for _ in range(talk.ticks(after_ms * 1e-3 + LATER_S)):
+        state = yield None
+        if state.flags & (StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST):
+            silent = ((state.sequence - last) % 2**32) * talk.tick_s
+            state = yield None
+            flags = state.flags
+            shown = bool(flags & StateFlag.COMMANDS_LOST)
+            return 1e3 * silent, bool(flags & StateFlag.FAULT_LATCHED), shown
+    return None, False, False
+
+
+def _recovered(talk: Talk) -> Stage[tuple[bool, bool]]:
+    """Send commands again; return whether COMMANDS_LOST clears by them, the fault when asked."""
+    state = yield RELEASE
+    for _ in range(talk.ticks(LATER_S)):
+        state = yield RELEASE
+    lost_cleared = not state.flags & StateFlag.COMMANDS_LOST
+    for _ in range(CLEARINGS):
+        if not state.flags & StateFlag.FAULT_LATCHED:
+            break
+        state = yield RELEASE._replace(clear=True)
+    return lost_cleared, not state.flags & StateFlag.FAULT_LATCHED
+
+
+def lag_ticks(lags: tuple[int, ...]) -> float:
+    """The mean lag in ticks."""
+    return float(np.mean(lags))

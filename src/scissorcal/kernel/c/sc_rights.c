@@ -1,0 +1,50 @@
+#define _GNU_SOURCE
+
+#include "sc_rights.h"
+
+#include <stdint.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+#ifdef __linux__
+#include <sys/syscall.h>
+#endif
+
+int sc_rights_lock_memory(void)
+{
+    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+}
+
+#if defined(__linux__) && defined(SYS_sched_setattr)
+
+static const uint64_t SHORTEST_SLICE_NS = 100000; /* the least that Linux takes */
+
+/* As in linux/sched/types.h, first version; not all systems have that header. */
+typedef struct {
+    uint32_t size;
+    uint32_t policy; /* 0: SCHED_OTHER */
+    uint64_t flags;
+    int32_t nice;
+    uint32_t priority;
+    uint64_t runtime_ns;
+    uint64_t deadline_ns;
+    uint64_t period_ns;
+} attributes;
+
+int sc_rights_short_slice(void)
+{
+    attributes wanted;
+    memset(&wanted, 0, sizeof wanted);
+    wanted.size = sizeof wanted;
+    wanted.runtime_ns = SHORTEST_SLICE_NS;
+    return syscall(SYS_sched_setattr, 0, &wanted, 0u) == 0;
+}
+
+#else
+
+int sc_rights_short_slice(void)
+{
+    return 0;
+}
+
+#endif

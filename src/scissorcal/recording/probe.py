@@ -1,0 +1,102 @@
+"""What the probe of a rig found before its motors ran: zeros, delay, inertia, friction.
+
+It stands here, and not with the probe, because it travels in recordings: a fit reads it there.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal
+
+from scissorcal.verdicts import Verdict
+
+FORMAT: Literal["scissorcal-probe/1"] = "scissorcal-probe/1"
+PROBE_KEY = "probe"
+"""The entry of a recording's ``device`` that holds the probe."""
+
+NORMAL_90 = 1.6448536269514722
+"""Half the width of an interval of 90 % of a normal distribution, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Mean and standard deviation of a posterior that is close to normal.
+
+    >>> Estimate(0.02, 0.001).interval
+    (0.01835514637304853, 0.021644853626951472)
+    """
+
+    mean: float
+    sd: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval of 90 %."""
+        return self.mean - NORMAL_90 * self.sd, self.mean + NORMAL_90 * self.sd
+
+
+@dataclass(frozen=True)
+class ProbeResult:
+    """What a probe found; an estimate is None where the device or the motion did not show it.
+
+    ``device`` names the rig, ``identity`` is the digest of all that it states, ``made_at`` the time
+    (UTC, ISO 8601). ``motor_sign`` is the recipe's: estimates are of corrected signs.
+
+    ``torque_zero_Nm`` and ``force_zero_N`` are what the sensors show with motors off and nobody at
+    the handles. ``delay_s``: from a measurement to the action of the torque that answers it,
+    through line, host and motor, as far as `motor_torque` and the device's flags show it.
+    ``torque_gain``: measured over commanded torque. Friction is at rest's edge (``coulomb_Nm``,
+    the mean of both directions) and ``viscous_Nm_s_per_rad``, both with ``inertia_kg_m2`` from
+    small motions: rough, not what a friction fit gives.
+
+    ``facts`` are plain numbers by name, with their unit in it.
+    """
+
+    device: str
+    identity: str
+    made_at: str
+    motor_sign: int = 1
+    torque_zero_Nm: Estimate | None = None
+    force_zero_N: Estimate | None = None
+    delay_s: Estimate | None = None
+    torque_gain: Estimate | None = None
+    inertia_kg_m2: Estimate | None = None
+    coulomb_Nm: Estimate | None = None
+    viscous_Nm_s_per_rad: Estimate | None = None
+    facts: Mapping[str, float] = field(default_factory=dict)
+    verdicts: tuple[Verdict, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give the probe as plain values, for JSON; a fact that is not finite becomes null."""
+        plain = asdict(self)
+        plain["facts"] = {
+            name: value if math.isfinite(value) else None for name, value in self.facts.items()
+        }
+        return {"format": FORMAT, **plain}
+
+
+def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
+    """The probe that a recording's ``device`` holds; None where it was made without one."""
+    plain = device.get(PROBE_KEY)
+    return None if plain is None else probe_from_dict(plain)
+
+
+def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
+    """Read what `ProbeResult.as_dict` gave. ValueError where it is something else."""
+    if plain.get("format") != FORMAT:
+        stated = plain.get("format")
+        raise ValueError(f"its format is {stated!r}, and this version reads {FORMAT!r}")
+    known = {item.name for item in fields(ProbeResult)}
+    values = {name: value for name, value in plain.items() if name in known}
+    try:
+        for name, value in values.items():
+            if isinstance(value, Mapping) and name != "facts":
+                values[name] = Estimate(float(value["mean"]), float(value["sd"]))
+        values["facts"] = {
+            name: math.nan if value is None else float(value)
+            for name, value in plain["facts"].items()
+        }
+        values["verdicts"] = tuple(Verdict(**verdict) for verdict in plain["verdicts"])
+        return ProbeResult(**values)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"it is not a whole probe ({error})") from None

@@ -1,0 +1,153 @@
+"""Probe a rig into a workspace: before its first motor run, and again where that is too old."""
+
+import json
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+from scissorcal.files import replacing
+from scissorcal.verdicts import failed
+from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.device.link import Link
+    from scissorcal.device.loading import Confirm
+    from scissorcal.device.probe.result import ProbeResult
+    from scissorcal.recipe.schema import Recipe
+
+Progress = Callable[[float, str], None]
+Say = Callable[[str], None]
+"""Shows one sentence to a person."""
+
+
+def probe_device(
+    recipe: "Recipe",
+    device: str,
+    *,
+    workspace: Workspace | None = None,
+    seed: int = 0,
+    baud: int | None = None,
+    realtime: bool = False,
+    progress: Progress | None = None,
+    confirm: "Confirm | None" = None,
+) -> "ProbeResult":
+    """Probe ``device`` (a port, or "sim") and keep the result in the workspace, if there is one.
+
+    "sim" is a virtual rig in virtual time, unless ``realtime``; ``baud`` takes the place of the
+    recipe's rate.
+
+    A probe that refuses the rig is kept as well, so that what it found can be looked up. Raises
+    what `scissorcal.device.probe.probe.probe` raises.
+    """
+    from scissorcal.device.probe.probe import probe
+
+    line = line_of(recipe, baud)
+    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
+        if workspace is None:
+            return probe(link, recipe, progress=progress, confirm=confirm)
+        return probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
+
+
+def probe_into(
+    workspace: Workspace,
+    link: "Link",
+    recipe: "Recipe",
+    *,
+    progress: Progress | None = None,
+    confirm: "Confirm | None" = None,
+) -> "ProbeResult":
+    """Probe the rig on a link, and keep what was found; as `probe_device`."""
+    from scissorcal.device.probe.probe import ProbeRefusedError, probe
+
+    try:
+        result = probe(link, recipe, progress=progress, confirm=confirm)
+    except ProbeRefusedError as error:
+        _store(workspace, error.result)
+        error.kept = (workspace.probe_path,)
+        raise
+    _store(workspace, result)
+    return result
+
+
+def ensure_probed(
+    workspace: Workspace,
+    link: "Link",
+    recipe: "Recipe",
+    *,
+    progress: Progress | None = None,
+    confirm: "Confirm | None" = None,
+    say: Say | None = None,
+    now: datetime | None = None,
+) -> "ProbeResult":
+    """The workspace's probe of this rig, or a new one where there is none that still counts.
+
+    One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
+    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was.
+    """
+    tell = say or (lambda sentence: None)
+    last = last_probe(workspace)
+    why = _why_again(last, link, recipe, now or datetime.now(UTC))
+    if last is not None and not why:
+        tell(f"The rig was probed at {last.made_at} ('scissorcal device probe' repeats it).")
+        return last
+    tell(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
+    result = probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
+    for verdict in result.verdicts:
+        if verdict.status == "not_evaluated" and verdict.value is not None:
+            tell(verdict.why)
+    return result
+
+
+def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult | None":
+    """The probe that the workspace keeps, if it is of the rig on ``link`` (of any without one).
+
+    None where there is none that can be read.
+    """
+    from scissorcal.device.probe.result import probe_from_dict
+
+    try:
+        found = probe_from_dict(json.loads(workspace.probe_path.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return None
+    if link is not None and _differs(found, link):
+        return None
+    return found
+
+
+def _most(recipe: "Recipe") -> str:
+    return f"{1e3 * recipe.rig.probe.largest_torque_Nm:g} mN m"
+
+
+def _why_again(last: "ProbeResult | None", link: "Link", recipe: "Recipe", now: datetime) -> str:
+    """Why a probe does not count, as part of a sentence; empty where it does."""
+    if last is None:
+        return "there is no probe of it yet"
+    if _differs(last, link):
+        return f"the last probe was of another rig, firmware or line ({last.device})"
+    if last.motor_sign != recipe.rig.motor_sign:
+        return "rig.motor_sign changed since"
+    if failed(last.verdicts):
+        return "the last probe refused it"
+    age = now - datetime.fromisoformat(last.made_at)
+    if not timedelta(0) <= age <= timedelta(hours=recipe.rig.probe.max_age_h):
+        return (
+            f"the last probe is older than {recipe.rig.probe.max_age_h:g} h (rig.probe.max_age_h)"
+        )
+    return ""
+
+
+def _differs(last: "ProbeResult", link: "Link") -> bool:
+    """Whether a probe is of another rig, or ran in virtual time where this one does not."""
+    from scissorcal.device.link import PortLink
+    from scissorcal.device.probe.probe import identity_digest
+    from scissorcal.device.probe.result import REAL_TIME
+
+    real = last.facts.get(REAL_TIME) == 1.0
+    return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)
+
+
+def _store(workspace: Workspace, result: "ProbeResult") -> None:
+    text = json.dumps(result.as_dict(), indent=2) + "\n"
+    with replacing(workspace.probe_path) as part:
+        part.write_text(text, encoding="utf-8")

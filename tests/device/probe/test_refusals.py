@@ -1,0 +1,161 @@
+"""What the probe says of a device that something is wrong with, and how far it moves it."""
+
+from dataclasses import replace
+
+import pytest
+
+from scissorcal.device.probe.probe import ProbeRefusedError, probe
+from scissorcal.device.probe.result import ProbeResult
+from scissorcal.errors import DeviceError, InputError
+from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
+from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+
+RECIPE = builtin_recipe("paper-80gsm")
+LARGEST_TORQUE = RECIPE.rig.probe.largest_torque_Nm * (1.0 + 1e-6)  # travels in 32 bits
+LARGEST_RATE = RECIPE.rig.probe.largest_rate_rad_per_s
+
+STILL = {
+    "encoder counted double": "beyond the stops that the device states",
+    "encoder noisy": "The opening jitters by",
+    "force sensor dead": "handle_force never changed",
+    "tick twice as long as stated": "so tick_us is wrong",
+    "clock in milliseconds": "it counts milliseconds",
+    "clock 5 % fast": "correct one of them in its firmware",
+    "handle radius misstated": "handle_radius is in metres",
+    "5 % of frames lost": "of the frames were lost",
+    "5 % of frames garbled": "garbled",
+    "watchdog deaf": "its watchdog is deaf",
+}
+"""Refused before a torque was commanded."""
+
+MOVED = {
+    "motor reversed": "Positive torque closes the blades",
+    "encoder reversed": "Set rig.motor_sign = -1 in the recipe or swap the motor's wires",
+    "encoder step misstated": "correct opening_resolution",
+    "measured torque reversed": "motor_torque has the opposite sign of the command",
+    "measured torque half": "its scale or the motor's torque constant is wrong",
+    "measured torque frozen": "motor_torque does not follow the command",
+    "sledge motor reversed": "Positive force retracts the sledge",
+    "sledge encoder reversed": "Positive force retracts the sledge",
+}
+
+LATER = {
+    "clock stands": "its clock (device_us) stood still",
+    "encoder stuck": "The blades did not move either way",
+    "measurements frozen": "The blades did not move either way",
+    "opening NaN": "no number",
+    "motor torque NaN": "no number",
+    "opening beyond the stops": "beyond the stops that it states",
+    "one leap of 0.25 rad": "the opening leapt by 0.25 rad",
+    "restarts": "it restarted",
+    "encoder fault": "it reports a fault of its encoder",
+    "fault that stays": "latched a fault that does not clear",
+}
+"""Faults that begin while the probe moves the blades."""
+
+WARNED = {
+    "measured torque zero off by 20 mN m": "motor_torque shows 20",
+    "force zero off by 2 N": "handle_force shows 2",
+    "BRAKE_AFTER_MS refused": "refused BRAKE_AFTER_MS",
+}
+
+
+def probed(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeResult, StrangeDevice]:
+    device = StrangeDevice(faults, seed=1)
+    return probe(VirtualPort(device), recipe, confirm=lambda request: None), device
+
+
+def refused(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeRefusedError, StrangeDevice]:
+    device = StrangeDevice(faults, seed=1)
+    with pytest.raises(ProbeRefusedError) as caught:
+        probe(VirtualPort(device), recipe, confirm=lambda request: None)
+    return caught.value, device
+
+
+@pytest.mark.parametrize("fault", STILL)
+def test_what_can_be_seen_at_rest_moves_nothing(fault: str) -> None:
+    error, device = refused(FAULTS[fault])
+    assert STILL[fault] in str(error)
+    assert device.largest_torque == 0.0
+    assert device.largest_rate == 0.0
+    assert any(verdict.status == "fail" for verdict in error.result.verdicts)
+
+
+@pytest.mark.parametrize("fault", MOVED)
+def test_signs_and_scales_are_refused_by_small_motions(fault: str) -> None:
+    error, device = refused(FAULTS[fault])
+    assert MOVED[fault] in str(error)
+    assert device.largest_torque <= LARGEST_TORQUE
+    assert device.largest_rate < LARGEST_RATE
+
+
+@pytest.mark.parametrize("fault", ["motor reversed", "encoder reversed"])
+def test_a_reversed_motor_is_stopped_within_a_few_encoder_steps(fault: str) -> None:
+    _, device = refused(FAULTS[fault])
+    assert device.largest_torque < 0.02
+    assert device.largest_rate < 0.05
+    assert abs(device.blades.place - 0.6) < 0.002
+
+
+@pytest.mark.parametrize("fault", LATER)
+def test_what_goes_wrong_during_the_probe_is_named(fault: str) -> None:
+    later = {
+        name: 1.45
+        for name, value in vars(FAULTS[fault]).items()
+        if name.endswith("_at_s") and value == 2.0
+    }
+    error, device = refused(replace(FAULTS[fault], **later))
+    assert LATER[fault] in str(error)
+    assert device.largest_torque <= LARGEST_TORQUE
+    assert device.largest_rate < LARGEST_RATE
+
+
+@pytest.mark.parametrize("fault", WARNED)
+def test_what_can_be_subtracted_or_only_worries_is_a_warning(fault: str) -> None:
+    result, _ = probed(FAULTS[fault])
+    said = [verdict.why for verdict in result.verdicts if verdict.status == "not_evaluated"]
+    assert any(WARNED[fault] in sentence for sentence in said)
+
+
+@pytest.mark.parametrize("fault", ["unplugged", "silent", "repeats one frame"])
+def test_a_device_that_is_gone_is_a_device_error(fault: str) -> None:
+    device = StrangeDevice(FAULTS[fault], seed=1)
+    with pytest.raises(DeviceError):
+        probe(VirtualPort(device), RECIPE, confirm=lambda request: None)
+
+
+def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts() -> None:
+    rig = RECIPE.rig.model_copy(update={"motor_sign": -1})
+    recipe = RECIPE.model_copy(update={"rig": rig})
+    result, _ = probed(FAULTS["motor reversed"], recipe)
+    assert result.motor_sign == -1
+    assert result.torque_gain is not None
+    assert result.torque_gain.mean == pytest.approx(1.0, abs=0.05)
+    error, _ = refused(FAULTS["none"], recipe)
+    assert "Set rig.motor_sign = 1" in str(error)
+
+
+def test_an_encoder_counted_by_half_shows_where_creeping_is_allowed() -> None:
+    probing = RECIPE.rig.probe.model_copy(update={"creep": True})
+    rig = RECIPE.rig.model_copy(update={"probe": probing})
+    recipe = RECIPE.model_copy(update={"rig": rig})
+    error, device = refused(FAULTS["encoder counted by half"], recipe)
+    assert "wrong by a factor 0.5" in str(error)
+    assert device.largest_torque <= LARGEST_TORQUE
+    assert device.largest_rate < LARGEST_RATE
+    result, _ = probed(FAULTS["none"], recipe)
+    assert result.facts["range_ratio"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_nobody_to_ask_is_refused_before_anything_is_sent() -> None:
+    device = StrangeDevice(seed=1)
+    with pytest.raises(InputError, match="must ask a person to clear the blades"):
+        probe(VirtualPort(device), RECIPE)
+    assert device.time_s < 0.1
+
+
+def test_a_probe_ends_with_motors_and_stream_off() -> None:
+    _, device = probed(FAULTS["none"])
+    assert not device._enabled
+    assert not device._streaming

@@ -1,0 +1,211 @@
+"""The capture's controller: margins against poles and simulation, designs, refusals."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scissorcal.device.capture import servo_config
+from scissorcal.device.capture_gains import (
+    ADVANCE_MASS_KG,
+    TYPICAL,
+    CaptureGains,
+    Probed,
+    capture_gains,
+)
+from scissorcal.device.control import Axis, Gains, loop_margins, loop_poles, open_loop, sag
+from scissorcal.device.open_motion import open_motion
+from scissorcal.device.paths import PathBuilder
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import Identity
+from scissorcal.recipe.library import builtin_recipe
+from tests.device.conftest import IDENTITY
+from tests.device.recipes import changed
+from tests.strange_device.device import StrangeDevice
+from tests.strange_device.faults import Faults
+from tests.strange_device.port import VirtualPort
+
+AXIS = Axis(
+    inertia=2.1e-4,
+    viscous=0.002,
+    coulomb=0.015,
+    delay_s=1e-3,
+    tick_s=1e-3,
+    step=4.8e-5,
+    rate_cutoff_Hz=120.0,
+    most_per_count=0.015,
+    inertia_factor=1.0,
+)
+PROBED = Probed(2.1e-4, 1e-5, 0.002, 0.015, 1e-3, 1e-4)
+DELAYS_S = (0.0, 0.4e-3, 1e-3, 2.3e-3, 5e-3)
+
+
+def steps_of(axis: Axis, gains: Gains, count: int) -> np.ndarray:
+    """Place after a step of effort from outside, integrated in substeps with a queue of efforts."""
+    fine = 40
+    dt = axis.tick_s / fine
+    place = rate = seen = last = total = 0.0
+    queue = [0.0] * (round(axis.delay_s / dt) + 1)
+    passed = 2.0 * math.pi * axis.rate_cutoff_Hz * axis.tick_s
+    weight = passed / (1.0 + passed) if axis.rate_cutoff_Hz else 1.0
+    effort, places = 0.0, []
+    for _ in range(count):
+        seen += weight * ((place - last) / axis.tick_s - seen)
+        last = place
+        total -= axis.tick_s * place
+        effort = -gains.kp * place - gains.kd * seen + gains.ki * total
+        for _ in range(fine):
+            queue.append(effort)
+            queue.pop(0)
+            push = queue[0] + 1.0
+            decay = math.exp(-axis.viscous * dt / axis.inertia)
+            before = rate
+            rate = push / axis.viscous + (rate - push / axis.viscous) * decay
+            place += 0.5 * dt * (before + rate)
+        places.append(place)
+    return np.array(places)
+
+
+@pytest.mark.parametrize("delay_s", DELAYS_S)
+def test_poles_and_sag_are_those_of_a_simulated_loop(delay_s: float) -> None:
+    axis = replace(AXIS, delay_s=delay_s)
+    gains = Gains(0.5, 0.015, 2.0)
+    slowest = float(np.abs(loop_poles(axis, gains)).max())
+    assert slowest < 1.0
+    places = steps_of(axis, gains, 1500)
+    assert np.abs(places).max() == pytest.approx(sag(axis, gains), rel=0.02)
+    swinging = Gains(60.0, 0.6, 200.0)
+    assert np.abs(loop_poles(axis, swinging)).max() > 1.0
+    assert np.abs(steps_of(axis, swinging, 400)).max() > 10.0 * sag(axis, gains)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    delay_ms=st.floats(0.0, 6.0),
+    tick_us=st.sampled_from([250, 500, 1000, 2000]),
+    inertia=st.floats(5e-5, 1e-3),
+    size=st.floats(0.05, 0.6),
+)
+def test_margins_are_where_poles_reach_the_unit_circle(
+    delay_ms: float, tick_us: int, inertia: float, size: float
+) -> None:
+    axis = replace(AXIS, delay_s=1e-3 * delay_ms, tick_s=1e-6 * tick_us, inertia=inertia)
+    omega = size / (axis.delay_s + 1.5 * axis.tick_s + 1.3e-3)
+    shape = Gains(omega / 3.0, 1.0, omega**2 / 40.0)
+    factor = 1.0 / abs(complex(open_loop(axis, shape, omega)))
+    gains = Gains(*(factor * value for value in (shape.kp, shape.kd, shape.ki)))
+    margins = loop_margins(axis, gains)
+    if np.abs(loop_poles(axis, gains)).max() >= 1.0:
+        assert not margins.stable
+        return
+    assert margins.crossover_rad_per_s == pytest.approx(omega, rel=0.05)
+
+    def settles(gain: float, late_s: float = 0.0) -> bool:
+        one = replace(axis, delay_s=axis.delay_s + late_s)
+        more = Gains(*(gain * value for value in (gains.kp, gains.kd, gains.ki)))
+        return bool(np.abs(loop_poles(one, more)).max() < 1.0)
+
+    late = math.radians(margins.phase_deg) / omega
+    assert settles(1.0, 0.9 * late)
+    assert not settles(1.0, 1.15 * late)
+    grown, fallen = settles(0.93 * margins.gain), settles(1.07 / margins.gain)
+    assert grown
+    assert fallen
+    assert not (settles(1.1 * margins.gain) and settles(0.9 / margins.gain))
+
+
+@pytest.mark.parametrize("tick_us", [250, 500, 1000, 2000])
+@pytest.mark.parametrize("delay_ms", [0.2, 1.0, 3.0])
+def test_designs_keep_their_margins(tick_us: int, delay_ms: float) -> None:
+    probed = replace(PROBED, delay_s=1e-3 * delay_ms, delay_sd_s=0.0)
+    identity = IDENTITY._replace(tick_us=tick_us)
+    found = capture_gains(builtin_recipe("paper-80gsm"), identity, "friction", probed)
+    verdict = found.verdicts[0]
+    assert verdict.status == "pass"
+    assert verdict.value is not None
+    axis = replace(
+        AXIS,
+        delay_s=probed.delay_s,
+        tick_s=1e-6 * tick_us,
+        rate_cutoff_Hz=found.rate_cutoff_Hz,
+        inertia_factor=1.15,
+    )
+    margins = loop_margins(axis, found.opening)
+    assert margins.enough
+    sledge = replace(axis, inertia=ADVANCE_MASS_KG, viscous=4.0, inertia_factor=2.0)
+    assert loop_margins(sledge, found.advance).enough
+    assert verdict.value <= margins.phase_deg + 1e-9
+
+
+def test_what_is_late_is_refused_with_the_delay_that_would_do() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    late = replace(PROBED, delay_s=20e-3)
+    with pytest.raises(
+        DeviceError, match=r"acts 20 ms after .* at most ([\d.]+) ms would do"
+    ) as no:
+        capture_gains(recipe, IDENTITY, "cut", late)
+    enough = 1e-3 * float(str(no.value).split("at most ")[1].split()[0])
+    assert 2e-3 < enough < 10e-3
+    capture_gains(recipe, IDENTITY, "cut", replace(PROBED, delay_s=0.95 * enough, delay_sd_s=0.0))
+
+
+def test_a_coarse_encoder_lowers_the_gains() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    coarse = IDENTITY._replace(opening_resolution=2.0 * math.pi / 8000)
+    fine = capture_gains(recipe, IDENTITY, "friction", PROBED)
+    found = capture_gains(recipe, coarse, "friction", PROBED)
+    assert found.opening.kd < fine.opening.kd
+    assert coarse.opening_resolution * found.opening.kp < 0.015
+
+
+def test_gains_of_the_recipe_are_used_and_judged() -> None:
+    keys = {"opening_kp_Nm_per_rad": 6.0, "opening_kd_Nm_s_per_rad": 0.06}
+    recipe = changed("paper-80gsm", rig__control={**keys, "opening_ki_Nm_per_rad_s": 20.0})
+    found = capture_gains(recipe, IDENTITY, "friction", PROBED)
+    assert found.opening == Gains(6.0, 0.06, 20.0)
+    assert found.verdicts[0].status == "fail"
+    assert "rig.control" in found.verdicts[0].why
+    with pytest.raises(DeviceError, match="would make the rig swing"):
+        capture_gains(recipe, IDENTITY, "friction", replace(PROBED, delay_s=4e-3))
+    part = changed("paper-80gsm", rig__control={"opening_kp_Nm_per_rad": 1.0})
+    assert capture_gains(part, IDENTITY, "friction", PROBED).opening.kp == 1.0
+
+
+def test_without_a_probe_the_gains_are_typical() -> None:
+    found = capture_gains(builtin_recipe("paper-80gsm"), IDENTITY, "cut", None)
+    assert found == TYPICAL
+    assert "device probe" in found.verdicts[0].why
+
+
+def swung(faults: Faults, gains: CaptureGains, identity: Identity) -> tuple[float, float]:
+    """Largest rate and torque at the strange device over a sweep at 1 rad/s."""
+    device = StrangeDevice(faults)
+    link = VirtualPort(device)
+    recipe = builtin_recipe("paper-80gsm")
+    with open_motion(link, servo_config(recipe, link.identity, gains=gains)) as motion:
+        path = PathBuilder(*motion.position, motion.tick_s)
+        for place in (0.9, 0.3, 0.6):
+            path.open_to(place, 1.0, 20.0)
+            path.rest(0.1)
+        for _ in motion.track(path.reference()):
+            pass
+    return device.largest_rate, device.largest_torque
+
+
+@pytest.mark.parametrize("tick_us", [250, 1000, 2000])
+@pytest.mark.parametrize("late_ms", [0.0, 1.0, 3.0, 5.0])
+def test_an_independent_device_is_followed_without_swinging(late_ms: float, tick_us: int) -> None:
+    half = 0.5e-3 * late_ms
+    faults = Faults(delay_to_host_s=half, delay_to_device_s=half, tick_us=tick_us)
+    # From a measurement to the torque that answers it: a tick of exchange, the line, the motor.
+    tick = 1e-6 * tick_us
+    delay = math.ceil(half / tick - 1e-9) * 2 * tick + tick + faults.motor_lag_s
+    probed = Probed(faults.inertia, 1e-4, 4e-3, faults.dry_Nm, delay, 0.0)
+    identity = VirtualPort(StrangeDevice(faults)).identity
+    gains = capture_gains(builtin_recipe("paper-80gsm"), identity, "friction", probed)
+    rate, torque = swung(faults, gains, identity)
+    assert rate < 2.0
+    assert torque < 0.2
