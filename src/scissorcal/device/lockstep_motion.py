@@ -52,7 +52,7 @@ class LockstepMotion(Motion):
         self._silent_s = 0.0
         self._garbled_before = link.garbled
         before_s = link.virtual_time
-        self._passed_ns = round(1e9 * before_s)
+        self._passed_ns = round(1e9 * link.virtual_time)
         link.configure(ConfigKey.STREAM, 1.0)
         self._round_trip_s = link.virtual_time - before_s
         self.step()
@@ -133,7 +133,7 @@ class LockstepMotion(Motion):
         samples = self._without_repeats(np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE))
         self._silent_s = 0.0 if len(samples) else self._silent_s + self._ticks * self.tick_s
         if self._silent_s > SILENCE_S and not stopped:
-            self._failure = DeviceError(StopReason.SILENCE.sentence, StopReason.SILENCE.name)
+            self._failure = DeviceError(StopReason.SILENCE.sentence)
         return samples
 
     def _exchange(self) -> list[bytes]:

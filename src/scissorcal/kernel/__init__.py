@@ -32,10 +32,10 @@ from scissorcal.kernel.messages import (
     State,
     StateFlag,
 )
+from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    EnergyLedger,
     Mode,
     SampleFlag,
     Servo,
@@ -78,6 +78,7 @@ __all__ = [
     "Message",
     "Mode",
     "ModelTables",
+    "PassivityConfig",
     "SampleFlag",
     "Servo",
     "ServoConfig",
