@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.probe.probe import probe
 from scissorcal.device.recorder import unloaded_sentence
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
@@ -54,6 +55,18 @@ def short_recipe() -> Recipe:
     facts = whole.model_dump(exclude_unset=True)
     facts["capture"] = {"friction": friction, "cut": cut}
     return Recipe.model_validate(facts)
+
+
+def probe_trial(name: str) -> Outcome:
+    """Probe a device with one fault."""
+    device = StrangeDevice(FAULTS[name], seed=SEED)
+
+    def run() -> str:
+        found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=lambda _: None)
+        warned = [v.why for v in found.verdicts if v.status != "pass" and v.value is not None]
+        return "; ".join(["done", *warned])
+
+    return _outcome(run, device, None)
 
 
 def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = None) -> Outcome:
@@ -109,7 +122,7 @@ def render_trial(
     return _outcome(run, device, path)
 
 
-def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path) -> Outcome:
+def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path | None) -> Outcome:
     stop = ""
     try:
         said = run()
@@ -117,6 +130,6 @@ def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path) -> Outco
     except ScissorcalError as error:
         said, code = str(error), error.exit_code
         stop = error.stop if isinstance(error, DeviceError) else ""
-    recording = read_recording(path) if path.is_file() else None
+    recording = read_recording(path) if path and path.is_file() else None
     torque, rate = device.largest_torque, device.largest_rate
     return Outcome(said, code, stop, torque, rate, device.time_s, recording)
