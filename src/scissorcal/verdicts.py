@@ -107,6 +107,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "what the package is made from: checks that its fits failed",
     ),
     "package review": ("at least", "whether the report was accepted: 1 if so"),
+    "render admission": (
+        "at most",
+        "stability of what is felt: rendered stiffness over what the rig renders in a hand",
+    ),
     "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),

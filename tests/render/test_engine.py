@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import ConfigKey, Identity, StateFlag
+from scissorcal.kernel import Capability, ConfigKey, Identity, StateFlag
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Recording, read_attachments, read_recording
 from scissorcal.render import RenderResult, VirtualStrokes, open_writer, render
+from scissorcal.render.rig_facts import rig_facts
 
 TWO = VirtualStrokes(count=2, rate_rad_per_s=0.5)
 
@@ -58,14 +59,16 @@ def test_strokes_are_rendered_recorded_and_judged(paper: ModelPackage, tmp_path:
     assert result.misses == result.garbled == result.faults == result.fallback_frames == 0
     assert result.latency is None
     assert {verdict.check: verdict.status for verdict in result.verdicts} == {
+        "admission": "pass",
         "deadline": "not_evaluated",
         "misses": "pass",
         "faults": "pass",
         "supervision": "pass",
         "passivity": "pass",
     }
-    (unsigned,) = result.warnings
+    unsigned, derated = result.warnings
     assert "not signed" in unsigned
+    assert "elastic slope" in derated
     assert recording.notes[0] == unsigned
     assert result.package_hash == paper.manifest.content_hash
     assert result.ledger.fracture_J > 0.005
@@ -170,6 +173,47 @@ def test_a_pad_is_pressed_and_gives_its_energy_back(pad: ModelPackage, tmp_path:
     assert result.ledger.fracture_J == result.ledger.arrest_J == 0.0
     assert result.largest_torque_Nm > 0.03
     assert next(v for v in result.verdicts if v.check == "passivity").status == "pass"
+
+
+def test_a_soft_rendering_is_stated_and_the_cut_keeps_its_energy(
+    paper: ModelPackage, tmp_path: Path
+) -> None:
+    """A rig with little friction renders softer; one that answers at once renders all."""
+    slow, _ = rendered(paper, tmp_path / "a.mcap")
+    known = rig_facts(paper)
+    quick, _ = rendered(
+        paper, tmp_path / "b.mcap", rig=replace(known, late_s=1e-5, damping_Nm_s_per_rad=0.03)
+    )
+    assert slow.admission.derated
+    assert slow.admission.rendered <= slow.admission.allowed_in_hand < slow.admission.needed
+    assert not quick.admission.derated
+    assert not any("elastic slope" in sentence for sentence in quick.warnings)
+    assert slow.ledger.injected_J == quick.ledger.injected_J == 0.0
+    assert abs(slow.ledger.unbooked_J) < 1e-3 * slow.ledger.absorbed_J
+    assert slow.ledger.fracture_J == pytest.approx(quick.ledger.fracture_J, rel=0.1)
+
+
+def test_a_rig_that_cannot_render_a_package_is_refused_before_anything_moves(
+    paper: ModelPackage,
+) -> None:
+    link = rig()
+    late = replace(rig_facts(paper), late_s=0.05)
+    with pytest.raises(InputError, match="What would cure it: A delay of"):
+        render(link, paper, strokes=TWO, rig=late)
+    assert link.virtual_time < 0.1
+
+
+def test_a_translation_force_needs_an_advance_motor(
+    pushing_paper: ModelPackage,
+) -> None:
+    link = Disguised(capabilities=int(Capability.SIMULATOR), force_limit=0.0)
+    result = render(link, pushing_paper, strokes=TWO, seconds=0.5)
+    assert any("no advance motor" in sentence for sentence in result.warnings)
+    manifest = pushing_paper.manifest
+    alone = manifest.mechanics.model_copy(update={"render": ("translation_force",)})
+    only = replace(pushing_paper, manifest=manifest.model_copy(update={"mechanics": alone}))
+    with pytest.raises(InputError, match="nothing would be felt"):
+        render(link, only, strokes=TWO, seconds=0.5)
 
 
 def test_equal_seeds_render_equally(paper: ModelPackage, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from scissorcal.kernel.loop import (
     Histogram,
     LoopBlock,
     LoopCounters,
-    ask_for_short_slice,
+    ask_for_slice,
     lock_memory,
     run_loop,
 )
@@ -32,10 +32,10 @@ from scissorcal.kernel.messages import (
     State,
     StateFlag,
 )
+from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    EnergyLedger,
     Mode,
     SampleFlag,
     Servo,
@@ -78,6 +78,7 @@ __all__ = [
     "Message",
     "Mode",
     "ModelTables",
+    "PassivityConfig",
     "SampleFlag",
     "Servo",
     "ServoConfig",
@@ -89,7 +90,7 @@ __all__ = [
     "StopReason",
     "Table",
     "WatchConfig",
-    "ask_for_short_slice",
+    "ask_for_slice",
     "c_sources",
     "crc16",
     "cut_log_likelihood",

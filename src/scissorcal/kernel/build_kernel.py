@@ -16,6 +16,7 @@ HEADERS = (
     "sc_edge.h",
     "sc_model.h",
     "sc_motion.h",
+    "sc_passivity.h",
     "sc_lag.h",
     "sc_watch.h",
     "sc_servo.h",

@@ -12,6 +12,7 @@ from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of
 from scissorcal.kernel.messages import Command, State
+from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
@@ -77,8 +78,8 @@ class ServoConfig:
     ``motor_sign = -1`` turns the motor's torque round on the wire, commanded and measured.
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
-    more stops. ``watch`` has the thresholds of the watches, by default none.
-    Raises ValueError for a number that is not finite or below 0.
+    more stops. ``watch`` has the thresholds of the watches, by default none; ``passivity`` watches
+    the energy of RENDER. Raises ValueError for a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -105,6 +106,7 @@ class ServoConfig:
     tick_us: int = 1000
     motor_sign: int = 1
     watch: WatchConfig = NO_WATCHES
+    passivity: PassivityConfig = UNWATCHED_ENERGY
 
     def __post_init__(self) -> None:
         for field in self._numbers():
@@ -129,33 +131,10 @@ class ServoConfig:
         for field in self._numbers():
             setattr(struct, field.name, getattr(self, field.name))
         self.watch.fill(struct.watch)
+        self.passivity.fill(struct.passivity)
 
     def _numbers(self) -> list[Field[Any]]:
-        return [field for field in fields(self) if field.name != "watch"]
-
-
-@dataclass(frozen=True)
-class EnergyLedger:
-    """Joules since the start.
-
-    ``delivered_J``: work of the commanded torque and force on the mechanism. The rest is the
-    model's energy while rendering: stored in the material now, taken by the cut
-    (kappa J_c h dX), lost by arresting cracks, taken by rendered friction.
-    """
-
-    delivered_J: float
-    stored_J: float
-    fracture_J: float
-    arrest_J: float
-    friction_J: float
-
-    @property
-    def created_J(self) -> float:  # noqa: N802  (J is the unit)
-        """Energy delivered beyond what the model absorbed; above 0 the rendering was not passive.
-
-        For runs that only rendered: tracking a reference delivers work as well.
-        """
-        return self.delivered_J + self.stored_J + self.fracture_J + self.arrest_J + self.friction_J
+        return [field for field in fields(self) if field.name not in ("watch", "passivity")]
 
 
 @dataclass(frozen=True)

@@ -123,12 +123,16 @@ class Rig(Section):
     wires are swapped.
     ``opening_zero_sd_deg`` says how well the zero of the opening (where the centrelines of the
     blades meet) is known, as by a homing switch; half a millimetre at each tip where not given.
+    ``hand_damping_N_s_per_m`` is what a hand adds to each handle at least, and what a rendering
+    counts on; 0 asks for stability without a hand. The default is chosen: below what an arm showed
+    (6.5 N s/m, doi:10.1038/srep18004).
     """
 
     joint: Literal["rotary", "linear"] = "rotary"
     moving: Literal["both", "upper"] = "both"
     handle_radius_mm: Length_mm = 60.0
     opening_zero_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] | None = None
+    hand_damping_N_s_per_m: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 4.0
     edge: Edge
     control: Control = Control()
     line: Line = Line()
@@ -138,6 +142,12 @@ class Rig(Section):
     @property
     def moving_blades(self) -> int:
         return 2 if self.moving == "both" else 1
+
+    @property
+    def hand_damping_Nm_s_per_rad(self) -> float:  # noqa: N802
+        """Damping of the opening by a hand: each handle moves by its radius times theta / m."""
+        radius_m = self.handle_radius_mm * 1e-3
+        return self.hand_damping_N_s_per_m * radius_m**2 / self.moving_blades
 
 
 class Material(Section):

@@ -1,12 +1,17 @@
 """The rendering loop on a rig: limits, ramp, watchdog, telemetry, and verdicts at the end."""
 
+from scissorcal.render.admission import Admission, admit_package
 from scissorcal.render.engine import VirtualStrokes, open_writer, render
 from scissorcal.render.result import AppliedLimits, RenderResult, latency_of
+from scissorcal.render.rig_facts import RigFacts
 
 __all__ = [
+    "Admission",
     "AppliedLimits",
     "RenderResult",
+    "RigFacts",
     "VirtualStrokes",
+    "admit_package",
     "latency_of",
     "open_writer",
     "render",

@@ -12,19 +12,26 @@ from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
-from scissorcal.kernel import ConfigKey, Identity, ServoConfig
+from scissorcal.kernel import Capability, ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
 from scissorcal.recording.probe import ProbeResult
+from scissorcal.render.admission import (
+    Admission,
+    admit_package,
+    passivity_config,
+    rendered_tables,
+)
+from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
 from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.rig_facts import RigFacts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
 
 SUPERVISOR_S = 0.2
 """Time without heartbeat after which only damping is left; after five times as much it stops.
 The heartbeat ends where the supervisor takes no block for a second: see Heartbeat."""
 
-RATE_CUTOFF_HZ = 100.0
 FALLBACK_DAMPING = 0.02
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 0.2
@@ -58,6 +65,7 @@ def render(
     writer: RecordingWriter | None = None,
     progress: Progress | None = None,
     confirm: Confirm | None = None,
+    rig: RigFacts | None = None,
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
@@ -70,19 +78,27 @@ def render(
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
-    Raises InputError, before anything moves, where package and device do not match or
-    nobody can be asked; DeviceError where the rig fails, and what was recorded is kept.
+    Before any force, `admission.admit_package` compares the package's stiffness with what the rig
+    renders stably, and softens it where that is less; ``rig`` is what is known of friction,
+    inertia and delay, by default the package's friction fit. The result's ``admission`` states it.
+
+    Raises InputError, before anything moves, where package and device do not match, where the rig
+    cannot render the package stably, or nobody can be asked; DeviceError where the rig fails, and
+    what was recorded is kept.
     """
     identity = link.identity
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
-    warnings = package.warnings + _mismatches(package, identity)
-    config = replace(_servo_config(applied, identity, seconds), motor_sign=motor_sign)
+    mismatches = _mismatches(package, identity)
+    admission = admit_package(package, identity, rig, applied.torque_Nm)
+    warnings = package.warnings + mismatches + _admitted(admission)
+    config = _servo_config(applied, admission, identity, seconds)
+    config = replace(config, motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
             writer.note(sentence)
     watch = Watch(_travel(package), writer, progress or _silent, seconds)
-    with open_motion(link, config, package.tables) as motion:
+    with open_motion(link, config, rendered_tables(package.tables, admission)) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
         motion.fresh_sheet(0.0)
         for samples in motion.render(seconds):
@@ -114,8 +130,9 @@ def render(
         largest_torque_Nm=watch.largest_torque,
         ledger=report.ledger,
         limits=applied,
+        admission=admission,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, identity.tick_us),
+        verdicts=render_verdicts(report, latency, identity.tick_us, admission),
         warnings=warnings + _limited_warning(limited, applied),
     )
     if writer:
@@ -177,7 +194,9 @@ def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -
     )
 
 
-def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) -> ServoConfig:
+def _servo_config(
+    applied: AppliedLimits, admission: Admission, identity: Identity, seconds: float
+) -> ServoConfig:
     return ServoConfig(
         torque_limit=applied.torque_Nm,
         torque_slew=applied.torque_slew_Nm_per_s,
@@ -191,8 +210,17 @@ def _servo_config(applied: AppliedLimits, identity: Identity, seconds: float) ->
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
+        passivity=passivity_config(admission),
         watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s),
     )
+
+
+def _admitted(admission: Admission) -> tuple[str, ...]:
+    """What a person at the rig has to know of the admission: nothing where it took nothing back."""
+    if admission.evaluated and not admission.derated:
+        return ()
+    cures = f" What would cure it: {' '.join(admission.cures)}" if admission.cures else ""
+    return (f"{' '.join(admission.reasons)}{cures}",)
 
 
 def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
@@ -201,6 +229,14 @@ def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
     Raises InputError where the scene and the device have no opening in common.
     """
     manifest = package.manifest
+    render = manifest.mechanics.render
+    has_motor = bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0
+    if render == ("translation_force",) and not has_motor:
+        raise InputError(
+            f"The package {manifest.name} renders the translation force alone, and this device has "
+            'no advance motor: nothing would be felt. Add "torque" to scene.render, or use a rig '
+            "with an advance motor."
+        )
     low, high = manifest.ranges.opening_rad
     if identity.opening_max <= low or identity.opening_min >= high:
         raise InputError(
@@ -210,6 +246,11 @@ def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
             "build a package for this rig."
         )
     found = []
+    if "translation_force" in render and not has_motor:
+        found.append(
+            "The package renders a translation force, and this device has no advance motor "
+            "(capability ADVANCE_MOTOR, force limit above 0): that force is not rendered."
+        )
     rate = 1e6 / identity.tick_us
     if abs(rate - manifest.mechanics.loop_rate_Hz) > 0.01 * rate:
         found.append(

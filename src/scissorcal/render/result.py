@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from scissorcal.device.motion import MotionReport
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.kernel import EnergyLedger
+from scissorcal.render.admission import Admission
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "render"
@@ -15,7 +16,11 @@ MOST_MISSED = 0.01
 MOST_CREATED = 0.1
 MOST_FAULTS_PER_S = 0.1
 NEGLIGIBLE_J = 5e-3
-"""Energy error that the ramp at engagement causes: the model's energies do not have it."""
+"""Below, an energy error is that of torque sensors: 1 mN m over a few radians of strokes."""
+REMEDY = (
+    "Check that torque and opening have the same sense ('scissorcal device probe'); a shorter "
+    "delay or more damping lowers it."
+)
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,8 @@ class RenderResult:
     of more than five ticks, ``unsent`` commands that the line did not accept, ``overrun`` samples
     that this process read too late. ``limited_share`` is the share of rendering frames in which
     torque or force met its limit. ``strokes`` counts closings of the blades, ``package_hash`` is
-    the content hash of what was rendered. ``warnings`` are sentences for the person at the
-    rig.
+    the content hash of what was rendered, ``admission`` how much of its stiffness. ``warnings`` are
+    sentences for the person at the rig.
     """
 
     seconds: float
@@ -66,6 +71,7 @@ class RenderResult:
     largest_torque_Nm: float
     ledger: EnergyLedger
     limits: AppliedLimits
+    admission: Admission
     package_hash: str
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
@@ -89,10 +95,11 @@ def latency_of(latency_ns: ArrayLike) -> Percentiles | None:
 
 
 def render_verdicts(
-    report: MotionReport, latency: Percentiles | None, tick_us: int
+    report: MotionReport, latency: Percentiles | None, tick_us: int, admission: Admission
 ) -> tuple[Verdict, ...]:
-    """Judge a rendering: on time, complete, without faults, supervised, passive."""
+    """Judge a rendering: admitted, on time, complete, without faults, supervised, passive."""
     return (
+        _admitted(admission),
         _deadline(latency, tick_us),
         _complete(report),
         _faultless(report, tick_us),
@@ -143,15 +150,28 @@ def _supervised(report: MotionReport) -> Verdict:
     return judge(SCOPE, "supervision", count, 0.0, never, missed)
 
 
+def _admitted(admission: Admission) -> Verdict:
+    """Whether what was rendered is within what the rig renders stably."""
+    why = " ".join(admission.reasons)
+    if not admission.evaluated:
+        return not_evaluated(SCOPE, "admission", f"{why} {' '.join(admission.cures)}")
+    share = admission.rendered / admission.allowed_in_hand
+    return judge(SCOPE, "admission", share, 1.0, why)
+
+
 def _passive(ledger: EnergyLedger) -> Verdict:
-    """Whether more energy came out than the model allows, which is felt as buzzing."""
-    taken = ledger.fracture_J + ledger.arrest_J + ledger.friction_J
+    """Whether the loop gave out more energy than the rig's share of it, which is felt as buzzing.
+
+    What the ramp put into pressed material and what limits kept back is not the loop's.
+    """
+    taken = ledger.absorbed_J
     allowed = max(NEGLIGIBLE_J, MOST_CREATED * taken)
     why = (
         f"Energy error {max(ledger.created_J, 0.0):.2g} J (limit {allowed:.2g} J): the motors "
-        f"delivered {ledger.delivered_J:.3g} J, the model absorbed {taken:.3g} J."
+        f"delivered {ledger.delivered_J:.3g} J, the model absorbed {taken:.3g} J"
     )
-    remedy = (
-        f"{why} Limits, the ramp or a slow loop distort the model: lower its stiffness or speed."
-    )
+    if ledger.injected_J < 0.0:
+        why += f", and added damping took {-ledger.injected_J:.2g} J"
+    why += "."
+    remedy = f"{why} {REMEDY}"
     return judge(SCOPE, "passivity", ledger.created_J, allowed, why, remedy)

@@ -16,6 +16,14 @@ typedef struct {
     float force;
 } effort;
 
+/* The way since the last usable frame. */
+typedef struct {
+    double turned;    /* [rad] */
+    double moved;     /* [m] */
+    double delivered; /* work of the motors [J] */
+    float dt;
+} way;
+
 static int is_level(float value)
 {
     return isfinite(value) && value >= 0.0f;
@@ -34,6 +42,7 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            isfinite(config->opening_low) && isfinite(config->opening_high) &&
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
            config->advance_rate_limit > 0.0f && isfinite(config->motor_sign) &&
+           sc_passivity_is_sound(&config->passivity) &&
            sc_watch_config_is_sound(&config->watch);
 }
 
@@ -108,7 +117,8 @@ static effort track(const sc_servo_config *config, const sc_reference *reference
     return wanted;
 }
 
-static effort render(const sc_servo_config *config, const sc_model *model, sc_servo *servo)
+static effort render(const sc_servo_config *config, const sc_model *model, sc_servo *servo,
+                     const way *since)
 {
     effort wanted = {0.0f, 0.0f};
     if (model == NULL) {
@@ -117,13 +127,17 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
     const sc_motion *motion = &servo->motion;
     sc_model_step(model, &servo->crack, motion->opening, motion->opening_rate, motion->advance,
                   &servo->step);
-    servo->ledger.stored_J = (double)servo->step.stored_J;
-    servo->ledger.fracture_J += (double)servo->step.fracture_J;
-    servo->ledger.arrest_J += (double)servo->step.arrest_J;
+    sc_port_friction(&config->passivity, model, &servo->port, motion->opening,
+                     motion->opening_rate, &servo->step);
     servo->sample.flags |= servo->step.flags << SC_SAMPLE_STEP_SHIFT;
     const float share =
         servo->engaged_s < config->ramp_s ? servo->engaged_s / config->ramp_s : 1.0f;
-    wanted.torque = share * servo->step.torque;
+    const sc_port_tick tick = {since->turned, since->moved,         since->delivered,
+                               since->dt,     motion->opening_rate, share,
+                               config->torque_limit, config->force_limit};
+    const float damping =
+        sc_port_render(&config->passivity, &servo->port, &servo->ledger, &tick, &servo->step);
+    wanted.torque = share * servo->step.torque + damping;
     wanted.force = share * servo->step.force;
     return wanted;
 }
@@ -163,19 +177,25 @@ static void apply_limits(const sc_servo_config *config, sc_servo *servo, effort 
     }
 }
 
-/* Work of the last command that was sent over the motion since, if the motors were on. */
-static void book_work(sc_servo *servo, const sc_motion *before, const sc_state *state)
+/* Where the blades went since the last usable frame, and the motors' work on the way if they were
+ * on. */
+static way way_since(const sc_servo_config *config, sc_servo *servo, const sc_motion *before,
+                     const sc_state *state, float dt)
 {
+    way since = {0.0, 0.0, 0.0, dt};
+    if (before->started) {
+        since.turned = (double)state->opening - (double)before->opening;
+        since.moved = (double)state->advance - (double)before->advance;
+    }
     if (!before->started || !(state->flags & SC_STATE_MOTOR_ENABLED)) {
-        return;
+        servo->port.was_measured = 0;
+        return since;
     }
-    const double turned = (double)state->opening - (double)before->opening;
-    const double moved = (double)state->advance - (double)before->advance;
-    servo->ledger.delivered_J +=
-        (double)servo->sent_torque * turned + (double)servo->sent_force * moved;
-    if (servo->mode == SC_MODE_RENDER) {
-        servo->ledger.friction_J -= (double)servo->step.friction_torque * turned;
-    }
+    since.delivered =
+        sc_port_delivered(&config->passivity, &servo->port, since.turned, since.moved,
+                          servo->sent_torque, servo->sent_force, state->motor_torque);
+    servo->ledger.delivered_J += since.delivered;
+    return since;
 }
 
 static void count_frame(sc_servo *servo, const sc_state *state)
@@ -234,13 +254,13 @@ static void release_motors(sc_servo *servo, uint16_t flags, sc_command *command)
 }
 
 static effort effort_of_mode(const sc_servo_config *config, const sc_model *model,
-                             const sc_reference *reference, sc_servo *servo, float dt)
+                             const sc_reference *reference, sc_servo *servo, const way *since)
 {
     effort wanted = {0.0f, 0.0f};
     if (servo->mode == SC_MODE_TRACK) {
-        wanted = track(config, reference, servo, dt);
+        wanted = track(config, reference, servo, since->dt);
     } else if (servo->mode == SC_MODE_RENDER) {
-        wanted = render(config, model, servo);
+        wanted = render(config, model, servo, since);
     } else if (servo->mode == SC_MODE_DAMP) {
         wanted.torque = -config->damping_Nm_s_per_rad * servo->motion.opening_rate;
     }
@@ -298,13 +318,13 @@ static int step(const sc_servo_config *config, const sc_model *model,
     servo->stale_us = 0;
     sc_lag_state(&servo->lag, servo->mode, state->sequence);
     const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
-    float dt = 0.0f;
+    way since = {0.0, 0.0, 0.0, 0.0f};
     if (valid) {
         const sc_motion before = servo->motion;
-        dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
+        float dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
                               state->device_us, state->opening, state->advance);
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
-        book_work(servo, &before, state);
+        since = way_since(config, servo, &before, state, dt);
         servo->engaged_s += dt;
         sc_servo_watch_speed(config, servo);
     } else {
@@ -319,9 +339,11 @@ static int step(const sc_servo_config *config, const sc_model *model,
     const int faulty = handle_fault(config, servo, state);
     effort wanted = {0.0f, 0.0f};
     if (valid && !faulty && servo->stop_reason == SC_STOP_NONE) {
-        wanted = effort_of_mode(config, model, reference, servo, dt);
+        wanted = effort_of_mode(config, model, reference, servo, &since);
+    } else {
+        sc_port_rest(&servo->port, &servo->ledger);
     }
-    sc_servo_watch_state(config, servo, state, dt, valid);
+    sc_servo_watch_state(config, servo, state, since.dt, valid);
     if (servo->ending) {
         const effort none = {0.0f, 0.0f};
         wanted = none;

@@ -17,6 +17,7 @@
 #include "sc_lag.h"
 #include "sc_model.h"
 #include "sc_motion.h"
+#include "sc_passivity.h"
 #include "sc_watch.h"
 #include "sc_wire.h"
 
@@ -71,6 +72,7 @@ typedef struct {
                                   the stop; 0: no supervision */
     uint32_t fault_clearings;  /* latched faults that are cleared before the servo stops */
     uint32_t tick_us;
+    sc_passivity_config passivity;
     float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
                                   measured; everything else here is of corrected signs */
     sc_watch_config watch;
@@ -111,24 +113,13 @@ typedef struct {
     uint32_t latency_ns;
 } sc_sample;
 
-/* Joules since the start. delivered: work of the commanded torque and force on the mechanism. The
- * model's energies: stored in the material now, taken by cutting, lost by arrests, taken by
- * rendered friction. A passive rendering has delivered + stored + fracture + arrest + friction
- * <= 0, up to what sampling adds. */
-typedef struct {
-    double delivered_J;
-    double stored_J;
-    double fracture_J;
-    double arrest_J;
-    double friction_J;
-} sc_ledger;
-
 typedef struct {
     sc_motion motion;
     sc_watch watch;
     float aim_opening, aim_rate, aim_advance; /* of the reference at the last state */
     sc_crack crack;
-    sc_ledger ledger;
+    sc_ledger ledger; /* delivered in every mode; the rest while rendering */
+    sc_port port;
     sc_sample sample; /* of the last frame; host time and latency are the loop's to fill */
     sc_step_output step;
     uint32_t started;

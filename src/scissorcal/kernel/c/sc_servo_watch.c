@@ -34,6 +34,7 @@ void sc_servo_engage(sc_servo *servo, uint32_t mode)
     servo->ledger.arrest_J += servo->ledger.stored_J;
     servo->ledger.stored_J = 0.0;
     memset(&servo->step, 0, sizeof servo->step);
+    memset(&servo->port, 0, sizeof servo->port);
     servo->mode = mode;
     servo->begins = 1;
     servo->engaged_s = 0.0f;

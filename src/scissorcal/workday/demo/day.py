@@ -277,13 +277,17 @@ def _render(
 ) -> "tuple[ModelPackage, RenderResult, Path]":
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
+    from scissorcal.render.rig_facts import rig_facts, with_probe
 
     package = open_package(workspace.package_path(recipe), warn=False)
     probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("render")
     text = read_text(workspace.recipe_path)
     with open_writer(path, link, package, text, probe=probe) as writer:
-        result = render(link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer)
+        rig = with_probe(rig_facts(package), probe)
+        result = render(
+            link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer, rig=rig
+        )
     return package, result, path
 
 

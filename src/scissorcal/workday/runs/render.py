@@ -1,20 +1,25 @@
 """Render a workspace's package on a rig, and record what happened."""
 
+import json
+import math
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import ScissorcalError
+from scissorcal.files import replacing
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.runs.probe import Say, ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
-    from scissorcal.render import RenderResult, VirtualStrokes
+    from scissorcal.package import ModelPackage
+    from scissorcal.render import RenderResult, RigFacts, VirtualStrokes
     from scissorcal.render.watch import Progress
 
 
@@ -52,6 +57,7 @@ def render_workspace(
     """
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
+    from scissorcal.render.rig_facts import with_probe
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
@@ -78,8 +84,45 @@ def render_workspace(
                 writer=writer,
                 progress=progress,
                 confirm=confirm,
+                rig=with_probe(_known_rig(workspace, package), probe),
             )
+    if package_path is None:
+        _write_admission(workspace.package_path(recipe), done, rig)
     return Rendered(done, path, rig)
+
+
+def _known_rig(workspace: Workspace, package: "ModelPackage") -> "RigFacts":
+    """What is known of the rig: the package's friction fit, or the workspace's.
+
+    A scene that renders no friction has none in its package, and the rig has friction all the same.
+    """
+    from scissorcal.render.rig_facts import fitted_facts, rig_facts
+
+    known = rig_facts(package)
+    engine = Engine.of(workspace)
+    if known.coulomb_Nm is not None or "friction" not in available(engine, ("friction",)):
+        return known
+    fit = load_result(engine, "friction")
+    return fitted_facts((*fit.parameters, *fit.nuisance), 1.0, "the workspace's friction fit")
+
+
+def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None:
+    """State beside the package how much of it was rendered on this rig, and what would cure it."""
+    admission = asdict(done.admission)
+    plain = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in admission.items()
+    }
+    facts = {
+        "format": "scissorcal-admission/1",
+        "package_hash": done.package_hash,
+        "rig": rig,
+        "derated": done.admission.derated,
+        "factor": done.admission.factor,
+        **plain,
+    }
+    with replacing(package_path.with_suffix(".admission.json")) as part:
+        part.write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def package_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:

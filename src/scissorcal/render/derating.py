@@ -1,0 +1,120 @@
+"""How stiff a package is over its scene, and the same package with a softer elastic response."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.kernel import Kernel, ModelTables, Table
+
+Array = NDArray[np.float64]
+
+OPENINGS, CONTACTS = 48, 24
+STEP_RAD = 1e-3
+"""Opening over which a slope is taken: some hundred steps of float32 in torque, and an indentation
+change of some 20 um."""
+BINS = 25
+STROKE_TICKS = 4000
+LEAST_SHARE = 0.05
+"""Of a stroke's largest torque; the cost of derating is compared where torque is above."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a package asks of the loop, within its torque limit.
+
+    ``stiffness`` (N m/rad): largest elastic slope of torque over the opening, found at ``opening``
+    (rad) and ``contact`` (m). ``drop_Nm``: largest drop of torque as a crack runs. ``damper``
+    (N m s/rad): largest damping of the material. ``friction_Nm``: largest rendered friction.
+    """
+
+    stiffness: float
+    opening: float
+    contact: float
+    drop_Nm: float
+    damper: float
+    friction_Nm: float
+
+
+def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
+    """Search the scene for the steepest slopes; places whose torque exceeds the limit do not count.
+
+    At each opening and contact the crack first runs to where it holds (with the peak force of a
+    ripple), then the blades open by a milliradian: what torque falls by is elastic.
+    """
+    quiet = replace(tables, render_friction=False)
+    smooth, teeth = Kernel(replace(quiet, kappa=1.0)), Kernel(quiet)
+    found = Needs(0.0, tables.opening_max, tables.contact_min, 0.0, 0.0, _friction(tables))
+    for opening in np.linspace(tables.opening_min, tables.opening_max, OPENINGS):
+        for contact in np.linspace(tables.contact_min, tables.contact_max, CONTACTS):
+            smooth.reset(float(contact))
+            at = smooth.step(float(opening), 0.0, 0.0)
+            if not 0.0 < at.torque <= torque_limit:
+                continue
+            settled = smooth.crack
+            opened = smooth.step(float(opening) + STEP_RAD, 0.0, 0.0)
+            slope = (at.torque - opened.torque) / STEP_RAD
+            smooth.reset(settled)
+            faster = smooth.step(float(opening), -1.0, 0.0)
+            teeth.reset(float(contact))
+            ran = teeth.step(float(opening), 0.0, 0.0)
+            drop = at.torque - ran.torque if ran.fracture_J > 0.0 else 0.0
+            found = replace(
+                found,
+                drop_Nm=max(found.drop_Nm, drop),
+                damper=max(found.damper, faster.torque - at.torque),
+            )
+            if slope > found.stiffness:
+                found = replace(
+                    found, stiffness=slope, opening=float(opening), contact=float(settled)
+                )
+    return found
+
+
+def softened(tables: ModelTables, steepest: float) -> ModelTables:
+    """The same model with a response that is nowhere steeper than ``steepest`` (N/m).
+
+    Where it was steeper it becomes straight, so that a force is reached at a greater indentation.
+    Gentle parts stay as they are, and so do fracture energy and arrest ratio: with them the forces
+    at which cracks start and stop, and the work of a cut. Raises ValueError unless steepest > 0.
+    """
+    if not steepest > 0.0:
+        raise ValueError(f"The steepest slope of a response is above 0, not {steepest}.")
+    response = tables.response
+    x, y = response.x.astype(np.float64), response.y.astype(np.float64)
+    width = np.maximum(np.diff(x), np.diff(y) / steepest)
+    place = np.concatenate([[0.0], np.cumsum(width)]).astype(np.float32)
+    slope = np.minimum(response.slope, np.float32(steepest))
+    return replace(tables, response=Table(place, response.y, slope))
+
+
+def felt_change(tables: ModelTables, other: ModelTables, torque_limit: float) -> float:
+    """Relative rms difference of torque, averaged over its ripple, in one closing stroke.
+
+    Torque is held to its limit, as it is rendered, and averaged in 25 bins of opening. The blades
+    close over the scene's openings: on a sheet whose near edge is at the scene's nearest contact,
+    or, where nothing is cut, at the middle of its contacts. Zero where no torque is felt.
+    """
+    one, two = (np.minimum(_stroke(each), torque_limit) for each in (tables, other))
+    felt = one > LEAST_SHARE * one.max()
+    if not felt.any() or one.max() <= 0.0:
+        return 0.0
+    return float(np.sqrt(np.mean((two - one)[felt] ** 2) / np.mean(one[felt] ** 2)))
+
+
+def _stroke(tables: ModelTables) -> Array:
+    quiet = replace(tables, render_friction=False)
+    kernel = Kernel(quiet)
+    pressed = 0.5 * (tables.contact_min + tables.contact_max)
+    kernel.reset(tables.contact_min if tables.fracture_energy > 0.0 else pressed)
+    opening = np.linspace(tables.opening_max, tables.opening_min, STROKE_TICKS)
+    torque = kernel.step_many(opening, 0.0, 0.0)["torque"].astype(np.float64)
+    return np.asarray(torque.reshape(BINS, -1).mean(axis=1))
+
+
+def _friction(tables: ModelTables) -> float:
+    """Largest rendered friction of both directions, N m."""
+    if not tables.render_friction:
+        return 0.0
+    level = max(float(tables.friction_opening.y.max()), float(tables.friction_closing.y.max()))
+    return level * float(np.abs(tables.friction_angle.y).max())

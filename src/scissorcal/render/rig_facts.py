@@ -1,0 +1,121 @@
+"""What is known of a rig before it renders: friction, inertia, delay, and where each comes from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from scissorcal.kernel import Identity
+from scissorcal.package import ModelPackage
+from scissorcal.recording.probe import ProbeResult
+from scissorcal.render.admission_rule import LoopFacts
+
+LATE_TICKS = 2.0
+"""Where no probe measured the delay: one tick for line and host, one for the motor."""
+SMALL_INERTIA_kg_m2 = 5e-5
+"""Where neither fit nor probe has the inertia: of small scissors, which damping disturbs first."""
+
+
+class Fitted(Protocol):
+    """A fitted parameter, of a fit or of a package's record of one."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def q05(self) -> float: ...
+    @property
+    def q50(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class RigFacts:
+    """What is known of the rig itself, None where nobody measured it; see LoopFacts.
+
+    ``source`` says where friction and inertia come from, ``late_source`` the delay.
+    """
+
+    coulomb_Nm: float | None = None
+    damping_Nm_s_per_rad: float | None = None
+    inertia_kg_m2: float | None = None
+    late_s: float | None = None
+    source: str = ""
+    late_source: str = ""
+
+
+def rig_facts(package: ModelPackage) -> RigFacts:
+    """Friction and inertia of the rig from the friction fit in a package; empty without one."""
+    record = package.manifest.provenance.friction
+    if record is None:
+        return RigFacts()
+    least = float(package.tables.friction_angle.y.min())
+    return fitted_facts(record.parameters, least, "the package's friction fit")
+
+
+def fitted_facts(parameters: Sequence[Fitted], least: float, source: str) -> RigFacts:
+    """Friction and inertia from a friction fit's parameters.
+
+    Levels are the lower ends of the 90 % intervals, of the weaker direction, times ``least``, the
+    least factor of friction over the scene's openings.
+    """
+    lower = {parameter.name: parameter.q05 for parameter in parameters}
+    inertia = [parameter.q50 for parameter in parameters if parameter.name == "inertia"]
+    return RigFacts(
+        coulomb_Nm=least * _weakest(lower, "coulomb"),
+        damping_Nm_s_per_rad=least * _weakest(lower, "viscous"),
+        inertia_kg_m2=inertia[0] if inertia and inertia[0] > 0.0 else None,
+        source=source,
+    )
+
+
+def with_probe(rig: RigFacts, probe: ProbeResult | None) -> RigFacts:
+    """Add what a probe measured: its delay (upper end), and what nothing else has.
+
+    Friction and inertia of a probe are rough, so a fit's count where there is one.
+    """
+    if probe is None:
+        return rig
+    found, name = rig, f"the probe of {probe.made_at}"
+    if probe.delay_s is not None:
+        late_s = max(probe.delay_s.interval[1], 0.0)
+        found = replace(found, late_s=late_s, late_source=name)
+    if found.coulomb_Nm is None and probe.coulomb_Nm is not None:
+        viscous = probe.viscous_Nm_s_per_rad
+        found = replace(
+            found,
+            coulomb_Nm=max(probe.coulomb_Nm.interval[0], 0.0),
+            damping_Nm_s_per_rad=0.0 if viscous is None else max(viscous.interval[0], 0.0),
+            source=name,
+        )
+    if found.inertia_kg_m2 is None and probe.inertia_kg_m2 is not None:
+        found = replace(found, inertia_kg_m2=max(probe.inertia_kg_m2.mean, 0.0) or None)
+    return found
+
+
+def loop_facts(identity: Identity, rig: RigFacts) -> tuple[LoopFacts | None, tuple[str, ...]]:
+    """Join what the device states and what is known of the rig; None without its friction."""
+    if rig.coulomb_Nm is None:
+        return None, ()
+    tick_s = identity.tick_us * 1e-6
+    late_s = LATE_TICKS * tick_s if rig.late_s is None else rig.late_s
+    inertia = rig.inertia_kg_m2 or SMALL_INERTIA_kg_m2
+    late = rig.late_source or f"assumed, {LATE_TICKS:g} ticks: no probe measured it"
+    known = rig.source if rig.inertia_kg_m2 else "assumed, of small scissors"
+    sources = (
+        f"friction: {rig.coulomb_Nm * 1e3:.3g} mN m dry and "
+        f"{(rig.damping_Nm_s_per_rad or 0.0) * 1e3:.3g} mN m s/rad viscous ({rig.source})",
+        f"delay: {late_s * 1e3:.3g} ms ({late})",
+        f"inertia: {inertia:.2g} kg m^2 ({known})",
+        f"encoder step: {identity.opening_resolution:.2g} rad (device)",
+    )
+    return LoopFacts(
+        tick_s=tick_s,
+        late_s=late_s,
+        inertia_kg_m2=inertia,
+        damping_Nm_s_per_rad=rig.damping_Nm_s_per_rad or 0.0,
+        coulomb_Nm=rig.coulomb_Nm,
+        encoder_step_rad=identity.opening_resolution,
+    ), sources
+
+
+def _weakest(levels: dict[str, float], term: str) -> float:
+    found = [value for name, value in levels.items() if name.startswith(term)]
+    return max(0.0, min(found, default=0.0))
