@@ -33,6 +33,7 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
     whole = _whole(recording, label)
     return {
         "by_hand": by_hand,
+        "stop": recording.stop,
         "directions": list(grid.directions),
         "speeds": list(grid.speeds),
         "openings": [list(cell) for cell in grid.cells],
