@@ -1,4 +1,4 @@
-"""Captures that the servo stopped, or that cut nothing, are incomplete, and what is there is kept."""
+"""Captures that the servo stopped, or that cut nothing: incomplete, and what is there is kept."""
 
 from dataclasses import replace
 from pathlib import Path
