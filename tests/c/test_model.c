@@ -121,12 +121,60 @@ static void check_absurd(const json *one)
     }
 }
 
+static void refused(const sc_model *model, const char *why)
+{
+    CHECK(!sc_model_is_sound(model), why);
+}
+
+/* What must not be rendered: each change makes a sound model unsound, and undone it is sound again. */
+static void check_soundness(const json *one)
+{
+    static storage rooms[5];
+    const char *title = json_text(one, "title");
+    sc_model model = load_model(json_get(one, "model"), rooms);
+    static float *const levels[] = {&rooms[2].y[1], &rooms[3].y[0], &rooms[4].y[1]};
+    static const float bad[] = {-1e-3f, NAN, INFINITY, -INFINITY};
+    CHECK(sc_model_is_sound(&model), title);
+    for (size_t i = 0; i < 3 * sizeof bad / sizeof *bad; i++) {
+        float *level = levels[i % 3], kept = *level;
+        *level = bad[i / 3];
+        refused(&model, "friction");
+        *level = kept;
+    }
+    float kept = rooms[2].slope[0];
+    rooms[2].slope[0] = -1.0f; /* between two knots above 0 the cubic falls below it */
+    refused(&model, "friction between knots");
+    rooms[2].slope[0] = kept;
+    kept = rooms[1].y[3];
+    rooms[1].y[3] = 0.5f * rooms[1].y[2];
+    refused(&model, "a response that falls");
+    rooms[1].y[3] = kept;
+    rooms[1].y[0] = 1e-3f;
+    refused(&model, "a response without contact");
+    rooms[1].y[0] = 0.0f;
+    kept = rooms[0].x[1];
+    rooms[0].x[1] = rooms[0].x[0];
+    refused(&model, "knots that do not ascend");
+    rooms[0].x[1] = kept;
+    model.friction_rate_eps = 0.0f;
+    refused(&model, "no band around rest");
+    model.friction_rate_eps = 0.01f;
+    model.opening_min = NAN;
+    refused(&model, "no range");
+    model.opening_min = 0.2f;
+    model.kappa = 1.5f;
+    refused(&model, "kappa");
+    model.kappa = 1.0f;
+    CHECK(sc_model_is_sound(&model), title);
+}
+
 int main(int argc, char **argv)
 {
     const char *folder = argc > 1 ? argv[1] : "../golden";
     json vectors = json_load(folder, "model.json");
     const json *cases = json_get(&vectors, "cases");
     check_tables(folder);
+    check_soundness(&cases->items[0]);
     for (size_t i = 0; i < cases->size; i++) {
         check_steps(&cases->items[i]);
         check_absurd(&cases->items[i]);

@@ -170,7 +170,8 @@ def test_a_reversed_motor_cannot_look_passive() -> None:
     found = swing(2.6, WATCHED, motor_sign=-1, seconds=0.2)
     ledger = found.servo.ledger
     honest = swing(2.6, WATCHED, seconds=0.2).servo.ledger
-    assert abs(ledger.late_J) > 10.0 * abs(honest.late_J)
+    assert ledger.created_J > 10.0 * abs(honest.created_J)
+    assert ledger.created_J > 0.1 * abs(ledger.stored_J + ledger.absorbed_J)
 
 
 def test_without_a_measured_torque_the_command_is_booked() -> None:

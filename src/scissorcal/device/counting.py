@@ -155,5 +155,6 @@ def _excitation(recording: Recording, label: Labels) -> float:
 
 
 def _tick(recording: Recording) -> float:
-    time = recording.device_time_s
-    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    """Seconds between two samples, from whole microseconds, so that their sum is exact."""
+    time_us = recording.samples["device_time_us"]
+    return 1e-6 * float(np.median(np.diff(time_us))) if len(time_us) > 1 else 0.0

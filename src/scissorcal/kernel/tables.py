@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -111,6 +112,17 @@ class ModelTables:
         for name in ("friction_opening", "friction_closing"):
             if np.any(getattr(self, name).y < 0):
                 raise ValueError(f"{name} holds a negative level, which would drive the blades.")
+
+    @cached_property
+    def release_falls(self) -> bool:
+        """Whether the energy that a crack releases falls outwards along the blade.
+
+        Once past its largest value, and at every opening of the range, as far as it decides where
+        a crack stops. Then the kernel finds that place in a few look-ups; else it looks at the
+        edge's knots one by one, because the first such place is where the crack stops.
+        """
+        model, _keep = model_struct(self)
+        return bool(model.release_falls)
 
 
 def _check_numbers(tables: ModelTables) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import correlation_time
+from scissorcal.kernel import StateFlag
 from scissorcal.recording.probe import Estimate
 
 Array = NDArray[np.float64]
@@ -27,6 +28,7 @@ DELAYS = np.linspace(-2e-3, 20e-3, 56)
 measure late in its tick."""
 LAGS = np.linspace(0.0, 20e-3, 101)
 HELD_S = 0.01
+LEAST_HELD = 40
 LEAST_SAMPLES = 6
 LEAST_SWINGS = 3
 VISCOUS_SD = 0.01
@@ -153,7 +155,7 @@ def follow(parts: list[NDArray[np.void]], zero: float) -> Follow:
     held = np.concatenate([_held(part) for part in parts])
     command = np.concatenate([_commanded(part, 0.0) for part in parts])
     inside = usable & held & (command != 0.0)
-    if np.count_nonzero(inside) < 2 * LEAST_SAMPLES:
+    if np.count_nonzero(inside) < LEAST_HELD:
         return Follow(Estimate(math.nan, math.nan), float(LAGS[int(np.argmin(costs))]), constant)
     x, y = command[inside], measured[inside]
     gain = float(x @ y / (x @ x))
@@ -260,14 +262,18 @@ def _commanded(part: NDArray[np.void], lag: float) -> Array:
 
 
 def _held(part: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Where the command had stood for HELD_S."""
+    """Where the motors were on and the command had stood for HELD_S."""
+    on = (part["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
     t = part["device_us"] * 1e-6
-    changes = np.flatnonzero(np.diff(part["torque"]) != 0.0) + 1
+    answered = np.flatnonzero(part["answer_flags"] >= 0)  # of several at once only the newest is
+    if len(answered) == 0:
+        return np.zeros(len(t), dtype=bool)
+    changes = answered[np.flatnonzero(np.diff(part["torque"][answered]) != 0.0) + 1]
     if len(changes) == 0:
-        return np.ones(len(t), dtype=bool)
+        return np.asarray(on)
     before = np.searchsorted(changes, np.arange(len(t)), side="right") - 1
     since = np.where(before >= 0, t - t[changes[np.maximum(before, 0)]], np.inf)
-    return np.asarray(since > HELD_S)
+    return np.asarray(on & (since > HELD_S))
 
 
 def _integral(t: Array, values: Array) -> Array:
