@@ -11,8 +11,9 @@ import signal
 import sys
 import threading
 
-from scissorcal.kernel import LoopBlock, ask_for_short_slice, lock_memory, run_loop
+from scissorcal.kernel import LoopBlock, ask_for_slice, lock_memory, run_loop
 
+SLICE_US = 100
 PRIORITY = 10
 """Under SCHED_FIFO, where that is allowed: above all that is not real-time, below drivers."""
 
@@ -34,7 +35,7 @@ def _ask_for_priority() -> bool:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except (OSError, AttributeError):
-        ask_for_short_slice()
+        ask_for_slice(SLICE_US)
         return False
     return True
 

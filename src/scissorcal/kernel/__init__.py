@@ -12,7 +12,7 @@ from scissorcal.kernel.loop import (
     Histogram,
     LoopBlock,
     LoopCounters,
-    ask_for_short_slice,
+    ask_for_slice,
     lock_memory,
     run_loop,
 )
@@ -90,7 +90,7 @@ __all__ = [
     "StopReason",
     "Table",
     "WatchConfig",
-    "ask_for_short_slice",
+    "ask_for_slice",
     "c_sources",
     "crc16",
     "cut_log_likelihood",

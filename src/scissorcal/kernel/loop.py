@@ -48,12 +48,13 @@ def lock_memory() -> bool:
     return bool(lib.sc_rights_lock_memory())
 
 
-def ask_for_short_slice() -> bool:
-    """Ask that this thread interrupts others when it wakes, without real-time priority.
+def ask_for_slice(slice_us: int) -> bool:
+    """Ask for a time slice of this length for this thread; whether the system knows such.
 
-    Needs no right, and Linux 6.12 or newer; whether the call is known. It ends real-time priority.
+    Needs no right, and Linux 6.12 or newer (100 to 100,000 us): a thread then interrupts those of
+    longer slices when it wakes, and its share of the processor stays. Ends real-time priority.
     """
-    return bool(lib.sc_rights_short_slice())
+    return bool(lib.sc_rights_slice(slice_us))
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,14 @@
 """MCAP encoding: samples, notes and attachments into one open file, in small chunks."""
 
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal import __version__
 from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
+from scissorcal.recording.mcapfile import McapFile
 from scissorcal.recording.schema import RecordingMetadata, to_entries
 
 FLUSH_SPAN_NS = 125_000_000
@@ -25,16 +27,12 @@ class SampleFile:
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
         self._entries = to_entries(metadata)
-        self._mcap = _start(stream, self._entries)
-        schema = self._mcap.register_schema(
+        self._mcap = McapFile(stream, f"scissorcal {__version__}", CHUNK_BYTES)
+        self._mcap.add_metadata(METADATA_NAME, self._entries)
+        self._mcap.begin_channel(
             layout.SCHEMA_NAME,
             layout.SCHEMA_ENCODING,
             layout.message_definition(metadata.joint_of_recording).encode(),
-        )
-        self._channel = self._mcap.register_channel(
-            layout.TOPIC,
-            layout.MESSAGE_ENCODING,
-            schema,
             {f"unit.{f}": layout.unit_of(f, metadata.joint_of_recording) for f in layout.fields()},
         )
         self._mcap.flush()
@@ -52,20 +50,13 @@ class SampleFile:
             )
         if not len(samples):
             return
-        data = samples.tobytes()
-        size = layout.SAMPLE_DTYPE.itemsize
-        times = np.maximum(samples["host_time_ns"], 0).tolist()
-        for index, (time, number) in enumerate(
-            zip(times, samples["sequence"].tolist(), strict=True)
-        ):
-            message = layout.CDR_HEADER + data[index * size : (index + 1) * size]
-            self._mcap.add_message(self._channel, time, message, time, number)
+        self._mcap.add_samples(samples)
         self.sample_count += len(samples)
         self.holds_data = True
         if self._flushed_at is None:
-            self._flushed_at = times[0]
-        self._newest_host_time = times[-1]
-        self.flush_if_due(times[-1])
+            self._flushed_at = max(int(samples["host_time_ns"][0]), 0)
+        self._newest_host_time = max(int(samples["host_time_ns"][-1]), 0)
+        self.flush_if_due(self._newest_host_time)
 
     def flush_if_due(self, host_time_ns: int) -> None:
         """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""
@@ -77,13 +68,7 @@ class SampleFile:
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Add a file, in its place among the samples."""
         self._flush(self._newest_host_time)
-        self._mcap.add_attachment(
-            create_time=0,
-            log_time=self._newest_host_time,
-            name=name,
-            media_type=media_type,
-            data=data,
-        )
+        self._mcap.attach(self._newest_host_time, name, media_type, data)
         self._mcap.flush()
         self.holds_data = True
 
@@ -114,14 +99,3 @@ class SampleFile:
         self._mcap.flush()
         if self._flushed_at is not None:
             self._flushed_at = host_time_ns
-
-
-def _start(stream: IO[bytes], entries: dict[str, str]) -> Any:
-    from mcap.writer import CompressionType, Writer
-
-    from scissorcal import __version__
-
-    writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-    writer.start(profile=layout.PROFILE, library=f"scissorcal {__version__}")
-    writer.add_metadata(METADATA_NAME, entries)
-    return writer

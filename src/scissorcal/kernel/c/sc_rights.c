@@ -2,9 +2,9 @@
 
 #include "sc_rights.h"
 
-#include <stdint.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 #ifdef __linux__
 #include <sys/syscall.h>
@@ -16,8 +16,6 @@ int sc_rights_lock_memory(void)
 }
 
 #if defined(__linux__) && defined(SYS_sched_setattr)
-
-static const uint64_t SHORTEST_SLICE_NS = 100000; /* the least that Linux takes */
 
 /* As in linux/sched/types.h, first version; not all systems have that header. */
 typedef struct {
@@ -31,19 +29,21 @@ typedef struct {
     uint64_t period_ns;
 } attributes;
 
-int sc_rights_short_slice(void)
+int sc_rights_slice(uint32_t slice_us)
 {
     attributes wanted;
     memset(&wanted, 0, sizeof wanted);
     wanted.size = sizeof wanted;
-    wanted.runtime_ns = SHORTEST_SLICE_NS;
+    wanted.nice = getpriority(PRIO_PROCESS, 0);
+    wanted.runtime_ns = (uint64_t)slice_us * 1000u;
     return syscall(SYS_sched_setattr, 0, &wanted, 0u) == 0;
 }
 
 #else
 
-int sc_rights_short_slice(void)
+int sc_rights_slice(uint32_t slice_us)
 {
+    (void)slice_us;
     return 0;
 }
 
