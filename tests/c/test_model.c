@@ -1,23 +1,9 @@
 #include "check.h"
 #include "json.h"
-#include "sc_model.h"
+#include "models.h"
 
 #include <stddef.h>
 #include <string.h>
-
-typedef struct {
-    float x[SC_TABLE_MAX], y[SC_TABLE_MAX], slope[SC_TABLE_MAX], area[SC_TABLE_MAX];
-} storage;
-
-static sc_table load_table(const json *columns, storage *room)
-{
-    sc_table table = {room->x, room->y, room->slope, room->area, 0};
-    table.size = (int32_t)json_floats(json_get(columns, "x"), room->x, SC_TABLE_MAX);
-    json_floats(json_get(columns, "y"), room->y, SC_TABLE_MAX);
-    json_floats(json_get(columns, "slope"), room->slope, SC_TABLE_MAX);
-    sc_table_accumulate(&table, room->area);
-    return table;
-}
 
 static double largest(const json *column)
 {
@@ -59,33 +45,6 @@ static void check_tables(const char *folder)
         CHECK(!sc_table_is_sound(&table), title);
     }
     json_free(&vectors);
-}
-
-static sc_model load_model(const json *from, storage rooms[5])
-{
-    sc_model model;
-    memset(&model, 0, sizeof model);
-    model.edge = load_table(json_get(from, "edge"), &rooms[0]);
-    model.response = load_table(json_get(from, "response"), &rooms[1]);
-    model.friction_opening = load_table(json_get(from, "friction_opening"), &rooms[2]);
-    model.friction_closing = load_table(json_get(from, "friction_closing"), &rooms[3]);
-    model.friction_angle = load_table(json_get(from, "friction_angle"), &rooms[4]);
-    model.moving_blades = (int32_t)json_number(from, "moving_blades");
-    model.closure =
-        strcmp(json_text(from, "closure"), "eq4") == 0 ? SC_CLOSURE_EQ4 : SC_CLOSURE_WORK;
-    model.render_friction = (int32_t)json_number(from, "render_friction");
-    model.upper_face = (float)json_number(from, "upper_face");
-    model.fracture_energy = (float)json_number(from, "fracture_energy");
-    model.kappa = (float)json_number(from, "kappa");
-    model.rate_damping = (float)json_number(from, "rate_damping");
-    model.friction_rate_eps = (float)json_number(from, "friction_rate_eps");
-    model.handle_radius = (float)json_number(from, "handle_radius");
-    model.tip_station = (float)json_number(from, "tip_station");
-    model.opening_min = (float)json_number(from, "opening_min");
-    model.opening_max = (float)json_number(from, "opening_max");
-    model.contact_min = (float)json_number(from, "contact_min");
-    model.contact_max = (float)json_number(from, "contact_max");
-    return model;
 }
 
 typedef struct {
@@ -162,12 +121,60 @@ static void check_absurd(const json *one)
     }
 }
 
+static void refused(const sc_model *model, const char *why)
+{
+    CHECK(!sc_model_is_sound(model), why);
+}
+
+/* What must not be rendered: each change makes a sound model unsound, and undone it is sound again. */
+static void check_soundness(const json *one)
+{
+    static storage rooms[5];
+    const char *title = json_text(one, "title");
+    sc_model model = load_model(json_get(one, "model"), rooms);
+    static float *const levels[] = {&rooms[2].y[1], &rooms[3].y[0], &rooms[4].y[1]};
+    static const float bad[] = {-1e-3f, NAN, INFINITY, -INFINITY};
+    CHECK(sc_model_is_sound(&model), title);
+    for (size_t i = 0; i < 3 * sizeof bad / sizeof *bad; i++) {
+        float *level = levels[i % 3], kept = *level;
+        *level = bad[i / 3];
+        refused(&model, "friction");
+        *level = kept;
+    }
+    float kept = rooms[2].slope[0];
+    rooms[2].slope[0] = -1.0f; /* between two knots above 0 the cubic falls below it */
+    refused(&model, "friction between knots");
+    rooms[2].slope[0] = kept;
+    kept = rooms[1].y[3];
+    rooms[1].y[3] = 0.5f * rooms[1].y[2];
+    refused(&model, "a response that falls");
+    rooms[1].y[3] = kept;
+    rooms[1].y[0] = 1e-3f;
+    refused(&model, "a response without contact");
+    rooms[1].y[0] = 0.0f;
+    kept = rooms[0].x[1];
+    rooms[0].x[1] = rooms[0].x[0];
+    refused(&model, "knots that do not ascend");
+    rooms[0].x[1] = kept;
+    model.friction_rate_eps = 0.0f;
+    refused(&model, "no band around rest");
+    model.friction_rate_eps = 0.01f;
+    model.opening_min = NAN;
+    refused(&model, "no range");
+    model.opening_min = 0.2f;
+    model.kappa = 1.5f;
+    refused(&model, "kappa");
+    model.kappa = 1.0f;
+    CHECK(sc_model_is_sound(&model), title);
+}
+
 int main(int argc, char **argv)
 {
     const char *folder = argc > 1 ? argv[1] : "../golden";
     json vectors = json_load(folder, "model.json");
     const json *cases = json_get(&vectors, "cases");
     check_tables(folder);
+    check_soundness(&cases->items[0]);
     for (size_t i = 0; i < cases->size; i++) {
         check_steps(&cases->items[i]);
         check_absurd(&cases->items[i]);

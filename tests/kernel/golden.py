@@ -311,7 +311,7 @@ def servo_vectors() -> dict[str, Any]:
         single_config = {
             f.name: getattr(config, f.name)
             for f in fields(config)
-            if f.name not in ("watch", "passivity")
+            if f.name not in ("watch", "passivity", "motor_sign")
         }
         single_config = {
             name: single(v) if isinstance(v, float) else v for name, v in single_config.items()

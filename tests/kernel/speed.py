@@ -1,10 +1,18 @@
-"""Nanoseconds of one kernel step, in a C loop, by single calls, and in plain Python.
+"""How long a step of the kernel takes, here and on a Cortex-M4F.
 
-``python -m tests.kernel.speed`` prints a table; figures are reported, never asserted.
+``python -m tests.kernel.speed`` prints three tables: nanoseconds of a step in a C loop, by single
+calls and in plain Python; then, from tests/c/bench_step.c, a slow stroke's mean step against one
+written by hand and the worst of random steps, in nanoseconds here and, where arm-none-eabi-gcc and
+qemu-system-arm are installed, in instructions of a Cortex-M4F. Times are reported, never asserted;
+the instructions are asserted by test_c_core.py.
 """
 
+import shutil
+import subprocess
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +24,7 @@ from tests.kernel.reference_model import Reference
 from tests.kernel.reference_wire import unstuffed
 from tests.kernel.zoo import make_tables
 
+C_TESTS = Path(__file__).parent.parent / "c"
 STEPS = 4000
 CASES = {
     "pressing (no fracture)": ({"fracture_energy": 0.0}, 0.4, 0.2, -0.05),
@@ -85,6 +94,13 @@ def servo_figure() -> float:
     return fastest(run)
 
 
+def bench(target: str) -> str:
+    """What a benchmark of tests/c prints; its output is kept nowhere."""
+    with tempfile.TemporaryDirectory() as build:
+        command = ["make", "-s", "--no-print-directory", "-C", str(C_TESTS), f"BUILD={build}"]
+        return subprocess.run([*command, target], capture_output=True, text=True, check=True).stdout
+
+
 def main() -> None:
     print(
         f"{'ns per step':26}{'C loop':>10}{'one call':>10}{'.step()':>10}{'Python':>10}{'ratio':>8}"
@@ -94,6 +110,9 @@ def main() -> None:
         row = "".join(f"{value:10.0f}" for value in figures)
         print(f"{title:26}{row}{figures[3] / figures[0]:8.0f}")
     print(f"servo, STATE bytes to COMMAND bytes, from Python: {servo_figure():.0f} ns")
+    print(f"\n{bench('bench')}")
+    if shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"):
+        print(bench("cortex-m"))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The C tests, strict and under the sanitizers, as part of the ordinary test run."""
+"""The C tests, strict and under the sanitizers, and a step on a Cortex-M4F where tools are here."""
 
 import shutil
 import subprocess
@@ -9,16 +9,76 @@ import pytest
 C_TESTS = Path(__file__).parent.parent / "c"
 
 
-@pytest.mark.skipif(
-    not (shutil.which("make") and shutil.which("cc")), reason="no make or C compiler here"
-)
-@pytest.mark.parametrize("kind", ["strict", "sanitized"])
-def test_c_core(kind: str, tmp_path: Path) -> None:
+MOST_INSTRUCTIONS = 6000
+"""Of any step at 64 knots on a Cortex-M4F, where the release falls along the blade."""
+
+MOST_TIMES_BY_HAND = 3.0
+"""Of a slow stroke's mean step."""
+
+
+def make(target: str, build: Path) -> str:
     ran = subprocess.run(
-        ["make", "--no-print-directory", "-C", str(C_TESTS), f"BUILD={tmp_path}", kind],
+        ["make", "--no-print-directory", "-C", str(C_TESTS), f"BUILD={build}", target],
         capture_output=True,
         text=True,
         check=False,
+        timeout=600,
     )
     assert ran.returncode == 0, ran.stdout[-4000:] + ran.stderr[-4000:]
-    assert ran.stdout.count(" 0 failed") == len(list(C_TESTS.glob("test_*.c")))
+    return ran.stdout
+
+
+needs_compiler = pytest.mark.skipif(
+    not (shutil.which("make") and shutil.which("cc")), reason="no make or C compiler here"
+)
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", ["strict", "sanitized"])
+def test_c_core(kind: str, tmp_path: Path) -> None:
+    assert make(kind, tmp_path).count(" 0 failed") == len(list(C_TESTS.glob("test_*.c")))
+
+
+@needs_compiler
+def test_what_two_threads_share(tmp_path: Path) -> None:
+    """Ring and mailbox under the thread sanitizer, where compiler and kernel can run it."""
+    probe = tmp_path / "probe.c"
+    probe.write_text("int main(void) { return 0; }\n", encoding="utf-8")
+    built = subprocess.run(
+        ["cc", "-fsanitize=thread", "-o", str(tmp_path / "probe"), str(probe)],
+        capture_output=True,
+        check=False,
+    )
+    if built.returncode or subprocess.run([tmp_path / "probe"], check=False).returncode:
+        pytest.skip("no thread sanitizer here")
+    assert " 0 failed" in make("threads", tmp_path)
+
+
+@needs_compiler
+@pytest.mark.skipif(
+    not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
+    reason="no arm-none-eabi-gcc or qemu-system-arm here",
+)
+def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
+    """The portable core compiles without a warning, and its step's instructions are bounded."""
+    rows = [line for line in make("cortex-m", tmp_path).splitlines() if ", " in line]
+    assert len(rows) == 10
+    for row in rows:
+        by_hand, stroke, ratio, _, worst = (float(word) for word in row.split()[-5:])
+        assert 0 < by_hand < stroke
+        if "scanned" not in row:
+            assert ratio <= MOST_TIMES_BY_HAND, row
+            assert worst <= MOST_INSTRUCTIONS, row
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_servo_over_ten_million_disturbed_states(seed: int, tmp_path: Path) -> None:
+    """The figures stand on stdout: pytest -s shows them."""
+    program = tmp_path / "strict" / "test_disturbed"
+    make(str(program), tmp_path)
+    words = [program, C_TESTS.parent / "golden", "10000000", str(seed)]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False)
+    print(ran.stdout)
+    assert ran.returncode == 0, ran.stdout + ran.stderr

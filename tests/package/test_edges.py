@@ -1,5 +1,6 @@
 """Edges that photographs gave: every family is compiled, and its uncertainty stands in the band."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,3 +75,27 @@ def test_an_edge_of_a_recipe_is_still_held_to_it(tmp_path: Path) -> None:
         build_package(
             recipe(render_friction=False), None, fit, tmp_path / "p.zip", np.random.default_rng(1)
         )
+
+
+@pytest.mark.parametrize("family", list(EDGES))
+def test_along_smooth_edges_the_release_falls(family: str, tmp_path: Path) -> None:
+    fit = fit_with(family, 1.0)
+    summary = build_package(photographed(), None, fit, tmp_path / "p.zip", np.random.default_rng(1))
+    assert open_package(summary.path).tables.release_falls
+    assert not [said for said in summary.warnings if "knots of the edge" in said]
+
+
+def test_a_nick_in_the_edge_is_stated(tmp_path: Path) -> None:
+    """Behind it the release rises: a step has to look at the knots, and the package says so."""
+    fit = fit_with("line", 1.0)
+    summary = build_package(photographed(), None, fit, tmp_path / "p.zip", np.random.default_rng(1))
+    package = open_package(summary.path)
+    station = np.linspace(0.0, 0.071, 120)
+    away = (station - 0.035) / 0.002
+    nick = -6e-4 * np.exp(-(away**2))
+    slope = 0.03 - 2.0 * away / 0.002 * nick
+    edge = np.stack([station, -0.0083 + 0.03 * station + nick, slope]).astype(np.float32)
+    nicked = replace(package, arrays={**package.arrays, "tables/edge.npy": edge})
+    assert not nicked.tables.release_falls
+    (said,) = set(nicked.warnings) - set(package.warnings)
+    assert "all 120 knots of the edge" in said

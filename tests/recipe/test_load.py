@@ -153,7 +153,7 @@ def test_builtin_recipes_load(name: str) -> None:
             "sheet_length_mm = 3.0\nmoving = ",
             "rig.sheet_length_mm: unknown key. It belongs in [material]. Allowed here: joint, "
             "moving, handle_radius_mm, opening_zero_sd_deg, hand_damping_N_s_per_m, edge, control, "
-            "line.",
+            "line, motor_sign, probe.",
         ),
     ],
 )

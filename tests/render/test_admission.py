@@ -10,11 +10,18 @@ from benchmarks.stability import draw_loops, simulate
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, Table
 from scissorcal.package import ModelPackage
+from scissorcal.recording.probe import Estimate, ProbeResult
 from scissorcal.render.admission import admit, passivity_config, rendered_tables
-from scissorcal.render.admission_rule import LoopFacts, allowed_stiffness, delayed_stiffness
+from scissorcal.render.admission_rule import (
+    LoopFacts,
+    allowed_damper,
+    allowed_stiffness,
+    delayed_stiffness,
+)
 from scissorcal.render.derating import felt_change, needs_of, softened
-from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
+from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables
+from tests.render.test_engine import rig
 
 RIG = LoopFacts(
     tick_s=1e-3,
@@ -121,7 +128,9 @@ def test_each_stated_cure_cures(paper: ModelPackage) -> None:
     more = float(damping.split(" mN m s/rad")[0]) * 1e-3
     assert delayed_stiffness(fine, HAND + more) == pytest.approx(needed, rel=0.1)
     coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 2000, late_s=0.0, tick_s=1e-4)
-    (step,) = admit(paper.tables, coarse, 0.3, LIMIT, RATE).cures
+    dry, step = admit(paper.tables, coarse, 0.3, LIMIT, RATE).cures
+    rough = float(dry.split("friction of ")[1].split(" mN m")[0]) * 1e-3
+    assert allowed_stiffness(replace(coarse, coulomb_Nm=rough), 0.3) > 0.9 * needed
     finer = float(step.split("step of ")[1].split(" rad")[0])
     assert allowed_stiffness(replace(coarse, encoder_step_rad=finer), 0.3) > 0.9 * needed
 
@@ -134,16 +143,52 @@ def test_friction_near_rest_follows_the_encoder_and_the_delay(paper: ModelPackag
     coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 5000)
     wide = admit(paper.tables, coarse, HAND, LIMIT, RATE)
     assert wide.friction_width_rad == pytest.approx(4.0 * coarse.encoder_step_rad)
-    config = passivity_config(known, 100.0)
+    config = passivity_config(known, rig().identity)
     assert config.friction_width == known.friction_width_rad
     assert config.is_measured
     assert 0.0 < config.most_damping < 0.1
 
 
 def test_without_dry_friction_or_far_too_late_it_is_refused(paper: ModelPackage) -> None:
-    for rig in (replace(RIG, coulomb_Nm=0.0), replace(RIG, late_s=0.05)):
+    for unfit in (replace(RIG, coulomb_Nm=0.0), replace(RIG, late_s=0.05)):
         with pytest.raises(InputError, match="cannot render the package stably"):
-            admit(paper.tables, rig, HAND, LIMIT, RATE)
+            admit(paper.tables, unfit, HAND, LIMIT, RATE)
+
+
+def test_a_material_damper_that_the_rate_is_too_late_for_is_rendered_weaker(
+    paper: ModelPackage,
+) -> None:
+    oily = replace(paper.tables, rate_damping=100.0)
+    found = admit(oily, RIG, HAND, LIMIT, RATE)
+    assert found.derated
+    assert 0.0 < found.damping_share < 1.0
+    assert "damping" in found.reasons[-1]
+    weaker = needs_of(replace(oily, rate_damping=100.0 * found.damping_share), LIMIT)
+    assert weaker.damper == pytest.approx(allowed_damper(RIG), rel=1e-3)
+    assert rendered_tables(oily, found).rate_damping == pytest.approx(100.0 * found.damping_share)
+
+
+def test_what_a_probe_adds(paper: ModelPackage) -> None:
+    """Its delay always, its upper end; friction and inertia where no fit has them."""
+    probe = ProbeResult(
+        device="rig",
+        identity="0",
+        made_at="2026-11-22T20:00:00+00:00",
+        delay_s=Estimate(1.0e-3, 1.0e-4),
+        inertia_kg_m2=Estimate(2.0e-4, 1e-5),
+        coulomb_Nm=Estimate(0.01, 1e-3),
+        viscous_Nm_s_per_rad=Estimate(0.002, 2e-3),
+    )
+    fitted = rig_facts(paper)
+    known = with_probe(fitted, probe)
+    assert known.late_s == pytest.approx(1.1645e-3, rel=1e-3)
+    assert (known.coulomb_Nm, known.inertia_kg_m2) == (fitted.coulomb_Nm, fitted.inertia_kg_m2)
+    bare = with_probe(RigFacts(), probe)
+    assert bare.coulomb_Nm == pytest.approx(0.00836, rel=1e-2)
+    assert bare.damping_Nm_s_per_rad == 0.0
+    assert bare.inertia_kg_m2 == 2.0e-4
+    assert "probe of 2026" in bare.source
+    assert with_probe(fitted, None) is fitted
 
 
 def test_an_unknown_rig_is_not_evaluated(silent_paper: ModelPackage) -> None:
@@ -157,8 +202,6 @@ def test_an_unknown_rig_is_not_evaluated(silent_paper: ModelPackage) -> None:
 def test_facts_are_the_weaker_ends_of_the_fit_and_say_where_they_come_from(
     paper: ModelPackage,
 ) -> None:
-    from tests.render.test_engine import rig
-
     known = rig_facts(paper)
     assert known.coulomb_Nm is not None
     assert 0.008 < known.coulomb_Nm < 0.014

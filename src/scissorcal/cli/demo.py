@@ -102,6 +102,7 @@ def _text(found: "DemoResult") -> str:
         f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
         f"rendered torque error {100 * found.torque_error:.2f} % (rms over the scene)",
         f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
+        found.rendering.admission.summary,
         "",
         f"report: {_shown(found.workspace / 'report' / 'report.html')}",
     ]

@@ -12,7 +12,6 @@ from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, po
 from scissorcal.cli.output import Answer, command, note, table
 
 if TYPE_CHECKING:
-    from scissorcal.render import Admission
     from scissorcal.workday.runs.render import Rendered
 
 
@@ -95,7 +94,7 @@ def _text(rendered: "Rendered") -> str:
         f"{result.misses} frames missed, {result.garbled} garbled, {result.stalls} stalls, "
         f"{result.faults} faults; {100 * result.limited_share:.1f} % of the frames at a limit",
         f"largest torque {result.largest_torque_Nm:.3g} N m",
-        _stiffness(result.admission),
+        result.admission.summary,
         "",
     ]
     ledger = [["energy", "mJ"]]
@@ -109,13 +108,3 @@ def _text(rendered: "Rendered") -> str:
     if result.warnings:
         lines += ["", *(f"note: {warning}" for warning in result.warnings)]
     return "\n".join(lines)
-
-
-def _stiffness(admission: "Admission") -> str:
-    """What was rendered of the package's stiffness, in a line."""
-    if not admission.evaluated:
-        return f"stiffness {admission.rendered:.3g} N m/rad, not checked against this rig"
-    return (
-        f"stiffness {admission.rendered:.3g} of the package's {admission.needed:.3g} N m/rad "
-        f"(stable alone {admission.allowed_alone:.2g}, in a hand {admission.allowed_in_hand:.2g})"
-    )

@@ -112,6 +112,17 @@ class ModelTables:
             if np.any(getattr(self, name).y < 0):
                 raise ValueError(f"{name} holds a negative level, which would drive the blades.")
 
+    @property
+    def release_falls(self) -> bool:
+        """Whether the energy that a crack releases falls outwards along the blade.
+
+        Once past its largest value, and at every opening of the range, as far as it decides where
+        a crack stops. Then the kernel finds that place in a few look-ups; else it looks at the
+        edge's knots one by one, because the first such place is where the crack stops.
+        """
+        model, _keep = model_struct(self)
+        return bool(model.release_falls)
+
 
 def _check_numbers(tables: ModelTables) -> None:
     if tables.moving_blades not in (1, 2):

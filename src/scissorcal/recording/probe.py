@@ -65,14 +65,12 @@ class ProbeResult:
     viscous_Nm_s_per_rad: Estimate | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
     verdicts: tuple[Verdict, ...] = ()
+    format: Literal["scissorcal-probe/1"] = FORMAT
 
     def as_dict(self) -> dict[str, Any]:
-        """Give the probe as plain values, for JSON; a fact that is not finite becomes null."""
-        plain = asdict(self)
-        plain["facts"] = {
-            name: value if math.isfinite(value) else None for name, value in self.facts.items()
-        }
-        return {"format": FORMAT, **plain}
+        """Give the probe as plain values, for JSON; facts that are not finite are left out."""
+        facts = {name: value for name, value in self.facts.items() if math.isfinite(value)}
+        return {**asdict(self), "facts": facts}
 
 
 def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
@@ -92,10 +90,7 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
         for name, value in values.items():
             if isinstance(value, Mapping) and name != "facts":
                 values[name] = Estimate(float(value["mean"]), float(value["sd"]))
-        values["facts"] = {
-            name: math.nan if value is None else float(value)
-            for name, value in plain["facts"].items()
-        }
+        values["facts"] = {name: float(value) for name, value in plain["facts"].items()}
         values["verdicts"] = tuple(Verdict(**verdict) for verdict in plain["verdicts"])
         return ProbeResult(**values)
     except (KeyError, TypeError, AttributeError) as error:

@@ -11,12 +11,13 @@ import math
 from dataclasses import dataclass, replace
 
 from scissorcal.errors import InputError
-from scissorcal.kernel import Identity, ModelTables, PassivityConfig
+from scissorcal.kernel import Capability, Identity, ModelTables, PassivityConfig
 from scissorcal.package import ModelPackage
 from scissorcal.render.admission_rule import (
     MARGIN,
     OSCILLATION_RATE,
     LoopFacts,
+    allowed_damper,
     allowed_stiffness,
     delayed_stiffness,
     dissipation,
@@ -41,7 +42,8 @@ class Admission:
     damping ``hand_damping_Nm_s_per_rad``; ``needed`` the package's largest over the scene, at
     ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``steepest_N_per_m``
     is to what the response was limited (None: not derated), ``felt_share`` the relative rms change
-    of mean torque that this costs. ``friction_width_rad`` is over which opening rendered friction
+    of mean torque that this costs, ``damping_share`` the share of the material's rate damping that
+    is rendered. ``friction_width_rad`` is over which opening rendered friction
     builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was
     checked. ``sources`` say where each comes from, ``reasons`` what was done and why, ``cures``
     what would make it unnecessary.
@@ -57,6 +59,7 @@ class Admission:
     drop_Nm: float
     steepest_N_per_m: float | None
     felt_share: float
+    damping_share: float
     friction_width_rad: float
     sources: tuple[str, ...]
     reasons: tuple[str, ...]
@@ -70,12 +73,22 @@ class Admission:
     @property
     def derated(self) -> bool:
         """Whether the package is rendered softer than it is."""
-        return self.steepest_N_per_m is not None
+        return self.steepest_N_per_m is not None or self.damping_share < 1.0
 
     @property
     def factor(self) -> float:
         """Rendered over needed stiffness."""
         return self.rendered / self.needed if self.needed > 0.0 else 1.0
+
+    @property
+    def summary(self) -> str:
+        """What is rendered of the package's stiffness, in a line."""
+        if not self.evaluated:
+            return f"stiffness {self.rendered:.3g} N m/rad, not checked against this rig"
+        return (
+            f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad "
+            f"(stable alone {self.allowed_alone:.2g}, in a hand {self.allowed_in_hand:.2g})"
+        )
 
 
 def admit(
@@ -100,6 +113,7 @@ def admit(
             f"{LEAST_FACTOR:.0%} of the elastic slope. What would cure it: {' '.join(cures)}"
         )
     felt = 0.0 if steepest is None else felt_change(tables, softened(tables, steepest), limit)
+    damping = min(1.0, allowed_damper(facts) / needs.damper) if needs.damper > 0.0 else 1.0
     return Admission(
         facts=facts,
         hand_damping_Nm_s_per_rad=hand,
@@ -111,9 +125,10 @@ def admit(
         drop_Nm=needs.drop_Nm,
         steepest_N_per_m=steepest,
         felt_share=felt,
+        damping_share=damping,
         friction_width_rad=_friction_width(needs, facts, held),
         sources=(),
-        reasons=_reasons(needs, facts, (alone, held), left, felt),
+        reasons=(*_reasons(needs, facts, (alone, held), left, felt), *_damped(needs, damping)),
         cures=() if steepest is None else cures,
     )
 
@@ -136,26 +151,26 @@ def admit_package(
 def rendered_tables(tables: ModelTables, admission: Admission) -> ModelTables:
     """What the loop renders of ``tables`` under an admission."""
     steepest = admission.steepest_N_per_m
-    return tables if steepest is None else softened(tables, steepest)
+    soft = tables if steepest is None else softened(tables, steepest)
+    if admission.damping_share == 1.0:
+        return soft
+    return replace(soft, rate_damping=admission.damping_share * soft.rate_damping)
 
 
-def passivity_config(admission: Admission, cutoff_Hz: float) -> PassivityConfig:
-    """How the servo watches the energy of an admitted rendering.
-
-    The controller's damping acts on a rate that is late by the loop's delay and by the estimator's
-    1 / (2 pi f): its largest value keeps the phase of that damper below a quarter of a turn at
-    twice its crossing, MARGIN I / delay.
-    """
+def passivity_config(admission: Admission, identity: Identity) -> PassivityConfig:
+    """How the servo watches the energy of an admitted rendering on a device."""
+    sensor = bool(identity.capabilities & Capability.HANDLE_FORCE_SENSOR)
+    radius = identity.handle_radius if sensor else 0.0
     facts = admission.facts
     if facts is None:
-        return PassivityConfig(is_measured=True)
-    late = facts.delay_s + 1.0 / (2.0 * math.pi * cutoff_Hz)
+        return PassivityConfig(is_measured=True, handle_radius=radius)
     return PassivityConfig(
         is_measured=True,
+        handle_radius=radius,
         rig_damping=facts.damping_Nm_s_per_rad,
         rig_coulomb=facts.coulomb_Nm,
         margin_J=0.5 * facts.inertia_kg_m2 * (ENERGY_RATE * OSCILLATION_RATE) ** 2,
-        most_damping=MARGIN * facts.inertia_kg_m2 / late,
+        most_damping=allowed_damper(facts),
         friction_width=admission.friction_width_rad,
     )
 
@@ -180,6 +195,7 @@ def _unchecked(needs: Needs, hand: float) -> Admission:
         drop_Nm=needs.drop_Nm,
         steepest_N_per_m=None,
         felt_share=0.0,
+        damping_share=1.0,
         friction_width_rad=0.0,
         sources=(),
         reasons=(
@@ -232,12 +248,27 @@ def _reasons(
     )
 
 
+def _damped(needs: Needs, share: float) -> tuple[str, ...]:
+    if share == 1.0:
+        return ()
+    return (
+        f"The material's damping of up to {needs.damper * 1e3:.2g} mN m s/rad is rendered at "
+        f"{share:.0%}, as the rate is known too late for more.",
+    )
+
+
 def _cures(facts: LoopFacts, hand: float, rate: float, needs: Needs) -> tuple[str, ...]:
     """What would make the package pass: delay, damping, encoder; each alone, where it can."""
     wanted = needs.stiffness
     cures = []
     cap = 2.0 * facts.coulomb_Nm / facts.encoder_step_rad
-    if cap < wanted and facts.coulomb_Nm > 0.0:
+    if cap < wanted:
+        dry = 0.5 * wanted * facts.encoder_step_rad
+        cures.append(
+            f"Dry friction of {dry * 1e3:.2g} mN m (now {facts.coulomb_Nm * 1e3:.2g}), for this "
+            "encoder."
+        )
+    if 0.0 < cap < wanted:
         step = 2.0 * facts.coulomb_Nm / wanted
         cures.append(f"An encoder step of {step:.1g} rad (now {facts.encoder_step_rad:.1g}).")
     if delayed_stiffness(facts, hand, rate) < wanted:

@@ -16,6 +16,8 @@ import math
 from dataclasses import dataclass
 
 MARGIN = 0.5
+RATE_CUTOFF_HZ = 100.0
+"""Low-pass of the rate by which damping is rendered."""
 OSCILLATION_RATE = 1.5
 """rad/s: amplitude of the rate up to which friction must stop an oscillation; a scene with faster
 motion raises it."""
@@ -65,3 +67,13 @@ def allowed_stiffness(facts: LoopFacts, hand: float = 0.0, rate: float = OSCILLA
 def delayed_stiffness(facts: LoopFacts, hand: float = 0.0, rate: float = OSCILLATION_RATE) -> float:
     """The delay's part of the rule alone, N m/rad: as with an encoder of infinite resolution."""
     return MARGIN * dissipation(facts, hand, rate) / facts.delay_s
+
+
+def allowed_damper(facts: LoopFacts) -> float:
+    """Largest damping in N m s/rad that is rendered from the estimated rate.
+
+    With inertia I alone, damping that is late by t oscillates from B t / I = pi / 2 on; t is the
+    loop's delay and the estimator's 1 / (2 pi f). Allowed is MARGIN I / t, a third of that.
+    """
+    late = facts.delay_s + 1.0 / (2.0 * math.pi * RATE_CUTOFF_HZ)
+    return MARGIN * facts.inertia_kg_m2 / late

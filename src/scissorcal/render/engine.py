@@ -23,6 +23,7 @@ from scissorcal.render.admission import (
     passivity_config,
     rendered_tables,
 )
+from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
 from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
@@ -31,7 +32,6 @@ SUPERVISOR_S = 0.2
 """Time without heartbeat after which only damping is left; after five times as much it stops.
 The heartbeat ends where the supervisor takes no block for a second: see Heartbeat."""
 
-RATE_CUTOFF_HZ = 100.0
 FALLBACK_DAMPING = 0.02
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 0.2
@@ -80,7 +80,7 @@ def render(
 
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
-    inertia and delay, by default the package's friction fit. The result's ``admission`` says so.
+    inertia and delay, by default the package's friction fit. The result's ``admission`` states it.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; DeviceError where the rig fails, and
@@ -210,7 +210,7 @@ def _servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
-        passivity=passivity_config(admission, RATE_CUTOFF_HZ),
+        passivity=passivity_config(admission, identity),
         watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s),
     )
 

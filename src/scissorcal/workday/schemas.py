@@ -20,6 +20,7 @@ SOURCES: Mapping[str, str] = {
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
+    "probe.schema.json": "scissorcal.recording.probe:ProbeResult",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",

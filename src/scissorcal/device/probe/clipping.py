@@ -32,7 +32,7 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
             f"Clipping was not tried: a tick at the limit ({limit:.3g} N m) could bring the blades "
             f"to {fastest:.2g} rad/s, and rig.probe allows {bounds.rate_rad_per_s:.2g}."
         )
-        return not_evaluated("probe.motors", check, why, bounds.rate_rad_per_s, fastest)
+        return not_evaluated("probe.motors", check, why)
     try:
         talk.link.configure(ConfigKey.BRAKE_AFTER_MS, SHORTEST_BRAKE_MS)
     except DeviceError as error:

@@ -41,6 +41,7 @@ STEP_RATIO = 1.5
 REST_RAD = 0.002
 LAG_LIMIT_MS = 10.0
 """BRAKE_AFTER_MS by default: later commands brake the device each time."""
+GAIN_SD = 0.1
 GAIN_WARNING, GAIN_LIMIT = 0.05, 0.2
 """Torque in a fit errs as the gain does: 5 % is most of a recipe's tolerance of 7 %, 20 % is no
 calibration of any current sensor but a wrong scale."""
@@ -156,8 +157,12 @@ def judge_follow(found: Follow) -> Verdict:
             "that its motor exerts (measured, or at least what its amplifier was told)."
         )
         return Verdict(MOTORS, check, "fail", 1.0, limit, why)
-    if not math.isfinite(gain):
-        return not_evaluated(MOTORS, check, "Too few samples with a steady torque.", limit)
+    if not sd <= GAIN_SD:
+        why = (
+            "The gain of motor_torque could not be told: its noise is too large, or this computer "
+            "stalled too often to hold a torque."
+        )
+        return not_evaluated(MOTORS, check, why, limit)
     off = abs(gain - 1.0)
     if abs(gain) < limit:
         why = (

@@ -226,14 +226,13 @@ def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     held = holds(talk, axis, pushed.effort, pulled.effort)
     swung = swings(talk, axis, push, pull)
     zero = finding.result.torque_zero_Nm
-    answered = follow(
-        joined(talk, (*found.pulses, *held, *swung)), zero.mean if zero is not None else 0.0
-    )
+    parts = joined(talk, (*found.pulses, *held, *swung), disturbed=True)
+    answered = follow(parts, zero.mean if zero is not None else 0.0)
     step = observed_step(talk.heard()["opening"])
-    parts = [swing_of(part, axis.moved) for part in joined(talk, swung)]
+    moving = [swing_of(part, axis.moved) for part in joined(talk, swung)]
     resolution = step if math.isfinite(step) else identity.opening_resolution
     noise = max(quiet.jitter_rad, resolution / math.sqrt(12.0))
-    fitted = mechanics([part for part in parts if part is not None], noise)
+    fitted = mechanics([swing for swing in moving if swing is not None], noise)
     facts = {
         "breakaway_Nm": max(pushed.effort, -pulled.effort),
         "breakaway_opening_Nm": pushed.effort,

@@ -240,7 +240,9 @@ def _pulse(talk: Talk, axis: Axis, effort: float, cut: Cut) -> Stage[tuple[float
     return (went if abs(went) >= axis.moved or first else 0.0), first
 
 
-def joined(talk: Talk, pulses: tuple[Pulse, ...]) -> list[NDArray[np.void]]:
-    """What was heard in each pulse that nothing disturbed."""
+def joined(
+    talk: Talk, pulses: tuple[Pulse, ...], *, disturbed: bool = False
+) -> list[NDArray[np.void]]:
+    """What was heard in each pulse; in those that something disturbed only if asked for."""
     whole = talk.heard()
-    return [whole[pulse.begin : pulse.end] for pulse in pulses if not pulse.disturbed]
+    return [whole[pulse.begin : pulse.end] for pulse in pulses if disturbed or not pulse.disturbed]

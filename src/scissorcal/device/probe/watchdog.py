@@ -73,23 +73,28 @@ def _toggled(talk: Talk) -> Stage[list[int]]:
         answer = RELEASE if on else Answer()
         on = not on
         asked = state.sequence
+        disturbed = False
         for _ in range(talk.ticks(LONGEST_TICKS_S)):
-            state = yield answer
+            faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
+            disturbed = disturbed or faulty  # this computer was late, and the device braked
+            state = yield answer._replace(clear=faulty)
             if bool(state.flags & StateFlag.MOTOR_ENABLED) is on:
-                lags.append((state.sequence - asked) % 2**32)
+                lags += [] if disturbed else [(state.sequence - asked) % 2**32]
                 break
         else:
             return []
         for _ in range(PAUSES[toggle % len(PAUSES)]):
-            state = yield answer
+            state = yield answer._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
     return lags
 
 
 def _silenced(talk: Talk, after_ms: float) -> Stage[tuple[float | None, bool, bool]]:
     """Withhold commands; return the silence until the brake (ms), and which flags showed."""
     state = yield RELEASE
-    for _ in range(talk.ticks(LATER_S)):
-        state = yield Answer()
+    for _ in range(talk.ticks(LATER_S) + CLEARINGS):
+        state = yield Answer(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
+        if not state.flags & StateFlag.FAULT_LATCHED and state.flags & StateFlag.MOTOR_ENABLED:
+            break
     last = state.sequence
     for _ in range(talk.ticks(after_ms * 1e-3 + LATER_S)):
         state = yield None

@@ -12,7 +12,7 @@
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 4, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 5, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
     SC_HISTOGRAM_BINS = 192,
     SC_BINS_PER_OCTAVE = 8

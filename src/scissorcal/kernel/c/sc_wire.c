@@ -1,5 +1,7 @@
 #include "sc_wire.h"
 
+#include "sc_bytes.h"
+
 #include <string.h>
 
 uint16_t sc_crc16(const uint8_t *data, size_t size)
@@ -79,7 +81,7 @@ static int finish_frame(sc_decoder *decoder)
     const size_t size = overrun ? 0 : uncobs(decoder->buffer, fill);
     if (size >= 3) {
         const uint8_t *crc = decoder->buffer + size - 2;
-        if (sc_crc16(decoder->buffer, size - 2) == (uint16_t)(crc[0] | (crc[1] << 8))) {
+        if (sc_crc16(decoder->buffer, size - 2) == get_u16(crc)) {
             return (int)(size - 2);
         }
     }

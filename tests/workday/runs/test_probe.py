@@ -1,0 +1,118 @@
+"""When a workspace's probe counts, what is said, and where it goes."""
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.probe.probe import ProbeRefusedError
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import read_recording
+from scissorcal.recording.probe import probe_of
+from scissorcal.workday.runs.capture import capture_into, speeds_below_encoder
+from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into
+from scissorcal.workday.workspace import Workspace, create_workspace
+from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return create_workspace(tmp_path / "day", "paper-80gsm")
+
+
+def virtual_rig(seed: int = 1) -> LockstepLink:
+    return LockstepLink("office-paper", np.random.default_rng(seed))
+
+
+def changed(recipe: Recipe, **keys: object) -> Recipe:
+    return recipe.model_copy(update={"rig": recipe.rig.model_copy(update=keys)})
+
+
+def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> None:
+    recipe = workspace.recipe()
+    said: list[str] = []
+    first = ensure_probed(workspace, virtual_rig(), recipe, say=said.append)
+    assert said[0] == (
+        "Probing the rig first, with up to 50 mN m at the blades: there is no probe of it yet."
+    )
+    said.clear()
+    again = ensure_probed(workspace, virtual_rig(2), recipe, say=said.append)
+    assert again == first
+    assert said == [
+        f"The rig was probed at {first.made_at} ('scissorcal device probe' repeats it)."
+    ]
+
+
+def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Workspace) -> None:
+    recipe = workspace.recipe()
+    first = ensure_probed(workspace, virtual_rig(), recipe)
+    said: list[str] = []
+    later = datetime.now(UTC) + timedelta(hours=5)
+    ensure_probed(workspace, virtual_rig(), recipe, say=said.append, now=later)
+    assert "older than 4 h (rig.probe.max_age_h)" in said[0]
+    with pytest.raises(ProbeRefusedError, match=r"Set rig\.motor_sign = 1 in the recipe"):
+        ensure_probed(workspace, virtual_rig(), changed(recipe, motor_sign=-1), say=said.append)
+    assert "rig.motor_sign changed since" in said[-1]
+    ensure_probed(workspace, virtual_rig(), changed(recipe, motor_sign=1), say=said.append)
+    assert "rig.motor_sign changed since" in said[-1]
+    other = VirtualPort(StrangeDevice(seed=1))
+    ensure_probed(workspace, other, recipe, say=said.append, confirm=said.append)
+    assert f"another rig, firmware or line ({first.device})" in said[-2]
+    assert "let go of the handles and keep clear" in said[-1]
+
+
+def test_a_refused_rig_is_probed_again(workspace: Workspace) -> None:
+    recipe = workspace.recipe()
+    said: list[str] = []
+    broken = VirtualPort(StrangeDevice(FAULTS["motor reversed"], seed=1))
+    with pytest.raises(ProbeRefusedError) as caught:
+        probe_into(workspace, broken, recipe, confirm=lambda request: None)
+    assert caught.value.kept == (workspace.probe_path,)
+    kept = last_probe(workspace)
+    assert kept is not None
+    assert any(verdict.status == "fail" for verdict in kept.verdicts)
+    mended = VirtualPort(StrangeDevice(seed=1))
+    ensure_probed(workspace, mended, recipe, say=said.append, confirm=lambda request: None)
+    assert "the last probe refused it" in said[0]
+
+
+def test_a_file_that_cannot_be_read_is_no_probe(workspace: Workspace) -> None:
+    workspace.probe_path.write_text("{", encoding="utf-8")
+    assert last_probe(workspace) is None
+    workspace.probe_path.write_text(json.dumps({"format": "other"}), encoding="utf-8")
+    assert last_probe(workspace) is None
+
+
+def test_a_capture_probes_and_its_recording_holds_what_was_found(workspace: Workspace) -> None:
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    text = text.replace("repeats = 2", "repeats = 1").replace(
+        "excitation_s = 10.0", "excitation_s = 1.0"
+    )
+    lines = [
+        "speeds_rad_per_s = [0.05, 1.0]" if line.startswith("speeds_rad_per_s") else line
+        for line in text.splitlines()
+    ]
+    workspace.recipe_path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    said: list[str] = []
+    captured = capture_into(workspace, "friction", "sim", say=said.append)
+    recording = read_recording(captured.path)
+    found = probe_of(recording.device)
+    assert found == last_probe(workspace)
+    assert found is not None
+    assert found.inertia_kg_m2 is not None
+    assert "motor_sign" not in recording.device
+
+
+def test_speeds_that_a_coarse_encoder_hides_are_named_before_the_capture(
+    workspace: Workspace,
+) -> None:
+    recipe = workspace.recipe()
+    identity = virtual_rig().identity
+    assert speeds_below_encoder(recipe, identity) == ""
+    coarse = identity._replace(opening_resolution=2.0 * np.pi / 20_000)
+    sentence = speeds_below_encoder(recipe, coarse)
+    assert sentence.startswith("Sweeps at 0.05 rad/s will not be used")
+    assert "from 0.081 rad/s on" in sentence
