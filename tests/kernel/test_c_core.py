@@ -69,3 +69,16 @@ def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
         if "scanned" not in row:
             assert ratio <= MOST_TIMES_BY_HAND, row
             assert worst <= MOST_INSTRUCTIONS, row
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_servo_over_ten_million_disturbed_states(seed: int, tmp_path: Path) -> None:
+    """The figures stand on stdout: pytest -s shows them."""
+    program = tmp_path / "strict" / "test_disturbed"
+    make(str(program), tmp_path)
+    words = [program, C_TESTS.parent / "golden", "10000000", str(seed)]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False)
+    print(ran.stdout)
+    assert ran.returncode == 0, ran.stdout + ran.stderr

@@ -7,15 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.probe.probe import probe
 from scissorcal.device.recorder import unloaded_sentence
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import read_recording
+from scissorcal.recording import Recording, read_recording
 from scissorcal.render import open_writer as open_render_writer
 from scissorcal.render import render
 from scissorcal.verdicts import failed
@@ -34,18 +33,18 @@ RENDER_ADVANCE_M = -0.02
 class Outcome:
     """What was said, the exit code that a command ends with, and the truth at the device.
 
-    ``torque`` (N m) and ``rate`` (rad/s) are the largest of motor and blades until it stopped,
-    ``stop`` its time (s) since the device was switched on, ``kept`` the samples recorded until
-    then.
+    ``stop`` names the servo's stop, empty where it did not stop by itself. ``torque`` (N m) and
+    ``rate`` (rad/s) are the largest of motor and blades until the end, ``time_s`` its time since
+    the device was switched on, ``recording`` what was kept.
     """
 
     said: str
     exit_code: int
+    stop: str
     torque: float
     rate: float
-    stop: float
-    kept: int = 0
-    notes: tuple[str, ...] = ()
+    time_s: float
+    recording: Recording | None
 
 
 def short_recipe() -> Recipe:
@@ -56,6 +55,18 @@ def short_recipe() -> Recipe:
     facts = whole.model_dump(exclude_unset=True)
     facts["capture"] = {"friction": friction, "cut": cut}
     return Recipe.model_validate(facts)
+
+
+def probe_trial(name: str) -> Outcome:
+    """Probe a device with one fault."""
+    device = StrangeDevice(FAULTS[name], seed=SEED)
+
+    def run() -> str:
+        found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=lambda _: None)
+        warned = [v.why for v in found.verdicts if v.status != "pass" and v.value is not None]
+        return "; ".join(["done", *warned])
+
+    return _outcome(run, device, None)
 
 
 def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = None) -> Outcome:
@@ -92,6 +103,7 @@ def render_trial(
     """Render on a device with one fault, a hand at the handles."""
     device = StrangeDevice(faults or FAULTS[name], seed=SEED)
     device.sledge.place = RENDER_ADVANCE_M
+    device.blades.place = Hand().high
     path = folder / "render.mcap"
 
     def run() -> str:
@@ -110,15 +122,14 @@ def render_trial(
     return _outcome(run, device, path)
 
 
-def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path) -> Outcome:
+def _outcome(run: Callable[[], str], device: StrangeDevice, path: Path | None) -> Outcome:
+    stop = ""
     try:
-        said, code = run(), 0
+        said = run()
         code = 0 if said.startswith("done") else 3
     except ScissorcalError as error:
         said, code = str(error), error.exit_code
-    kept, notes = 0, ()
-    if path.is_file():
-        recording = read_recording(path)
-        kept, notes = len(recording.samples), recording.notes
+        stop = error.stop if isinstance(error, DeviceError) else ""
+    recording = read_recording(path) if path and path.is_file() else None
     torque, rate = device.largest_torque, device.largest_rate
-    return Outcome(said, code, torque, rate, float(np.round(device.time_s, 3)), kept, notes)
+    return Outcome(said, code, stop, torque, rate, device.time_s, recording)

@@ -153,6 +153,9 @@ def completeness(
         if excitation.missing:
             found, wanted = excitation.recorded_s, excitation.planned_s
             missing.append(f"excitation: {found:.1f} s of {wanted:g} s recorded")
+    if not missing and all(count.get("stop") for count, _ in pairs):
+        stop = str(pairs[-1][0]["stop"]).replace("_", " ").lower()
+        missing.append(f"an undisturbed end: the servo stopped the last capture ({stop})")
     return Completeness(
         cells,
         tuple(row for row in strokes if kind == "friction" or row.kind != "opening"),

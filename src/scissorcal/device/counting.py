@@ -33,6 +33,7 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
     whole = _whole(recording, label)
     return {
         "by_hand": by_hand,
+        "stop": recording.stop,
         "directions": list(grid.directions),
         "speeds": list(grid.speeds),
         "openings": [list(cell) for cell in grid.cells],
@@ -154,5 +155,6 @@ def _excitation(recording: Recording, label: Labels) -> float:
 
 
 def _tick(recording: Recording) -> float:
-    time = recording.device_time_s
-    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    """Seconds between two samples, from whole microseconds, so that their sum is exact."""
+    time_us = recording.samples["device_time_us"]
+    return 1e-6 * float(np.median(np.diff(time_us))) if len(time_us) > 1 else 0.0

@@ -133,7 +133,8 @@ class LockstepMotion(Motion):
         samples = self._without_repeats(np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE))
         self._silent_s = 0.0 if len(samples) else self._silent_s + self._ticks * self.tick_s
         if self._silent_s > SILENCE_S and not stopped:
-            self._failure = DeviceError(StopReason.SILENCE.sentence)
+            silence = StopReason.SILENCE
+            self._failure = DeviceError(silence.sentence, silence.name)
         return samples
 
     def _exchange(self) -> list[bytes]:

@@ -153,7 +153,7 @@ class PortMotion(Motion):
         if reason is StopReason.NONE and not self._process.alive:
             return self._process.why_dead()
         if reason in (StopReason.HANGUP, StopReason.SILENCE, StopReason.LINE_ERROR):
-            return DeviceError(f"{self._link.name}: {reason.sentence}")
+            return DeviceError(f"{self._link.name}: {reason.sentence}", reason.name)
         return None
 
     def _go_idle(self) -> None:

@@ -15,12 +15,12 @@ above what friction's reversal or the sheet's springing back adds within 8 ms.""
 RUNAWAY_M_PER_S = 0.1
 """A little more than the speed at which captures move the sledge."""
 
-STILL_RAD = 0.03
-"""The default gains answer it with 0.2 N m: ten times the breakaway of scissors."""
+STILL_RAD = 0.02
+"""Three times by how far a reference leads blades that stick before they move (6 mrad)."""
 STILL_M = 0.005
 """A quarter of the error at which tracking is lost."""
-STILL_TORQUE_SHARE = 0.1
-"""Of the device's limit: five times the breakaway of scissors with a motor of 1 N m."""
+STILL_TORQUE_SHARE = 0.15
+"""Of the device's limit: ten times the breakaway of scissors with a motor of 1 N m."""
 
 LEAST_RATIO = 0.7
 MOST_RATIO = 1.4

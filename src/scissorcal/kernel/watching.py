@@ -20,10 +20,11 @@ class WatchConfig:
     of torque (N m) and frequency; of a tracked reference, its own rate is subtracted.
     ``runaway_rate``, ``runaway_speed``: blades (rad/s) or sledge (m/s) speed up by so much against
     their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
-    ``stop_low`` and ``stop_high``. ``still_rad``,
-    ``still_m``: the reference moves so far while the measured place stays exactly the same.
-    ``still_torque``: torques of motor and hand differ by so much (N m) for half a second, and the
-    opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a force sensor.
+    ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far while the
+    measured place stays exactly the same, the opening under a torque of at least ``still_torque``
+    (N m). Without a reference: torques of motor and hand differ by ``still_torque`` for half a
+    second, and the opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a
+    force sensor.
     ``least_ratio``, ``most_ratio``: measured over commanded torque, where torques of at least
     ``ratio_torque`` (N m) act. ``clock_share``, ``host_clock_share``: device clock against its
     ticks, and against this computer. Raises ValueError for a number that is not finite or below 0.

@@ -179,8 +179,11 @@ static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch
     }
     watch->has_still = 1;
     if (in->tracking) {
-        return over(watch, SC_WATCH_STILL, fabsf(in->aim_opening - watch->still_aim),
-                    config->still_rad);
+        const float moved = fabsf(in->aim_opening - watch->still_aim);
+        const float pushed = fabsf(in->torque);
+        return config->still_rad > 0.0f && config->still_torque > 0.0f &&
+               over(watch, SC_WATCH_STILL,
+                    fminf(moved / config->still_rad, pushed / config->still_torque), 1.0f);
     }
     const float drive = in->measured - config->handle_radius * in->handle_force;
     const float share = in->time_s / (SMOOTH_S + in->time_s);

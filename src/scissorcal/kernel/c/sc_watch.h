@@ -31,9 +31,9 @@ typedef struct {
     float swing_Hz;          /* slower swings are a hand's, or planned */
     float runaway_rate;      /* [rad/s] */
     float runaway_speed;     /* of the advance [m/s] */
-    float still_rad;         /* motion of the reference while the opening stands */
+    float still_rad;         /* motion of the reference while the opening stands ... */
     float still_m;           /* motion of the reference while the advance stands */
-    float still_torque;      /* imbalance of motor and hand under which blades cannot rest [N m] */
+    float still_torque;      /* ... under so large a torque, or imbalance of motor and hand [N m] */
     float least_ratio;       /* of measured to commanded torque ... */
     float most_ratio;        /* ... outside of which they differ */
     float ratio_torque;      /* torques below it say nothing about that [N m]; 0: nothing that is

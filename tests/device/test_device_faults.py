@@ -1,0 +1,151 @@
+"""Faults of a device that was written from docs/protocol.md alone: each is named, with its stop.
+
+The whole table, with what is said and the largest torque and rate: benchmarks/device_faults.py.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import StopReason
+from tests.strange_device import FAULTS, Faults
+from tests.strange_device.trials import Outcome, capture_trial
+
+STOPS = {
+    "motor reversed": "RUNAWAY",
+    "encoder reversed": "RUNAWAY",
+    "encoder counted by half": "STOP_ELSEWHERE",
+    "encoder counted double": "IMPLAUSIBLE",
+    "encoder noisy": "OSCILLATION",
+    "measured torque reversed": "MEASURED_REVERSED",
+    "measured torque half": "MEASURED_DIFFERS",
+    "measured torque frozen": "MEASURED_DIFFERS",
+    "tick twice as long as stated": "CLOCK_RATE",
+    "clock in milliseconds": "CLOCK_RATE",
+    "clock 5 % fast": "CLOCK_RATE",
+    "clock stands": "DEVICE_CLOCK",
+    "3 ms late, light blades": "OSCILLATION",
+    "silent": "SILENCE",
+    "repeats one frame": "SILENCE",
+    "measurements frozen": "OPENING_STANDS",
+    "encoder stuck": "OPENING_STANDS",
+    "opening NaN": "IMPLAUSIBLE",
+    "motor torque NaN": "UNREADABLE",
+    "opening beyond the stops": "IMPLAUSIBLE",
+    "restarts": "RESTARTED",
+    "encoder fault": "ENCODER_FAULT",
+    "fault that stays": "DEVICE_FAULT",
+    "blades jam": "STOP_ELSEWHERE",
+}
+"""What stops a capture of friction."""
+
+STOPS_OF_A_CUT = {
+    "sledge motor reversed": "RUNAWAY_ADVANCE",
+    "sledge encoder reversed": "RUNAWAY_ADVANCE",
+    "sledge encoder stuck": "ADVANCE_STANDS",
+    "5 ms late": "OSCILLATION",
+}
+
+UNNOTICED = {
+    "none",
+    "motor and encoder reversed",
+    "encoder zero off by 0.1 rad",
+    "encoder step misstated",
+    "motor torque half",
+    "motor torque double",
+    "measured torque zero off by 20 mN m",
+    "force reversed",
+    "force zero off by 0.05 N",
+    "force zero off by 2 N",
+    "force sensor dead",
+    "handle radius misstated",
+    "0.2 ms late",
+    "1 ms late",
+    "3 ms late",
+    "500 Hz",
+    "2 kHz",
+    "4 kHz",
+    "20 % of frames duplicated",
+    "one leap of 0.25 rad",
+    "watchdog deaf",
+    "torque not clipped",
+    "BRAKE_AFTER_MS refused",
+}
+"""A capture ends well with them: they are harmless to it, or only 'scissorcal device probe' can
+tell them, before anything is captured."""
+
+TOLD = {
+    "stalls of 30 ms each second": "faults",
+    "5 % of frames lost": "frames lost",
+    "5 % of frames garbled": "frames lost",
+    "one fault latched": "faults",
+}
+"""A capture goes on, and says how often they came."""
+
+ELSEWHERE = {"unplugged", "no sheet"}
+
+
+@pytest.mark.parametrize("name", STOPS)
+def test_a_capture_of_friction_stops_by_name(name: str, tmp_path: Path) -> None:
+    said = capture_trial(name, "friction", tmp_path)
+    assert (said.stop, said.exit_code) == (STOPS[name], DeviceError.exit_code)
+    assert said.said.startswith(StopReason[said.stop].sentence)
+    assert said.torque < 0.55
+    _is_kept(said)
+
+
+@pytest.mark.parametrize("name", STOPS_OF_A_CUT)
+def test_a_capture_of_a_cut_stops_by_name(name: str, tmp_path: Path) -> None:
+    said = capture_trial(name, "cut", tmp_path)
+    assert (said.stop, said.exit_code) == (STOPS_OF_A_CUT[name], DeviceError.exit_code)
+    _is_kept(said)
+
+
+@pytest.mark.parametrize("name", sorted(UNNOTICED))
+def test_what_does_not_disturb_a_capture_raises_no_alarm(name: str, tmp_path: Path) -> None:
+    assert capture_trial(name, "friction", tmp_path).said == "done"
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_comes_and_goes_is_counted(name: str, tmp_path: Path) -> None:
+    said = capture_trial(name, "friction", tmp_path)
+    assert said.exit_code == 0
+    assert TOLD[name] in said.said
+
+
+def test_a_cable_that_is_pulled_is_an_error_of_the_device(tmp_path: Path) -> None:
+    said = capture_trial("unplugged", "friction", tmp_path)
+    assert said.exit_code == DeviceError.exit_code
+    assert "unplugged" in said.said
+
+
+def test_a_piece_that_is_missing_is_told_by_its_number(tmp_path: Path) -> None:
+    said = capture_trial("no sheet", "cut", tmp_path)
+    assert said.exit_code == 0
+    assert "(piece 1) cut nothing" in said.said
+    assert said.recording is not None
+    assert said.recording.unloaded == {0, 2}
+    assert any("put in a fresh one" in note for note in said.recording.notes)
+
+
+def test_every_fault_is_in_one_of_the_tables() -> None:
+    tables = [set(STOPS), set(STOPS_OF_A_CUT), UNNOTICED, set(TOLD), ELSEWHERE]
+    assert set(FAULTS) == set().union(*tables)
+    assert sum(map(len, tables)) == len(FAULTS) >= 30
+
+
+@pytest.mark.parametrize("kind", ["friction", "cut"])
+def test_a_good_rig_raises_no_alarm(kind: str, tmp_path: Path) -> None:
+    said = capture_trial("none", kind, tmp_path, Faults())
+    assert said.said == "done"
+    assert said.recording is not None
+    assert said.recording.stop == ""
+    assert said.recording.unloaded == frozenset()
+
+
+def _is_kept(said: Outcome) -> None:
+    """What was recorded until then has the stop's name, and its sentence among the notes."""
+    if said.recording is not None:
+        assert said.recording.stop == said.stop
+        assert any(StopReason[said.stop].sentence in note for note in said.recording.notes)
