@@ -115,6 +115,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),
     "render supervision": ("at most", f"{_LOOP}: frames with damping only"),
+    "render motor sense": (
+        "at most",
+        "sense of motor and force sensor: energy that the rig would have given, J",
+    ),
     "render passivity": ("at most", "energy beyond the model's, which is felt as buzzing: J"),
     "device round trip": ("at most", f"{_LOOP}: 99 % of the answers, ms"),
     "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),

@@ -37,10 +37,15 @@ static void check_ring(sc_block *block)
 {
     static sc_sample samples[500];
     pthread_t writer;
-    uint64_t cursor = 0, lost = 0, read = 0, torn = 0, late = 0;
+    uint64_t cursor = 0, lost = 0, read = 0, torn = 0, late = 0, rounds = 0;
     CHECK(pthread_create(&writer, NULL, write_samples, block) == 0, "ring");
     uint32_t next = 0;
     while (cursor < SAMPLES) {
+        const uint64_t late_by = rounds++ % 2 ? 50 : 0; /* just overtaken, or about to be */
+        const uint64_t full = cursor + SC_RING_SAMPLES - 25 + late_by;
+        while (__atomic_load_n(&block->written, __ATOMIC_RELAXED) <
+               (full < SAMPLES ? full : SAMPLES)) {
+        }
         const uint64_t n = sc_block_read(block, &cursor, samples, 500, &lost);
         for (uint64_t i = 0; i < n; i++) {
             const sc_sample whole = sample_of(samples[i].sequence);
@@ -54,6 +59,7 @@ static void check_ring(sc_block *block)
     CHECK(torn == 0, "ring");
     CHECK(late == 0, "ring");
     CHECK(read + lost == SAMPLES, "ring");
+    CHECK(lost > 0, "ring");
 }
 
 /* What the loop does with the mailbox, at full speed: a request's value is its key's square. */

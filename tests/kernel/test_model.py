@@ -256,13 +256,21 @@ def test_a_nick_stops_the_crack_at_its_first_place() -> None:
     s = np.linspace(0.0, BLADE_LENGTH, 151)
     dent = -6e-4 * np.exp(-(((s - 0.035) / 0.002) ** 2))
     edge = Table(s, -0.008 + 0.035 * s + dent, 0.035 - 2 * (s - 0.035) / 0.002**2 * dent)
-    kernel = Kernel(make_tables(edge=edge))
+    tables = make_tables(edge=edge)
+    assert not tables.release_falls
+    kernel = Kernel(tables)
     opening = np.linspace(0.8, 0.3, 4000)
     out = kernel.step_many(opening, -0.5, -0.02)
     assert all(np.isfinite(out[name]).all() for name in out.dtype.names)
     assert np.all(np.diff(out["contact"]) > -1e-6)
     release = -out["force"][out["flags"] & StepFlag.ADVANCED > 0]
     assert release.max() <= JCH * 1.001
+
+
+@pytest.mark.parametrize("curvature", [-2.0, 0.0, 2.0])
+@pytest.mark.parametrize("kappa", [1.0, 0.7])
+def test_along_a_smooth_blade_the_release_falls(curvature: float, kappa: float) -> None:
+    assert make_tables(edge=arc_edge(curvature), kappa=kappa).release_falls
 
 
 def test_static_torque_is_what_a_slow_stroke_settles_at() -> None:

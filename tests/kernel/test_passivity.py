@@ -144,6 +144,7 @@ def test_c_and_reference_keep_the_same_books() -> None:
         assert servo._servo.port.injected == pytest.approx(added, rel=2e-3, abs=1e-6)
         held = share * out.torque
         before = opening
+    assert servo.ledger.hand_J == 0.0
     for ours, theirs in zip(astuple(servo.ledger), astuple(reference.ledger), strict=True):
         assert ours == pytest.approx(theirs, rel=1e-3, abs=2e-6)
     assert servo.ledger.injected_J < 0.0
@@ -181,6 +182,16 @@ def test_without_a_measured_torque_the_command_is_booked() -> None:
         servo.step(State(ENABLED, tick, 1000 * tick, 0.7 - 1e-3 * tick, 0.0, math.nan, 0.0))
     assert servo.ledger.delivered_J < 0.0
     assert math.isfinite(servo.ledger.created_J)
+
+
+def test_the_hands_work_is_booked_by_its_sensor() -> None:
+    passivity = replace(MEASURED, handle_radius=0.06)
+    servo = Servo(make_tables(), replace(CONFIG, passivity=passivity))
+    servo.engage(Mode.RENDER)
+    for tick in range(400):
+        servo.step(State(ENABLED, tick, 1000 * tick, 0.7 - 5e-4 * tick, 0.0, 0.0, 2.0))
+    assert servo.ledger.hand_J == pytest.approx(0.06 * 2.0 * 5e-4 * 398, rel=1e-3)
+    assert servo.ledger.rig_J == servo.ledger.hand_J + servo.ledger.delivered_J
 
 
 def test_an_engagement_in_pressed_material_is_no_error_of_the_loop() -> None:

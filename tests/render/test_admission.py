@@ -21,6 +21,7 @@ from scissorcal.render.admission_rule import (
 from scissorcal.render.derating import felt_change, needs_of, softened
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables
+from tests.render.test_engine import rig
 
 RIG = LoopFacts(
     tick_s=1e-3,
@@ -142,16 +143,16 @@ def test_friction_near_rest_follows_the_encoder_and_the_delay(paper: ModelPackag
     coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 5000)
     wide = admit(paper.tables, coarse, HAND, LIMIT, RATE)
     assert wide.friction_width_rad == pytest.approx(4.0 * coarse.encoder_step_rad)
-    config = passivity_config(known)
+    config = passivity_config(known, rig().identity)
     assert config.friction_width == known.friction_width_rad
     assert config.is_measured
     assert 0.0 < config.most_damping < 0.1
 
 
 def test_without_dry_friction_or_far_too_late_it_is_refused(paper: ModelPackage) -> None:
-    for rig in (replace(RIG, coulomb_Nm=0.0), replace(RIG, late_s=0.05)):
+    for unfit in (replace(RIG, coulomb_Nm=0.0), replace(RIG, late_s=0.05)):
         with pytest.raises(InputError, match="cannot render the package stably"):
-            admit(paper.tables, rig, HAND, LIMIT, RATE)
+            admit(paper.tables, unfit, HAND, LIMIT, RATE)
 
 
 def test_a_material_damper_that_the_rate_is_too_late_for_is_rendered_weaker(
@@ -201,8 +202,6 @@ def test_an_unknown_rig_is_not_evaluated(silent_paper: ModelPackage) -> None:
 def test_facts_are_the_weaker_ends_of_the_fit_and_say_where_they_come_from(
     paper: ModelPackage,
 ) -> None:
-    from tests.render.test_engine import rig
-
     known = rig_facts(paper)
     assert known.coulomb_Nm is not None
     assert 0.008 < known.coulomb_Nm < 0.014

@@ -18,6 +18,8 @@ from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Recording, read_attachments, read_recording
 from scissorcal.render import RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.rig_facts import rig_facts
+from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
+from tests.strange_device.mechanics import Hand
 
 TWO = VirtualStrokes(count=2, rate_rad_per_s=0.5)
 
@@ -65,6 +67,7 @@ def test_strokes_are_rendered_recorded_and_judged(paper: ModelPackage, tmp_path:
         "faults": "pass",
         "supervision": "pass",
         "passivity": "pass",
+        "motor sense": "pass",
     }
     unsigned, derated = result.warnings
     assert "not signed" in unsigned
@@ -214,6 +217,19 @@ def test_a_translation_force_needs_an_advance_motor(
     only = replace(pushing_paper, manifest=manifest.model_copy(update={"mechanics": alone}))
     with pytest.raises(InputError, match="nothing would be felt"):
         render(link, only, strokes=TWO, seconds=0.5)
+
+
+@pytest.mark.parametrize("fault", ["none", "motor reversed"])
+def test_a_reversed_motor_is_told_by_the_hands_work(paper: ModelPackage, fault: str) -> None:
+    """Also where the device reports what it commands its amplifier, not what the motor gives."""
+    device = StrangeDevice(FAULTS[fault], seed=1)
+
+    def grasp(_: str) -> None:
+        device.grasp(Hand(stiffness=8.0, damping=0.05, strokes=2))
+
+    result = render(VirtualPort(device), paper, seconds=6.0, confirm=grasp)
+    sense = next(verdict for verdict in result.verdicts if verdict.check == "motor sense")
+    assert sense.status == ("pass" if fault == "none" else "fail")
 
 
 def test_equal_seeds_render_equally(paper: ModelPackage, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +202,9 @@ def servo_config(
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * duration_s),
         tick_us=identity.tick_us,
         motor_sign=recipe.rig.motor_sign,
-        watch=watches_of(identity, torque_limit, limits.held_at_limit_s),
+        watch=replace(
+            watches_of(identity, torque_limit, limits.held_at_limit_s), still_rad=control.still_rad
+        ),
     )
 
 
@@ -295,18 +297,7 @@ def _gains(
     link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
 ) -> CaptureGains:
     """Gains by what the probe found; what is said of them is noted."""
-    probed = None
-    if probe and probe.inertia_kg_m2 and probe.delay_s and probe.coulomb_Nm:
-        viscous = probe.viscous_Nm_s_per_rad
-        probed = Probed(
-            inertia_kg_m2=probe.inertia_kg_m2.mean,
-            inertia_sd_kg_m2=probe.inertia_kg_m2.sd,
-            viscous_Nm_s_per_rad=viscous.mean if viscous else 0.0,
-            coulomb_Nm=probe.coulomb_Nm.mean,
-            delay_s=max(probe.delay_s.mean, 0.0),
-            delay_sd_s=probe.delay_s.sd,
-        )
-    gains = capture_gains(recipe, link.identity, kind, probed)
+    gains = capture_gains(recipe, link.identity, kind, Probed.of(probe))
     for verdict in gains.verdicts if probe else ():
         writer.note(verdict.why)
     return gains

@@ -11,10 +11,12 @@ from scissorcal.device.trajectory import (
     SWING_ACCELERATION,
     TURN_ACCELERATION,
 )
+from scissorcal.device.watching import STILL_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Kind
+from scissorcal.recording.probe import ProbeResult
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 OPENING_ERROR_RAD = 0.3
@@ -28,7 +30,10 @@ COUNT_SHARE = 0.01
 """Share of the motor's limit by which a count of the encoder may change the effort in any case:
 blades without dry friction may buzz so little."""
 SURE = 2.0
-"""Standard deviations by which inertia and delay may be worse than what a probe found."""
+"""Standard deviations by which the inertia may be other than what a probe found. The delay's own,
+0.1 ms, is a degree of the 45 that are kept."""
+HELD_BACK = 3.0
+"""Dry friction over the opening, and static friction, may hold three times what a probe found."""
 ADVANCE_MASS_KG, ADVANCE_VISCOUS_N_s_per_m, ADVANCE_COULOMB_N = 0.8, 4.0, 0.8
 ADVANCE_FACTOR = 2.0
 """A sledge with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half or
@@ -47,16 +52,31 @@ class Probed:
     viscous_Nm_s_per_rad: float
     coulomb_Nm: float
     delay_s: float
-    delay_sd_s: float
+
+    @classmethod
+    def of(cls, probe: ProbeResult | None) -> "Probed | None":
+        """Of a probe; None where it found no inertia, dry friction or delay."""
+        if probe is None:
+            return None
+        inertia, delay, dry = probe.inertia_kg_m2, probe.delay_s, probe.coulomb_Nm
+        if inertia is None or delay is None or dry is None:
+            return None
+        viscous = probe.viscous_Nm_s_per_rad
+        damping = 0.0 if viscous is None else viscous.mean
+        return cls(inertia.mean, inertia.sd, damping, dry.mean, delay.mean)
 
 
 @dataclass(frozen=True)
 class CaptureGains:
-    """Gains of both axes and the rate filter; ``verdicts`` say how far they are from swinging."""
+    """Gains of both axes and the rate filter; ``verdicts`` say how far they are from swinging.
+
+    Blades that stand while the reference moves by ``still_rad`` are stuck, and not in dry friction.
+    """
 
     opening: Gains
     advance: Gains
     rate_cutoff_Hz: float
+    still_rad: float
     verdicts: tuple[Verdict, ...]
 
 
@@ -64,6 +84,7 @@ TYPICAL = CaptureGains(
     opening=Gains(6.0, 0.06, 20.0),
     advance=Gains(3000.0, 40.0, 10000.0),
     rate_cutoff_Hz=120.0,
+    still_rad=STILL_RAD,
     verdicts=(
         not_evaluated(
             "device",
@@ -93,7 +114,7 @@ def capture_gains(
             _merged(own, typical)
             for own, typical in zip(stated, (TYPICAL.opening, TYPICAL.advance), strict=True)
         )
-        return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, TYPICAL.verdicts)
+        return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, STILL_RAD, TYPICAL.verdicts)
     axes = _axes(recipe, identity, probed)
     demands = _demands(recipe, kind)
     cutoffs = tuple(share * 1e6 / identity.tick_us for share in CUTOFFS_PER_TICK)
@@ -108,7 +129,9 @@ def capture_gains(
         cutoffs = at if name == "opening" else cutoffs
         margins.append(_checked(axis.filtered(at[0]), gains, name))
         found.append(gains)
-    return CaptureGains(found[0], found[1], cutoffs[0], (_verdict(margins, axes[0].delay_s),))
+    still = max(STILL_RAD, HELD_BACK * probed.coulomb_Nm / found[0].kp)
+    verdicts = (_verdict(margins, axes[0].delay_s),)
+    return CaptureGains(found[0], found[1], cutoffs[0], still, verdicts)
 
 
 def _stated(recipe: Recipe) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
@@ -140,7 +163,7 @@ def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axi
     """Opening and advance as the controller meets them; the filter of the rate is still open."""
     torque = COUNT_SHARE * min(recipe.limits.torque_Nm, identity.torque_limit)
     force = COUNT_SHARE * min(recipe.limits.force_N, identity.force_limit)
-    tick, delay = identity.tick_us * 1e-6, probed.delay_s + SURE * probed.delay_sd_s
+    tick, delay = identity.tick_us * 1e-6, max(0.0, probed.delay_s)
     factor = 1.0 + SURE * probed.inertia_sd_kg_m2 / probed.inertia_kg_m2
     opening = Axis(
         inertia=probed.inertia_kg_m2,

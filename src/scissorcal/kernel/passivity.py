@@ -11,8 +11,10 @@ class PassivityConfig:
 
     ``is_measured``: states hold the torque that the motor exerts, and work is booked with it.
     ``rig_damping`` and ``rig_coulomb`` are the rig's own friction, which takes what the loop
-    creates. Beyond ``margin_J`` the controller adds at most ``most_damping`` (0 for none). Rendered
-    friction builds up over ``friction_width`` (rad) after a reversal; 0 lets it grow with the rate.
+    creates. ``handle_radius`` (m) turns the force that a sensor of the hand measures into torque; 0
+    without a sensor. Beyond ``margin_J`` the controller adds at most ``most_damping`` (0 for none).
+    Rendered friction builds up over ``friction_width`` (rad) after a reversal; 0 lets it grow with
+    the rate.
     Raises ValueError for a number that is not finite or below 0.
     """
 
@@ -21,6 +23,7 @@ class PassivityConfig:
     rig_coulomb: float = 0.0
     margin_J: float = 0.0
     most_damping: float = 0.0
+    handle_radius: float = 0.0
     friction_width: float = 0.0
 
     def __post_init__(self) -> None:
@@ -48,7 +51,8 @@ class EnergyLedger:
     now, taken by the cut (kappa J_c h dX), lost by arresting cracks, taken by rendered friction.
     ``engaged_J`` is what the ramp put into pressed material, ``limited_J`` the work that limits
     kept back, ``injected_J`` (negative) what the passivity controller took, ``late_J`` the rest:
-    work beyond the commands, by holding, delay and lag.
+    work beyond the commands, by holding, delay and lag. ``hand_J``: work of the hand while the
+    motors are on, 0 without a sensor of its force.
     """
 
     delivered_J: float
@@ -60,6 +64,7 @@ class EnergyLedger:
     limited_J: float = 0.0
     late_J: float = 0.0
     injected_J: float = 0.0
+    hand_J: float = 0.0
 
     @property
     def absorbed_J(self) -> float:  # noqa: N802  (J is the unit)
@@ -74,6 +79,11 @@ class EnergyLedger:
         """
         came = self.engaged_J + self.limited_J
         return self.delivered_J + self.stored_J + self.absorbed_J - came
+
+    @property
+    def rig_J(self) -> float:  # noqa: N802
+        """What hand and motors gave to the rig, whose friction takes it: below 0 is impossible."""
+        return self.hand_J + self.delivered_J
 
     @property
     def unbooked_J(self) -> float:  # noqa: N802

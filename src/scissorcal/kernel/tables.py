@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -113,7 +112,7 @@ class ModelTables:
             if np.any(getattr(self, name).y < 0):
                 raise ValueError(f"{name} holds a negative level, which would drive the blades.")
 
-    @cached_property
+    @property
     def release_falls(self) -> bool:
         """Whether the energy that a crack releases falls outwards along the blade.
 

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 from scissorcal.errors import InputError
-from scissorcal.kernel import Identity, ModelTables, PassivityConfig
+from scissorcal.kernel import Capability, Identity, ModelTables, PassivityConfig
 from scissorcal.package import ModelPackage
 from scissorcal.render.admission_rule import (
     MARGIN,
@@ -157,13 +157,16 @@ def rendered_tables(tables: ModelTables, admission: Admission) -> ModelTables:
     return replace(soft, rate_damping=admission.damping_share * soft.rate_damping)
 
 
-def passivity_config(admission: Admission) -> PassivityConfig:
-    """How the servo watches the energy of an admitted rendering."""
+def passivity_config(admission: Admission, identity: Identity) -> PassivityConfig:
+    """How the servo watches the energy of an admitted rendering on a device."""
+    sensor = bool(identity.capabilities & Capability.HANDLE_FORCE_SENSOR)
+    radius = identity.handle_radius if sensor else 0.0
     facts = admission.facts
     if facts is None:
-        return PassivityConfig(is_measured=True)
+        return PassivityConfig(is_measured=True, handle_radius=radius)
     return PassivityConfig(
         is_measured=True,
+        handle_radius=radius,
         rig_damping=facts.damping_Nm_s_per_rad,
         rig_coulomb=facts.coulomb_Nm,
         margin_J=0.5 * facts.inertia_kg_m2 * (ENERGY_RATE * OSCILLATION_RATE) ** 2,

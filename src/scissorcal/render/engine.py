@@ -210,7 +210,7 @@ def _servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
-        passivity=passivity_config(admission),
+        passivity=passivity_config(admission, identity),
         watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s),
     )
 

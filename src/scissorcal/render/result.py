@@ -105,6 +105,7 @@ def render_verdicts(
         _faultless(report, tick_us),
         _supervised(report),
         _passive(report.ledger),
+        _motor_sense(report.ledger),
     )
 
 
@@ -175,3 +176,24 @@ def _passive(ledger: EnergyLedger) -> Verdict:
     why += "."
     remedy = f"{why} {REMEDY}"
     return judge(SCOPE, "passivity", ledger.created_J, allowed, why, remedy)
+
+
+def _motor_sense(ledger: EnergyLedger) -> Verdict:
+    """Whether the motor pushes as it says: what hand and motor give, the rig's friction takes.
+
+    A device that reports its command for its torque shows a reversed motor here alone.
+    """
+    if ledger.hand_J == 0.0:
+        why = "No sensor measured the hand's work, so the motor's own sense was not checked."
+        return not_evaluated(SCOPE, "motor sense", why)
+    exchanged = abs(ledger.hand_J) + abs(ledger.delivered_J)
+    allowed = max(NEGLIGIBLE_J, MOST_CREATED * exchanged)
+    why = (
+        f"The hand gave {ledger.hand_J:.3g} J and the motors {ledger.delivered_J:.3g} J, so that "
+        f"the rig took {ledger.rig_J:.2g} J."
+    )
+    remedy = (
+        f"{why} A rig cannot give energy: the motor pushes against its stated sense, or the force "
+        "sensor's sign or radius is wrong. Run 'scissorcal device probe'."
+    )
+    return judge(SCOPE, "motor sense", -ledger.rig_J, allowed, why, remedy)

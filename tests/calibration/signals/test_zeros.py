@@ -12,6 +12,7 @@ from scissorcal.calibration.signals.zeros import (
     without_zeros,
     zero_verdicts,
 )
+from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 UNMEASURED, NOISE, RADIUS = 3e-3, 1e-3, 0.06
@@ -102,6 +103,30 @@ def test_a_zero_that_is_known_from_before_is_used_where_nothing_shows_it() -> No
     assert zero is not None
     assert zero.sd == pytest.approx(5e-3 / np.sqrt(12))
     assert not zero.measured
+
+
+def test_what_a_probe_found_counts_as_the_beginning() -> None:
+    probe = ProbeResult(
+        device="rig",
+        identity="0" * 64,
+        made_at="2026-01-01T00:00:00+00:00",
+        torque_zero_Nm=Estimate(0.0, 1e-4),
+        force_zero_N=Estimate(0.05, 1e-3),
+    )
+    late = recording(torque=(6e-3, 6e-3), ends=(False, True))
+    raw = replace(late, device={PROBE_KEY: probe.as_dict()})
+    zero = without_zeros((raw,), UNMEASURED)[1]
+    assert zero is not None
+    assert zero.drift == pytest.approx(6e-3 + RADIUS * 0.05, rel=0.05)
+    assert zero.sd == pytest.approx(zero.drift / np.sqrt(12), rel=0.05)
+    whole = replace(recording(), device={PROBE_KEY: probe.as_dict()})
+    own = without_zeros((recording(),), UNMEASURED)[1]
+    assert without_zeros((whole,), UNMEASURED)[1] == own
+    only = replace(recording(ends=(False, False)), device={PROBE_KEY: probe.as_dict()})
+    alone = without_zeros((only,), UNMEASURED)[1]
+    assert alone is not None
+    assert alone.measured
+    assert alone.force_N == 0.05
 
 
 def test_imports_without_commands_stay_as_they_are() -> None:

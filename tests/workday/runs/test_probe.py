@@ -12,7 +12,7 @@ from scissorcal.device.probe.probe import ProbeRefusedError
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import probe_of
-from scissorcal.workday.runs.capture import capture_into
+from scissorcal.workday.runs.capture import capture_into, speeds_below_encoder
 from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into
 from scissorcal.workday.workspace import Workspace, create_workspace
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
@@ -104,3 +104,15 @@ def test_a_capture_probes_and_its_recording_holds_what_was_found(workspace: Work
     assert found is not None
     assert found.inertia_kg_m2 is not None
     assert "motor_sign" not in recording.device
+
+
+def test_speeds_that_a_coarse_encoder_hides_are_named_before_the_capture(
+    workspace: Workspace,
+) -> None:
+    recipe = workspace.recipe()
+    identity = virtual_rig().identity
+    assert speeds_below_encoder(recipe, identity) == ""
+    coarse = identity._replace(opening_resolution=2.0 * np.pi / 20_000)
+    sentence = speeds_below_encoder(recipe, coarse)
+    assert sentence.startswith("Sweeps at 0.05 rad/s will not be used")
+    assert "from 0.081 rad/s on" in sentence

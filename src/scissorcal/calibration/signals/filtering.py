@@ -65,6 +65,11 @@ def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
         return 0.0
     seen = resolution_of(position)
     step = seen if np.isfinite(seen) else float(np.quantile(moved, 0.01))
+    return rate_floor_of_step(step, cutoff_Hz, rate_Hz)
+
+
+def rate_floor_of_step(step: float, cutoff_Hz: float, rate_Hz: float) -> float:
+    """The same of an encoder whose step is known, as before a capture."""
     share = min(2 * cutoff_Hz / rate_Hz, 1.0)
     noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
     return float(3 * noise)

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.idle import IdlePeriod, idle_periods
+from scissorcal.calibration.signals.idle import IDLE_S, IdlePeriod, idle_periods
+from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
@@ -78,7 +79,8 @@ def without_zeros(
 ) -> tuple[tuple[Recording, ...], DriveZero | None]:
     """Subtract each recording's zeros from its torque and force; say what is left.
 
-    A zero runs straight from one idle period to the next. ``unmeasured_sd`` is that of a recording
+    A zero runs straight from one idle period to the next; what a probe found counts as one at the
+    beginning if the recording has none there. ``unmeasured_sd`` is that of a recording
     without any; ``known``, if given, is then taken for it, as of a fit before. The zero is None
     where no recording has commands: such files (imports) do not show when motors were off, and
     stay as they are.
@@ -87,7 +89,7 @@ def without_zeros(
         return recordings, None
     cleaned, zeros = [], []
     for recording in recordings:
-        periods = idle_periods(recording)
+        periods = _shown(recording)
         zero = _zero_of(periods, unmeasured_sd)
         if not zero.measured and known is not None:
             zero = replace(known, sd=max(known.sd, abs(known.drive) * BRIDGE), seconds=0.0)
@@ -137,6 +139,30 @@ def zero_verdicts(
         judge(scope, "sensor zeros", share, LARGEST, said, said + large),
         judge(scope, "zero drift", rest, FELT, moved, moved + warm),
     )
+
+
+def _shown(recording: Recording) -> tuple[IdlePeriod, ...]:
+    """Idle periods of a recording, and before its first stroke what the probe of the rig found."""
+    periods = idle_periods(recording)
+    moving = np.flatnonzero(np.asarray(recording.samples["stroke"]) >= 0)
+    first = float(recording.device_time_s[moving[0]]) if len(moving) else np.inf
+    probe = probe_of(recording.device)
+    early = any(period.time_s < first for period in periods)
+    if early or probe is None or probe.torque_zero_Nm is None:
+        return periods
+    torque, force, radius = probe.torque_zero_Nm, probe.force_zero_N, 0.0
+    if force is not None and np.isfinite(recording.handle_radius_m):
+        radius = recording.handle_radius_m
+    pushed = (0.0, 0.0) if force is None else (force.mean, force.sd)
+    found = IdlePeriod(
+        time_s=0.0,
+        torque=torque.mean,
+        force_N=pushed[0],
+        drive=torque.mean - radius * pushed[0],
+        drive_sd=float(np.hypot(torque.sd, radius * pushed[1])),
+        seconds=IDLE_S,
+    )
+    return (found, *periods)
 
 
 def _zero_of(periods: tuple[IdlePeriod, ...], unmeasured_sd: float) -> DriveZero:

@@ -111,11 +111,12 @@ def mechanics(swings: list[Swing], noise_rad: float) -> Mechanics | None:
     """Fit all swings together; None where they are too few or fit no positive inertia."""
     if len(swings) < LEAST_SWINGS or len({swing.way for swing in swings}) < 2:
         return None
-    whole = _Regression(swings, noise_rad, DELAYS)
+    pushed = [(swing, _twofold(swing, DELAYS)) for swing in swings]
+    whole = _Regression(pushed, noise_rad, DELAYS)
     values = whole.physical
     if values is None:
         return None
-    without = [[swing for swing in swings if swing is not out] for out in swings]
+    without = [[one for one in pushed if one is not out] for out in pushed]
     left = [_Regression(some, noise_rad, DELAYS) for some in without if len(some) >= 2]
     kept = np.array([(*one.physical, one.delay) for one in left if one.physical is not None])
     if len(kept) < LEAST_SWINGS:
@@ -168,13 +169,15 @@ def follow(parts: list[NDArray[np.void]], zero: float) -> Follow:
 class _Regression:
     """The linear fit at each of many delays, and its solution at the best one.
 
+    Each swing comes with the twofold integral of its torque, a column for each delay.
+
     Only one column depends on the delay, so the rest is projected out once.
     """
 
-    def __init__(self, swings: list[Swing], noise_rad: float, delays: Array) -> None:
+    def __init__(self, swings: list[tuple[Swing, Array]], noise_rad: float, delays: Array) -> None:
         count = len(swings)
         rows, right, pushes = [], [], []
-        for index, swing in enumerate(swings):
+        for index, (swing, push) in enumerate(swings):
             t = swing.t - swing.t[0]
             row = np.zeros((len(t), 3 + 2 * count))
             row[:, 0 if swing.way > 0 else 1] = -0.5 * swing.way * t**2
@@ -183,7 +186,7 @@ class _Regression:
             row[:, 4 + 2 * index] = t
             rows.append(row)
             right.append(swing.opening - swing.opening[0])
-            pushes.append(_twofold(swing, delays))
+            pushes.append(push)
         others, target, pushed = np.vstack(rows), np.concatenate(right), np.vstack(pushes)
         dry = np.delete(others, 2, axis=1)
         costs, over = _costs(dry, target, pushed)
@@ -238,7 +241,9 @@ def _twofold(swing: Swing, delays: Array) -> Array:
     """Twofold integral of the torque from the swing's begin: at each of its times, per delay."""
     begin = swing.t[0]
     steps = np.diff(swing.torque, prepend=0.0)
-    since = np.maximum(swing.at[:, None] + delays[None, :], begin)
+    changes = steps != 0.0
+    steps = steps[changes]
+    since = np.maximum(swing.at[changes, None] + delays[None, :], begin)
     passed = np.maximum(swing.t[:, None, None] - since[None, :, :], 0.0)
     return np.asarray(0.5 * np.einsum("tad,a->td", passed**2, steps), dtype=np.float64)
 

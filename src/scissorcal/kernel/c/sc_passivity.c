@@ -14,7 +14,7 @@ int sc_passivity_is_sound(const sc_passivity_config *config)
 {
     return is_level(config->rig_damping) && is_level(config->rig_coulomb) &&
            is_level(config->margin_J) && is_level(config->most_damping) &&
-           is_level(config->friction_width);
+           is_level(config->handle_radius) && is_level(config->friction_width);
 }
 
 double sc_port_delivered(const sc_passivity_config *config, sc_port *port, double turned,
@@ -28,6 +28,19 @@ double sc_port_delivered(const sc_passivity_config *config, sc_port *port, doubl
     port->was_measured = now;
     port->measured = measured;
     return torque * turned + (double)sent_force * moved;
+}
+
+double sc_port_hand(const sc_passivity_config *config, sc_port *port, double turned, float force)
+{
+    const uint32_t now = config->handle_radius > 0.0f && isfinite(force) ? 1u : 0u;
+    double work = 0.0;
+    if (now && port->had_hand) {
+        const double mean = 0.5 * ((double)port->hand_force + (double)force);
+        work = -(double)config->handle_radius * mean * turned;
+    }
+    port->had_hand = now;
+    port->hand_force = force;
+    return work;
 }
 
 static float within(float value, float limit)

@@ -29,6 +29,7 @@ typedef struct {
     float rig_coulomb;     /* ... and its dry friction [N m], which take what a loop creates */
     float margin_J;        /* observed energy up to which no damping is added */
     float most_damping;    /* largest damping that is added [N m s/rad]; 0: none */
+    float handle_radius;   /* of a sensor of the hand's force [m]; 0: there is none */
     float friction_width;  /* opening over which rendered friction builds up after a reversal
                               [rad]; 0: friction grows with the rate, as sc_model has it */
 } sc_passivity_config;
@@ -44,6 +45,7 @@ typedef struct {
     double limited_J;
     double late_J;
     double injected_J;
+    double hand_J; /* work of the hand, where a sensor measures its force */
 } sc_ledger;
 
 typedef struct {
@@ -58,6 +60,8 @@ typedef struct {
     float injected;
     float measured;       /* motor torque, then */
     uint32_t was_measured;
+    float hand_force;     /* positive closes, then */
+    uint32_t had_hand;
     double observed_J;
     uint32_t has_anchor;
     float anchor; /* opening from which friction near rest is counted */
@@ -79,6 +83,10 @@ typedef struct {
  * else of the one sent. A measured torque is remembered for the next frame. */
 double sc_port_delivered(const sc_passivity_config *config, sc_port *port, double turned,
                          double moved, float sent_torque, float sent_force, float measured);
+
+/* Work of the hand since the last frame, by its measured force, trapezoidal; 0 without. What hand and
+ * motor give the rig takes: a motor that pushes otherwise than it says makes that negative. */
+double sc_port_hand(const sc_passivity_config *config, sc_port *port, double turned, float force);
 
 /* Friction of the model, without regard to the rate at which the blades rest: it builds up over
  * friction_width of opening after a reversal (Hayward and Armstrong 2000, doi:10.1007/BFb0119420),

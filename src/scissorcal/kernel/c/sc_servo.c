@@ -189,12 +189,15 @@ static way way_since(const sc_servo_config *config, sc_servo *servo, const sc_mo
     }
     if (!before->started || !(state->flags & SC_STATE_MOTOR_ENABLED)) {
         servo->port.was_measured = 0;
+        servo->port.had_hand = 0;
         return since;
     }
     since.delivered =
         sc_port_delivered(&config->passivity, &servo->port, since.turned, since.moved,
                           servo->sent_torque, servo->sent_force, state->motor_torque);
     servo->ledger.delivered_J += since.delivered;
+    servo->ledger.hand_J +=
+        sc_port_hand(&config->passivity, &servo->port, since.turned, state->handle_force);
     return since;
 }
 

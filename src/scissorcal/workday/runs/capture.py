@@ -14,6 +14,8 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.capture import CaptureProgress, CaptureReport
     from scissorcal.device.loading import Confirm
+    from scissorcal.kernel import Identity
+    from scissorcal.recipe.schema import Recipe
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,9 @@ def capture_into(
             probe = last_probe(workspace, link)
         else:
             probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
+        too_slow = speeds_below_encoder(recipe, link.identity) if kind == "friction" else ""
+        if too_slow and say is not None:
+            say(too_slow)
         path = workspace.new_recording(kind)
         with open_writer(path, kind, link, recipe, text, hand=hand, probe=probe) as writer:
             if kind == "friction":
@@ -72,3 +77,25 @@ def capture_into(
             else:
                 report = capture_cut(link, recipe, writer, hand, progress, confirm, probe)
         return Captured(path, report, f"{link.identity.name} {link.identity.serial}")
+
+
+def speeds_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
+    """Which planned speeds of friction a fit will not use, as a sentence; empty where it uses all.
+
+    Below the rate's floor, which the encoder's step and the fit's cutoff give, the sign of the
+    rate is noise.
+    """
+    from scissorcal.calibration.signals.filtering import rate_floor_of_step
+    from scissorcal.calibration.signals.weak_form import RATE_BAND
+
+    band_Hz = RATE_BAND * recipe.fit.friction.cutoff_Hz
+    floor = rate_floor_of_step(identity.opening_resolution, band_Hz, 1e6 / identity.tick_us)
+    slow = [speed for speed in recipe.capture.friction.speeds_rad_per_s if speed <= floor]
+    if not slow:
+        return ""
+    listed = ", ".join(f"{speed:g}" for speed in slow)
+    return (
+        f"Sweeps at {listed} rad/s will not be used: an encoder with a step of "
+        f"{identity.opening_resolution:.2g} rad tells the sense of motion from {floor:.2g} rad/s on. "
+        "Leave them out of capture.friction.speeds_rad_per_s, or lower fit.friction.cutoff_Hz."
+    )
