@@ -33,16 +33,16 @@ from scissorcal.calibration.friction.noise import (
     sample_noise,
     stroke_offsets,
 )
+from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.errors import InputError
 from scissorcal.inference import Posterior, Stop, infer, tails_of
-from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, TERMS, needs_load, terms_of
+from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
@@ -58,9 +58,6 @@ DRAFT_LAWS = {
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
 place of normal noise; milder tails are left to the widening by the scores."""
-FEWEST_BINS = 200
-LEAST_TRAVEL_S = 0.1
-"""Travel of so many seconds at the slowest certain rate is motion, if a slow one."""
 
 
 def fit_friction(
@@ -93,7 +90,7 @@ def fit_friction(
     again = partial(weigh, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
-    _refuse(recordings, settings, every, windows, sensors)
+    refuse_friction(recordings, settings, every, windows, sensors)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     compared, chosen = _compare(laws, stop, tell)
@@ -312,76 +309,6 @@ def _symmetry_note(law: FrictionExperiment, chosen: FittedCandidate) -> tuple[st
 def _tails_if_heavy(chosen: FittedCandidate) -> dict[str, float]:
     tails = chosen.candidate.likelihood.tails
     return {"tails": tails} if np.isfinite(tails) else {}
-
-
-def _refuse(
-    recordings: tuple[Recording, ...],
-    settings: FitFriction,
-    every: Windows,
-    windows: Windows,
-    sensors: Sensors,
-) -> None:
-    """Raise InputError where the moving windows cannot determine what ``settings`` ask for."""
-    joint = recordings[0].joint
-    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
-    _refuse_terms(settings, windows, joint)
-
-
-def _refuse_poor_motion(
-    bins: Bins, every: Bins, recordings: tuple[Recording, ...], joint: Joint, sensors: Sensors
-) -> None:
-    names = ", ".join(recording.source or "the recording" for recording in recordings)
-    if len(bins.rate) < FEWEST_BINS:
-        travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
-        if sensors.verdict.status == "fail":
-            raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
-        if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
-            raise InputError(
-                f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
-                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder does not "
-                "show its direction: record faster sweeps, or lower fit.friction.cutoff_Hz."
-            )
-        raise InputError(
-            f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
-            f"{len(bins.rate) * bins.bin_s:.2g} s of it moving). Friction needs at least "
-            f"{FEWEST_BINS * bins.bin_s:.1g} s of motion: capture sweeps in both directions at "
-            "several speeds."
-        )
-    if not (np.any(bins.rate > 0) and np.any(bins.rate < 0)):
-        missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
-        raise InputError(
-            f"{names}: the motion has one direction only; the {missing} one is missing. "
-            "Friction and an offset are not distinguishable: capture sweeps in both directions."
-        )
-    if float(np.ptp(bins.drive)) <= 1e-9 * float(np.abs(bins.drive).max()):
-        raise InputError(
-            f"{names}: the drive torque is constant while the joint moves; check the "
-            "motor_torque column or the sensor's connection."
-        )
-
-
-def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
-    """Refuse terms that these recordings cannot determine: of a load or angle that they lack."""
-    named = "" if settings.rung == "auto" else settings.rung
-    own = terms_of(named) if named else ()
-    wanted = [f'fit.friction.rung = "{named}"'] if any(one.needs_load for one in own) else []
-    wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
-    if wanted and not windows.bears_load:
-        raise InputError(
-            f"{wanted[0]} needs the load that the joint bears, and these recordings have none, or "
-            "one that hardly varies: record sweeps in which motor and handle work against each "
-            "other by various amounts (motor_torque and handle_force, with handle_radius), or "
-            "choose a law without load."
-        )
-    angles = [name for name in settings.adopt if TERMS[name].rotary]
-    if angles and joint.kind == "linear":
-        raise InputError(f'The term "{angles[0]}" needs an angle, and this joint is linear.')
-    known = {name for one in own or terms_of("coulomb") for name in one.covers}
-    for name in settings.adopt:
-        if name in known or settings.adopt.count(name) > 1:
-            raise InputError(
-                f'fit.friction.adopt names "{name}", which the law has already: remove it.'
-            )
 
 
 def _strokes(bins: Bins) -> NDArray[np.int64]:
