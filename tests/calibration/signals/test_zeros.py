@@ -138,6 +138,18 @@ def test_imports_without_commands_stay_as_they_are() -> None:
     assert zero_verdicts("fit.friction", zero, (raw,), 0.02)[0].status == "not_evaluated"
 
 
+def test_a_hand_that_holds_the_handles_at_rest_is_no_zero() -> None:
+    raw = recording(force=(1.0, 1.0))
+    raw.samples["torque_command"][raw.samples["stroke"] >= 0] = 0.0
+    raw.samples["torque_command"][:100] = 0.02
+    assert without_zeros((raw,), UNMEASURED)[1] is None
+    known = DriveZero(0.0, 0.05, -3e-3, 1e-4, 0.0, 3.0)
+    (cleaned,), zero = without_zeros((raw,), UNMEASURED, known)
+    assert zero is not None
+    assert zero.drive == known.drive
+    assert float(np.median(cleaned.samples["handle_force"])) == pytest.approx(0.95)
+
+
 def test_a_zero_beyond_the_drive_fails_and_names_its_sensor() -> None:
     raw = recording(force=(2.0, 2.0))
     zero = without_zeros((raw,), UNMEASURED)[1]

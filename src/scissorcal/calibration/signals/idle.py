@@ -78,12 +78,13 @@ def idle_periods(recording: Recording) -> tuple[IdlePeriod, ...]:
 def idle_spans(recording: Recording) -> list[slice]:
     """Samples of idle periods: no command, blades at rest and no stroke for ``IDLE_S``.
 
-    A recording without any command does not show when motors were off: it has none.
+    Where no stroke has a command, nothing shows when motors were off, or a hand moves the handles
+    and may hold them at rest: there are none.
     """
+    if not is_driven(recording):
+        return []
     samples = recording.samples
     command = np.asarray(samples["torque_command"], dtype=np.float64)
-    if not np.any(command):
-        return []
     opening = np.asarray(samples["opening"], dtype=np.float64)
     still = resolution_of(opening)
     still = STILL_STEPS * still if np.isfinite(still) else 0.0
@@ -95,6 +96,12 @@ def idle_spans(recording: Recording) -> list[slice]:
             if (high - low) * tick >= IDLE_S and np.ptp(opening[part]) <= still:
                 found.append(part)
     return found
+
+
+def is_driven(recording: Recording) -> bool:
+    """Whether motors move the joint in strokes, by the commands."""
+    samples = recording.samples
+    return bool(np.any(samples["torque_command"][samples["stroke"] >= 0]))
 
 
 def _tick(recording: Recording) -> float:

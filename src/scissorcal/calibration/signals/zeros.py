@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.idle import IDLE_S, IdlePeriod, idle_periods
+from scissorcal.calibration.signals.idle import IDLE_S, IdlePeriod, idle_periods, is_driven
 from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
@@ -80,12 +80,12 @@ def without_zeros(
     """Subtract each recording's zeros from its torque and force; say what is left.
 
     A zero runs straight from one idle period to the next; what a probe found counts as one at the
-    beginning if the recording has none there. ``unmeasured_sd`` is that of a recording
-    without any; ``known``, if given, is then taken for it, as of a fit before. The zero is None
-    where no recording has commands: such files (imports) do not show when motors were off, and
-    stay as they are.
+    beginning if the recording has none there. ``unmeasured_sd`` is that of a recording without any;
+    ``known``, if given, is then taken for it, as of a fit before. Without ``known`` the zero is
+    None where no recording has commands in strokes: such files (imports, a hand's strokes) do not
+    show when nothing drove the joint, and stay as they are.
     """
-    if not any(np.any(recording.samples["torque_command"]) for recording in recordings):
+    if known is None and not any(is_driven(recording) for recording in recordings):
         return recordings, None
     cleaned, zeros = [], []
     for recording in recordings:
