@@ -63,7 +63,7 @@ def probe_trial(name: str) -> Outcome:
 
     def run() -> str:
         found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=lambda _: None)
-        warned = [v.why for v in found.verdicts if v.status != "pass" and v.value is not None]
+        warned = [v.why for v in found.verdicts if v.status != "pass" and v.check != "clipping"]
         return "; ".join(["done", *warned])
 
     return _outcome(run, device, None)

@@ -252,7 +252,7 @@ class _Drive:
         self._warned = 0
 
     def warning(self) -> str:
-        """What to tell whoever loads the next piece about the last one; empty if it was cut."""
+        """What to tell the person who loads the next piece about the last; empty if it was cut."""
         empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
         return f"{unloaded_sentence(empty[-1])} " if empty else ""
 

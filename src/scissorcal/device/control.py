@@ -86,12 +86,23 @@ class Margins:
 
 def loop_margins(axis: Axis, gains: Gains) -> Margins:
     """Phase and gain margin of the sampled loop, at the worst inertia within its factor."""
-    middle = _margins(axis, gains)
-    phase, gain = middle.phase_deg, middle.gain
-    for factor in (1.0 / axis.inertia_factor, axis.inertia_factor):
-        found = _margins(replace(axis, inertia=factor * axis.inertia), gains)
-        phase, gain = min(phase, found.phase_deg), min(gain, found.gain)
-    return Margins(phase, gain, middle.crossover_rad_per_s)
+    middle, *others = (_margins(one, gains) for one in _inertias(axis))
+    if not all(_settles(one, gains) for one in _inertias(axis)):
+        return Margins(0.0, 0.0, middle.crossover_rad_per_s)
+    every = (middle, *others)
+    return Margins(
+        min(one.phase_deg for one in every),
+        min(one.gain for one in every),
+        middle.crossover_rad_per_s,
+    )
+
+
+def keeps_margins(axis: Axis, gains: Gains) -> bool:
+    """Whether `loop_margins` are enough, looking no further than at what fails."""
+    every = _inertias(axis)
+    return all(_margins(one, gains).enough for one in every) and all(
+        _settles(one, gains) for one in every
+    )
 
 
 def loop_poles(axis: Axis, gains: Gains) -> NDArray[np.complex128]:
@@ -176,14 +187,12 @@ def _loop(axis: Axis, gains: Gains) -> tuple[Array, Array]:
 
 
 def _margins(axis: Axis, gains: Gains) -> Margins:
-    """Margins at the stated inertia."""
+    """Margins at the stated inertia, of a loop that settles."""
     omega = _frequencies(axis)
     loop = open_loop(axis, gains, omega)
     size, phase = np.abs(loop), np.unwrap(np.angle(loop))
     phase -= 2.0 * math.pi * np.ceil(phase[0] / (2.0 * math.pi))
     crossed = np.flatnonzero((size[:-1] >= 1.0) != (size[1:] >= 1.0))
-    if np.abs(loop_poles(axis, gains)).max() >= 1.0:
-        return Margins(0.0, 0.0, float(omega[crossed[-1]]) if len(crossed) else math.nan)
     away = np.abs(np.remainder(phase[crossed], 2.0 * math.pi) - math.pi)
     opposed = np.flatnonzero(np.diff(np.floor((phase + math.pi) / (2.0 * math.pi))) != 0)
     apart = np.exp(np.abs(np.log(size[opposed])))
@@ -191,6 +200,16 @@ def _margins(axis: Axis, gains: Gains) -> Margins:
     return Margins(
         math.degrees(float(away.min(initial=math.pi))), float(apart.min(initial=math.inf)), last
     )
+
+
+def _inertias(axis: Axis) -> tuple[Axis, Axis, Axis]:
+    """The axis as stated, and with the lightest and the heaviest inertia."""
+    light, heavy = axis.inertia / axis.inertia_factor, axis.inertia * axis.inertia_factor
+    return axis, replace(axis, inertia=light), replace(axis, inertia=heavy)
+
+
+def _settles(axis: Axis, gains: Gains) -> bool:
+    return bool(np.abs(loop_poles(axis, gains)).max() < 1.0)
 
 
 def _frequencies(axis: Axis) -> Array:

@@ -10,6 +10,7 @@ from scissorcal.device.control import (
     Margins,
     PHASE_MARGIN_deg,
     count_effort,
+    keeps_margins,
     loop_margins,
     open_loop,
     sag,
@@ -25,6 +26,8 @@ STEPS = 40
 LEADS = (2.0, 2.5, 3.0, 4.0)
 """Crossover over the corner at which the rate takes over from the error: 63 to 76 degrees of lead,
 of which delay, filter and integral take their part."""
+MOST_LAG = math.radians(90.0 - PHASE_MARGIN_deg)
+"""Lag by delay and hold at the crossover that leaves the margin, if the lead were complete."""
 INTEGRALS = (1.25, 2.0, 4.0)
 """That corner over the integral's."""
 LEAST_DELAY_S = 1e-4
@@ -113,14 +116,14 @@ def _fastest(axis: Axis, lead: float, integral: float) -> Design | None:
     ratio = FASTEST_CROSSOVER_rad_per_s / SLOWEST_CROSSOVER_rad_per_s
     for step in range(STEPS):
         omega = FASTEST_CROSSOVER_rad_per_s * ratio ** (-step / (STEPS - 1))
-        if omega * axis.tick_s > 0.5 * math.pi:
+        lag = omega * (axis.delay_s + 0.5 * axis.tick_s)
+        if lag > MOST_LAG + math.atan(axis.inertia_factor * axis.viscous / (axis.inertia * omega)):
             continue
         gains = _shaped(axis, omega, lead, integral)
         if count_effort(axis, gains) > axis.most_per_count:
             continue
-        margins = loop_margins(axis, gains)
-        if margins.enough:
-            return Design(axis, gains, margins)
+        if keeps_margins(axis, gains):
+            return Design(axis, gains, loop_margins(axis, gains))
     return None
 
 

@@ -129,12 +129,17 @@ class CoverageGrid:
 
     def _count(self, rate: Array, opening: Array, seconds: Array) -> None:
         speed = np.searchsorted(self.speed_edges, np.abs(rate), side="right") - 1
-        fits = (speed >= 0) & (speed < len(self.speeds))
+        towards = np.full(len(rate), -1)
         for d, direction in enumerate(self.directions):
-            towards = fits & ((rate < 0) if direction == "closing" else (rate > 0))
-            for c, (low, high) in enumerate(self.cells):
-                of = towards & (opening >= low) & (opening < high)
-                self.seconds[d, :, c] += np.bincount(speed[of], seconds[of], len(self.speeds))
+            towards[(rate < 0) if direction == "closing" else (rate > 0)] = d
+        fits = (speed >= 0) & (speed < len(self.speeds)) & (towards >= 0)
+        low, high = np.asarray(self.cells, dtype=np.float64).reshape(-1, 2).T
+        inside = (opening[:, None] >= low) & (opening[:, None] < high) & fits[:, None]
+        sample, cell = np.nonzero(inside)  # cells may overlap
+        shape = self.seconds.shape
+        place = np.ravel_multi_index((towards[sample], speed[sample], cell), shape)
+        counted = np.bincount(place, seconds[sample], minlength=self.seconds.size)
+        self.seconds += counted.reshape(shape)
 
 
 def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:

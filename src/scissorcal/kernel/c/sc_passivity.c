@@ -97,8 +97,9 @@ static void observe(const sc_passivity_config *config, sc_port *port, const sc_p
     const double rate = tick->dt > 0.0f ? tick->turned / (double)tick->dt : 0.0;
     const double taken = (double)config->rig_coulomb * fabs(tick->turned) +
                          (double)config->rig_damping * rate * tick->turned;
-    const double kept = 1.0 - fmin((double)tick->dt / (double)MEMORY_S, 1.0);
-    port->observed_J = fmax(kept * port->observed_J + late - taken, 0.0);
+    const double kept = tick->dt < MEMORY_S ? 1.0 - (double)(tick->dt / MEMORY_S) : 0.0;
+    const double observed = kept * port->observed_J + late - taken;
+    port->observed_J = observed > 0.0 ? observed : 0.0;
 }
 
 static float injected(const sc_passivity_config *config, const sc_port *port,

@@ -96,6 +96,6 @@ def speeds_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
     listed = ", ".join(f"{speed:g}" for speed in slow)
     return (
         f"Sweeps at {listed} rad/s will not be used: an encoder with a step of "
-        f"{identity.opening_resolution:.2g} rad tells the sense of motion from {floor:.2g} rad/s on. "
-        "Leave them out of capture.friction.speeds_rad_per_s, or lower fit.friction.cutoff_Hz."
+        f"{identity.opening_resolution:.2g} rad tells the sense of motion from {floor:.2g} rad/s "
+        "on. Leave them out of capture.friction.speeds_rad_per_s, or lower fit.friction.cutoff_Hz."
     )
