@@ -32,7 +32,7 @@ WINDOW_S = 1.0
 DECAYS = 0.995
 """A swing that falls by less than this in two seconds does not die."""
 COUNTS = (20_000, 1_000_000)
-MULTIPLES = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5, 3.0, 4.0])
+MULTIPLES = np.array([1.0, 1.2, 1.4, 1.6, 1.8, 1.9, 2.0, 2.1, 2.2, 2.3, 2.5, 3.0, 4.0])
 
 
 @dataclass(frozen=True)

@@ -474,3 +474,21 @@ def test_the_energies_of_a_press_balance_when_the_mode_ends() -> None:
     servo.step(state(500))
     assert servo.ledger.stored_J == 0
     assert servo.ledger.arrest_J == pytest.approx(stored)
+
+
+def test_a_motor_sign_turns_commanded_and_measured_torque_round_on_the_wire_alone() -> None:
+    damping = replace(CONFIG, damping_Nm_s_per_rad=0.1)
+    plain, turned = Servo(None, damping), Servo(None, replace(damping, motor_sign=-1))
+    plain.engage(Mode.DAMP)
+    turned.engage(Mode.DAMP)
+    for tick in range(50):
+        opening, torque = 0.6 - 1e-3 * tick, 0.02
+        right = plain.step(State(1, tick, 1000 * tick, opening, 0.0, torque, 0.0))
+        wrong = turned.step(State(1, tick, 1000 * tick, opening, 0.0, -torque, 0.0))
+        assert wrong.torque == -right.torque
+        assert wrong.force == right.force
+        assert turned.telemetry() == plain.telemetry()
+    assert right.torque > 0.05
+    assert turned.ledger == plain.ledger
+    with pytest.raises(ValueError, match="motor_sign must be 1 or -1"):
+        replace(CONFIG, motor_sign=2)

@@ -103,6 +103,7 @@ class Talk(AbstractContextManager["Talk"]):
         self.largest_torque = self.largest_rate = 0.0
         self.duplicates = 0
         self._sign = motor_sign
+        self._virtual = link if isinstance(link, Exchanging) else None
         self._rows: list[tuple[float, ...]] = []
         self._origin: tuple[float, float] | None = None
         self._frame: bytes | None = None
@@ -190,8 +191,8 @@ class Talk(AbstractContextManager["Talk"]):
             if not select.select([link], [], [], SILENCE_S)[0]:
                 return []
             return [found for found in link.receive(0.0) if isinstance(found, State)]
-        assert isinstance(link, Exchanging)
-        found = [decode(payload) for payload in link.exchange(frame)]
+        assert self._virtual is not None
+        found = [decode(payload) for payload in self._virtual.exchange(frame)]
         return [message for message in found if isinstance(message, State)]
 
     def _note(self, state: State) -> bool:
@@ -226,8 +227,7 @@ class Talk(AbstractContextManager["Talk"]):
 
     def _now(self) -> float:
         """The host's clock in seconds: the virtual one where time is virtual."""
-        link = self.link
-        return link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
+        return self._virtual.virtual_time if self._virtual is not None else time.monotonic()
 
     def _answer(self, state: State, answer: Answer | None) -> None:
         if answer is None:
