@@ -74,7 +74,7 @@ class KnownFriction:
         )
 
     def with_zero(self, own: DriveZero | None, before: DriveZero | None) -> "KnownFriction":
-        """Friction for a cut with a zero of its own: errors of both zeros are in its offsets.
+        """Friction for a cut whose zero was measured apart: errors of both are in its offsets.
 
         ``before`` is the zero of the empty sweeps; levels and offset of that fit hold together,
         whatever is left of it, but not with another zero.
