@@ -100,7 +100,7 @@ def _text(found: "DemoResult") -> str:
         table(rows, right=[2, 3, 4, 5]),
         "",
         f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
-        f"rendered torque error {100 * found.torque_error:.2f} % (rms over the scene)",
+        f"torque error of the package {100 * found.torque_error:.2f} % (rms over the scene)",
         f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
         found.rendering.admission.summary,
         "",
