@@ -16,7 +16,12 @@ Folder = Annotated[
 ]
 
 Seed = Annotated[
-    int, typer.Option("--seed", min=0, help="Seed of all random numbers; a run can be repeated.")
+    int,
+    typer.Option(
+        "--seed",
+        min=0,
+        help="Seed of all random numbers. A further capture of one seed in a workspace has other noise.",
+    ),
 ]
 
 Device = Annotated[

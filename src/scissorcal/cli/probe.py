@@ -57,7 +57,7 @@ def probe(
     \b
     Example:
       $ scissorcal device probe --device sim
-      scissorcal-sim office-paper: fit to run
+      scissorcal-sim office-paper: no fault found
       ...
     """
     from scissorcal.cli.live_view import LiveView
@@ -84,7 +84,7 @@ def probe(
         note(_text(error.result))
         raise
     files = [workspace.probe_path] if workspace else []
-    head = f"{result.device}: fit to run\n\n"
+    head = f"{result.device}: no fault found\n\n"
     return Answer(result.as_dict(), head + _text(result), result.verdicts, files)
 
 

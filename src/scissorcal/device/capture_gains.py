@@ -231,8 +231,8 @@ def _checked(axis: Axis, gains: Gains, name: str) -> Margins:
 def _verdict(margins: list[Margins], delay_s: float) -> Verdict:
     worst = min(margins, key=lambda one: one.phase_deg)
     said = (
-        f"{worst.phase_deg:.0f} degrees of phase margin and a gain margin of {worst.gain:.1f} at a "
-        f"delay of {1e3 * delay_s:.2g} ms."
+        f"The capture's gains have {worst.phase_deg:.0f} degrees of phase margin and a gain margin "
+        f"of {worst.gain:.1f} at a delay of {1e3 * delay_s:.2g} ms."
     )
     remedy = """ Lower the gains in rig.control, or set them to "auto"."""
     return judge("device", "control margin", worst.phase_deg, PHASE_MARGIN_deg, said, said + remedy)

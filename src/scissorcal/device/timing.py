@@ -127,15 +127,14 @@ class FeltLag:
         if math.isnan(ticks.p50):
             return "Felt lag: not measured, no command was sent."
         text = (
-            f"Felt lag {ticks.p50:g} (p50), {ticks.p99:g} (p99), {ticks.p999:g} (p99.9), "
-            f"{ticks.worst:g} (worst) ticks; {100 * self.held_share:.2g} % of the ticks without a "
-            "new command"
+            f"{ticks.p50:g} to {ticks.worst:g} ticks of felt lag (middle to worst; 99 % within "
+            f"{ticks.p99:g}); {100 * self.held_share:.2g} % of the ticks without a new command"
         )
         if math.isnan(self.transport_ms):
             return f"{text}; the line's round trip could not be measured."
         return (
-            f"{text}; with the line's round trip of {self.transport_ms:.2g} ms at most "
-            f"{ms.p50:.3g}, {ms.p99:.3g}, {ms.p999:.3g}, {ms.worst:.3g} ms."
+            f"{text}; with the line's round trip of {self.transport_ms:.2g} ms at most {ms.p50:.3g} "
+            f"to {ms.worst:.3g} ms."
         )
 
 

@@ -47,8 +47,8 @@ _STOP_SENTENCES = {
     ),
     StopReason.DEVICE_FAULT: (
         "The device latched a fault that did not clear, or latched faults too often. Remove the "
-        "cause; if the computer answers late, close programs that load it or raise BRAKE_AFTER_MS; "
-        "then start again."
+        "cause; if the computer answers late, close programs that load it or raise "
+        "rig.line.brake_after_ms; then start again."
     ),
     StopReason.ENCODER_FAULT: (
         "The device reports a fault of its encoder; check the encoder and its cable."
@@ -59,7 +59,7 @@ _STOP_SENTENCES = {
     ),
     StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
     StopReason.SILENCE: (
-        "The device stopped sending STATE frames; check its power and the cable, then start again."
+        "No STATE frame arrived for 1 s; check the device's power and the cable, then start again."
     ),
     StopReason.LINE_ERROR: "Reading or writing the port failed; check the port and start again.",
     StopReason.BAD_BLOCK: (
@@ -67,14 +67,14 @@ _STOP_SENTENCES = {
         "recipe's limits and rig.control."
     ),
     StopReason.IMPLAUSIBLE: (
-        "The device reported openings or advances beyond its stops, not finite, or too far apart "
-        "for any motion, four frames in a row; check the encoders and their cables."
+        "4 frames in a row had an opening beyond the device's stops, or an opening or advance that "
+        "was not finite or leapt farther than any motion; check the encoders and their cables."
     ),
     StopReason.DEVICE_CLOCK: (
         "The device's clock (device_us) stood still for 20 frames; restart the device."
     ),
     StopReason.OVERSPEED: (
-        "The blades moved faster than any capture or hand moves them; check that the motor and "
+        "Above 30 rad/s (or 5 m/s): the blades moved faster than any capture or hand moves them; check that the motor and "
         "its encoder have the same sense, and that nothing is loose."
     ),
     StopReason.RESTARTED: (
@@ -82,8 +82,8 @@ _STOP_SENTENCES = {
         "then start again."
     ),
     StopReason.TORQUE_HELD: (
-        "The motor's torque stayed at its limit. Check for an obstacle, or material that is too "
-        "stiff for limits.torque_Nm; if the torque is meant, raise limits.held_at_limit_s."
+        "The motor's torque was at its limit for limits.held_at_limit_s. Check for an obstacle, or material that is too "
+        "stiff for limits.torque_Nm; if the torque is meant, raise that key."
     ),
     StopReason.OSCILLATION: (
         "The blades swung to and fro, driven by the loop itself: commands act too late, or the "
@@ -93,15 +93,17 @@ _STOP_SENTENCES = {
     ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "
-        "sense. Positive torque must open the blades and a wider opening count up; swap two wires "
-        "of one of the two."
+        "sense. Positive torque must open the blades and a wider opening count up: set rig.motor_sign "
+        "to the other sign or swap two wires of the motor or of the encoder, then run 'scissorcal "
+        "device probe'."
     ),
     StopReason.RUNAWAY_ADVANCE: (
         "The sledge sped up against the force of its motor: motor or encoder has the wrong sense. "
         "Positive force must advance it and the advance count up; swap two wires of one of the two."
     ),
     StopReason.STOP_ELSEWHERE: (
-        "The device reports that the blades are at a stop, and the opening says that they are not. "
+        "The device reports that the blades are at an end stop, more than 0.1 rad from those of "
+        "its identity. "
         "Check scale and zero of the encoder, opening_min and opening_max of the device, and that "
         "nothing blocks the blades."
     ),
@@ -118,15 +120,16 @@ _STOP_SENTENCES = {
         "be positive when it opens the blades: change its sign in the device."
     ),
     StopReason.MEASURED_DIFFERS: (
-        "The measured motor torque differs from the commanded one by more than a sensor's error. "
+        "Measured over commanded motor torque was outside 0.7 to 1.4 for half a second. "
         "Check the scale of motor_torque, the motor's torque constant and its supply."
     ),
     StopReason.CLOCK_RATE: (
-        "The device's clock (device_us) does not keep time with its ticks (tick_us) or with this "
-        "computer; rates would be wrong by as much. Correct the timer or tick_us of the device."
+        "The device's clock (device_us) is off by more than 2 % of its ticks (tick_us) or 5 % of "
+        "this computer's time; rates would be wrong by as much. Correct the device's timer or "
+        "tick_us."
     ),
     StopReason.UNREADABLE: (
-        "The device sent no number as motor torque or handle force, 20 frames in a row. Check the "
+        "20 frames in a row had a motor torque or handle force that was not finite. Check the "
         "sensors and their cables."
     ),
 }

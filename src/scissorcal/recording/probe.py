@@ -6,6 +6,7 @@ It stands here, and not with the probe, because it travels in recordings: a fit 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from datetime import datetime
 from typing import Any, Literal
 
 from scissorcal.verdicts import Verdict
@@ -81,6 +82,8 @@ def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
 
 def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
     """Read what `ProbeResult.as_dict` gave. ValueError where it is something else."""
+    if not isinstance(plain, Mapping):
+        raise ValueError("it is no object")
     if plain.get("format") != FORMAT:
         stated = plain.get("format")
         raise ValueError(f"its format is {stated!r}, and this version reads {FORMAT!r}")
@@ -91,6 +94,8 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
             if isinstance(value, Mapping) and name != "facts":
                 values[name] = Estimate(float(value["mean"]), float(value["sd"]))
         values["facts"] = {name: float(value) for name, value in plain["facts"].items()}
+        if datetime.fromisoformat(values["made_at"]).tzinfo is None:
+            raise ValueError("its made_at states no time zone")
         values["verdicts"] = tuple(Verdict(**verdict) for verdict in plain["verdicts"])
         return ProbeResult(**values)
     except (KeyError, TypeError, AttributeError) as error:

@@ -129,7 +129,8 @@ class RecordingWriter:
             self._stream.close()
             self.part.unlink()
         else:
-            reason = str(error) or type(error).__name__
+            stopped = isinstance(error, KeyboardInterrupt)
+            reason = "Ctrl-C" if stopped else str(error) or type(error).__name__
             self.note(f"The capture ended early after {self.sample_count} samples: {reason}")
             if isinstance(error, DeviceError) and error.stop:
                 self.mark(STOP_MARK, error.stop)

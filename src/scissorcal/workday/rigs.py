@@ -29,9 +29,14 @@ def open_rig(
     late. ``run`` numbers the runs of one ``seed``, so that each has another noise. With
     ``realtime`` it is as `open_port`. ``line`` has the baud rate, and how long the device waits for
     commands until it brakes; without it the rate is the default and the device keeps its own time.
-    Raises InputError where there is no specimen to simulate, DeviceError where the rig cannot be
-    reached.
+    Raises InputError where there is no specimen to simulate, or ``realtime`` is asked of a port;
+    DeviceError where the rig cannot be reached.
     """
+    if device != SIM and realtime:
+        raise InputError(
+            f"--realtime is for --device sim: {device} is a port, and always runs in real time. "
+            "Leave it out."
+        )
     if device != SIM or realtime:
         with open_port(device, specimen, seed, line=line) as port:
             yield port

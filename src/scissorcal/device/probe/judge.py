@@ -255,13 +255,13 @@ def _clock(found: Idle, identity: Identity) -> list[Verdict]:
         bad = f"{said}: by this computer's clock device_us is right, so tick_us is wrong."
     verdicts = [judge(LINE, check, abs(ratio - 1.0), CLOCK_LIMIT, f"{said}.", bad)]
     host, error = found.host_ratio, found.host_ratio_se
-    good = f"The device's clock runs {100 * (host - 1.0):+.2f} % fast by this computer's."
+    good = f"The device's clock is off by {100 * (host - 1.0):+.2f} % by this computer's."
     if identity.capabilities & Capability.SIMULATOR:
         why = f"{good} A virtual rig's clock follows how busy its computer is."
         return [*verdicts, not_evaluated(LINE, "clock by host", why, CLOCK_LIMIT)]
     off = max(abs(host - 1.0) - 3.0 * error, 0.0) if math.isfinite(host) else math.inf
     bad = (
-        f"The device's clock runs {100 * (host - 1.0):+.2f} % fast by this computer's, or its "
+        f"The device's clock is off by {100 * (host - 1.0):+.2f} % by this computer's, or its "
         "ticks are longer or shorter than it states: rates and inertia err with it. Check its "
         "timer's frequency."
     )
@@ -339,7 +339,10 @@ def _radius(identity: Identity, recipe_mm: float) -> Verdict:
         why = f"{said}: no handle is so long. handle_radius is in metres; correct the firmware."
         return Verdict(SENSORS, check, "fail", off, RADIUS_SHARE, why)
     if off > RADIUS_SHARE:
-        why = f"{said}: measure it, and correct the one that is wrong. Handle forces err by it."
+        why = (
+            f"{said}, {off:.0%} apart. Measure it, and correct rig.handle_radius_mm or the firmware: "
+            "forces at the handles are wrong by as much."
+        )
         return not_evaluated(SENSORS, check, why, RADIUS_SHARE, off)
     return Verdict(SENSORS, check, "pass", off, RADIUS_SHARE, f"{said}.")
 

@@ -120,7 +120,9 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
     finding.add(
         judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
     )
-    finding.add([], facts={REAL_TIME: float(isinstance(talk.link, PortLink))})
+    finding.add(
+        [], facts={REAL_TIME: float(isinstance(talk.link, PortLink)), **recipe_facts(recipe)}
+    )
     tell(0.4, "watchdog, at zero torque")
     watched = watchdog(talk, recipe.rig.line.brake_after_ms)
     finding.add(judge_watchdog(watched, identity.tick_us * 1e-3), **_of_watchdog(watched, talk))
@@ -142,6 +144,15 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
             "largest_rate_rad_per_s": talk.largest_rate,
         },
     )
+
+
+def recipe_facts(recipe: Recipe) -> dict[str, float]:
+    """The numbers of the recipe that a probe judges: another probe is due where they change."""
+    rig = recipe.rig
+    return {
+        "rig.handle_radius_mm": rig.handle_radius_mm,
+        "rig.line.brake_after_ms": rig.line.brake_after_ms,
+    }
 
 
 def bounds_of(recipe: Recipe, identity: Identity) -> Bounds:

@@ -272,10 +272,14 @@ class Talk(AbstractContextManager["Talk"]):
             )
             late = np.diff([row[7] for row in self._rows[-STUCK_FRAMES:]])
             stalled = bool(np.any(late > STALL_TICKS * self.tick_s))
+            allowed = (
+                f"rig.probe.largest_angle_deg = {np.degrees(bounds.angle_rad):.3g} and "
+                f"rig.probe.largest_rate_rad_per_s = {bounds.rate_rad_per_s:g}"
+            )
             raise (StalledError if stalled else RunawayError)(
-                f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, which is "
-                "more than rig.probe allows. Check that nothing else moves them (a hand, a spring, "
-                "gravity) and that the encoder's counts are right; the motors are off."
+                f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, beyond what "
+                f"the recipe allows ({allowed}). Check that no hand, spring or gravity moves them "
+                "and that the encoder's counts are right, or raise these keys. The motors are off."
             )
 
     def _what_is_wrong(self, state: State) -> str:

@@ -1,6 +1,7 @@
 """Probe a rig into a workspace: before its first motor run, and again where that is too old."""
 
 import json
+import math
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
@@ -86,9 +87,9 @@ def ensure_probed(
     nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was.
     """
     tell = say or (lambda sentence: None)
-    last = last_probe(workspace)
+    last = _kept(workspace)
     why = _why_again(last, link, recipe, now or datetime.now(UTC))
-    if last is not None and not why:
+    if not isinstance(last, str) and not why:
         tell(f"The rig was probed at {last.made_at} ('scissorcal device probe' repeats it).")
         return last
     tell(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
@@ -104,36 +105,51 @@ def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult
 
     None where there is none that can be read.
     """
-    from scissorcal.device.probe.result import probe_from_dict
-
-    try:
-        found = probe_from_dict(json.loads(workspace.probe_path.read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return None
-    if link is not None and _differs(found, link):
+    found = _kept(workspace)
+    if isinstance(found, str) or (link is not None and _differs(found, link)):
         return None
     return found
+
+
+def _kept(workspace: Workspace) -> "ProbeResult | str":
+    """The probe that the workspace keeps, or why there is none."""
+    from scissorcal.device.probe.result import probe_from_dict
+
+    path = workspace.probe_path
+    if not path.exists():
+        return "there is no probe of it yet"
+    try:
+        return probe_from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        return f"{path.name} cannot be read ({error}) and is replaced"
 
 
 def _most(recipe: "Recipe") -> str:
     return f"{1e3 * recipe.rig.probe.largest_torque_Nm:g} mN m"
 
 
-def _why_again(last: "ProbeResult | None", link: "Link", recipe: "Recipe", now: datetime) -> str:
+def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: datetime) -> str:
     """Why a probe does not count, as part of a sentence; empty where it does."""
-    if last is None:
-        return "there is no probe of it yet"
+    from scissorcal.device.probe.probe import recipe_facts
+
+    if isinstance(last, str):
+        return last
     if _differs(last, link):
         return f"the last probe was of another rig, firmware or line ({last.device})"
     if last.motor_sign != recipe.rig.motor_sign:
         return "rig.motor_sign changed since"
+    for name, stated in recipe_facts(recipe).items():
+        if last.facts.get(name) != stated:
+            was = last.facts.get(name, math.nan)
+            return f"the recipe's {name} changed since (from {was:g} to {stated:g})"
     if failed(last.verdicts):
         return "the last probe refused it"
-    age = now - datetime.fromisoformat(last.made_at)
-    if not timedelta(0) <= age <= timedelta(hours=recipe.rig.probe.max_age_h):
-        return (
-            f"the last probe is older than {recipe.rig.probe.max_age_h:g} h (rig.probe.max_age_h)"
-        )
+    age_h = (now - datetime.fromisoformat(last.made_at)) / timedelta(hours=1)
+    if age_h < 0.0:
+        return f"the last probe is dated {last.made_at}, after this computer's clock"
+    most_h = recipe.rig.probe.max_age_h
+    if age_h > most_h:
+        return f"the last probe is {age_h:.1f} h old, and rig.probe.max_age_h allows {most_h:g} h"
     return ""
 
 
