@@ -67,7 +67,7 @@ def test_felt_lag_adds_the_round_trip_to_the_ticks() -> None:
     assert lag.held_share == pytest.approx(0.004)
     assert lag.ms.p50 == pytest.approx(1.4)
     assert lag.ms.worst == pytest.approx(5.4)
-    assert "1 (p50)" in lag.sentence
+    assert lag.sentence.startswith("1 to 5 ticks of felt lag (middle to worst; 99 % within 1)")
     assert "0.4 ms" in lag.sentence
 
 

@@ -20,7 +20,8 @@ Seed = Annotated[
     typer.Option(
         "--seed",
         min=0,
-        help="Seed of all random numbers. A further capture of one seed in a workspace has other noise.",
+        help="Seed of all random numbers. A further capture of one seed in a workspace has other "
+        "noise.",
     ),
 ]
 

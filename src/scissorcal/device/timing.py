@@ -133,8 +133,8 @@ class FeltLag:
         if math.isnan(self.transport_ms):
             return f"{text}; the line's round trip could not be measured."
         return (
-            f"{text}; with the line's round trip of {self.transport_ms:.2g} ms at most {ms.p50:.3g} "
-            f"to {ms.worst:.3g} ms."
+            f"{text}; with the line's round trip of {self.transport_ms:.2g} ms at most "
+            f"{ms.p50:.3g} to {ms.worst:.3g} ms."
         )
 
 

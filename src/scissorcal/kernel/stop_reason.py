@@ -74,16 +74,17 @@ _STOP_SENTENCES = {
         "The device's clock (device_us) stood still for 20 frames; restart the device."
     ),
     StopReason.OVERSPEED: (
-        "Above 30 rad/s (or 5 m/s): the blades moved faster than any capture or hand moves them; check that the motor and "
-        "its encoder have the same sense, and that nothing is loose."
+        "Above 30 rad/s (or 5 m/s): the blades moved faster than any capture or hand moves "
+        "them; check that the motor and its encoder have the same sense, and that nothing is loose."
     ),
     StopReason.RESTARTED: (
         "The device restarted: its sequence numbers fell back. Check its power supply and cable, "
         "then start again."
     ),
     StopReason.TORQUE_HELD: (
-        "The motor's torque was at its limit for limits.held_at_limit_s. Check for an obstacle, or material that is too "
-        "stiff for limits.torque_Nm; if the torque is meant, raise that key."
+        "The motor's torque was at its limit for limits.held_at_limit_s. Check for an obstacle, "
+        "or material that is too stiff for limits.torque_Nm; if the torque is meant, raise that "
+        "key."
     ),
     StopReason.OSCILLATION: (
         "The blades swung to and fro, driven by the loop itself: commands act too late, or the "
@@ -93,9 +94,9 @@ _STOP_SENTENCES = {
     ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "
-        "sense. Positive torque must open the blades and a wider opening count up: set rig.motor_sign "
-        "to the other sign or swap two wires of the motor or of the encoder, then run 'scissorcal "
-        "device probe'."
+        "sense. Positive torque must open the blades and a wider opening count up: set "
+        "rig.motor_sign to the other sign or swap two wires of the motor or of the encoder, then "
+        "run 'scissorcal device probe'."
     ),
     StopReason.RUNAWAY_ADVANCE: (
         "The sledge sped up against the force of its motor: motor or encoder has the wrong sense. "

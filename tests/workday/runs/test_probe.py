@@ -52,7 +52,7 @@ def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Works
     said: list[str] = []
     later = datetime.now(UTC) + timedelta(hours=5)
     ensure_probed(workspace, virtual_rig(), recipe, say=said.append, now=later)
-    assert "older than 4 h (rig.probe.max_age_h)" in said[0]
+    assert "5.0 h old, and rig.probe.max_age_h allows 4 h" in said[0]
     with pytest.raises(ProbeRefusedError, match=r"Set rig\.motor_sign = 1 in the recipe"):
         ensure_probed(workspace, virtual_rig(), changed(recipe, motor_sign=-1), say=said.append)
     assert "rig.motor_sign changed since" in said[-1]

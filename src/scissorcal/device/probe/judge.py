@@ -340,8 +340,8 @@ def _radius(identity: Identity, recipe_mm: float) -> Verdict:
         return Verdict(SENSORS, check, "fail", off, RADIUS_SHARE, why)
     if off > RADIUS_SHARE:
         why = (
-            f"{said}, {off:.0%} apart. Measure it, and correct rig.handle_radius_mm or the firmware: "
-            "forces at the handles are wrong by as much."
+            f"{said}, {off:.0%} apart. Measure it, and correct rig.handle_radius_mm or the "
+            "firmware: forces at the handles are wrong by as much."
         )
         return not_evaluated(SENSORS, check, why, RADIUS_SHARE, off)
     return Verdict(SENSORS, check, "pass", off, RADIUS_SHARE, f"{said}.")
