@@ -275,3 +275,26 @@ def test_a_watch_needs_sound_thresholds() -> None:
         WatchConfig(swing_rate=-1.0)
     with pytest.raises(ValueError, match="below 1"):
         WatchConfig(ratio_torque=0.01, least_ratio=1.2, most_ratio=1.4)
+
+
+def test_what_is_seen_while_it_ends_does_not_take_the_first_reasons_place() -> None:
+    config = replace(CONFIG, opening_error_limit=0.032, torque_slew=0.5)
+    servo = tracking(config)
+    joint = Joint(seen=lambda tick, opening: 0.6)
+    assert joint.run(servo, 4000) is StopReason.OPENING_STANDS
+    assert servo.watched["opening_stands"] >= 1.0
+
+
+def test_an_ending_ends_also_where_the_device_repeats_itself() -> None:
+    servo = tracking(replace(CONFIG, torque_slew=0.5))
+    state = State(1, 0, 0, 0.6, -0.02, 0.0, 0.0)
+    for tick in range(1, 4000):
+        state = State(1, tick, 1000 * tick, 0.6, -0.02, 0.0, 0.0)
+        servo.step(state)
+        if servo.watched["opening_stands"] >= 1.0:
+            break
+    assert servo.stop_reason is StopReason.NONE
+    for _ in range(120):
+        command = servo.step(state)
+    assert servo.stop_reason is StopReason.OPENING_STANDS
+    assert command.torque == 0.0

@@ -279,7 +279,8 @@ class Talk(AbstractContextManager["Talk"]):
             raise (StalledError if stalled else RunawayError)(
                 f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, beyond "
                 f"what the recipe allows ({allowed}). Check that no hand, spring or gravity moves "
-                "them and that the encoder's counts are right, or raise these keys. The motors are off."
+                "them and that the encoder's counts are right, or raise these keys. The motors are "
+                "off."
             )
 
     def _what_is_wrong(self, state: State) -> str:

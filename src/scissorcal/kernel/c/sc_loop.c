@@ -62,21 +62,24 @@ static void fail(loop *self, uint32_t reason, int error)
  * sent before anything else. Returns 1 once all is written. */
 static int flush_pending(loop *self)
 {
+    int64_t until_ns = 0; /* the clock is read only where the line is full */
     while (self->pending > 0) {
         const ssize_t wrote = write(self->fd, self->out, self->pending);
         if (wrote > 0) {
             self->pending -= (size_t)wrote;
             memmove(self->out, self->out + wrote, self->pending);
-        } else if (wrote < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+        } else if (wrote == 0 || errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) {
             struct pollfd line = {self->fd, POLLOUT, 0};
-            if (poll(&line, 1, WRITE_PATIENCE_MS) == 0) {
+            const int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
+            until_ns = until_ns > 0 ? until_ns : now_ns + WRITE_PATIENCE_MS * (int64_t)1000000;
+            if (now_ns >= until_ns || poll(&line, 1, WRITE_PATIENCE_MS) == 0) {
                 return 0;
             }
             if (line.revents & (POLLHUP | POLLERR | POLLNVAL)) {
                 fail(self, SC_STOP_HANGUP, 0);
                 return 0;
             }
-        } else if (wrote < 0 && errno != EINTR) {
+        } else {
             fail(self, errno == EIO || errno == ENXIO || errno == EPIPE ? SC_STOP_HANGUP
                                                                          : SC_STOP_LINE_ERROR,
                  errno);
@@ -273,6 +276,9 @@ static void pass_time(loop *self)
         return;
     }
     self->passed_ns = passed_ns > listened_ns ? now_ns : self->passed_ns + whole_us * 1000;
+    if (passed_ns > listened_ns) { /* the device's clock went on meanwhile, and is compared */
+        sc_watch_pass(&block->servo.watch, (uint32_t)((passed_ns - listened_ns) / 1000));
+    }
     self->silent_ns += whole_us * 1000;
     sc_block_read_orders(block, &orders);
     sc_servo_pass(&block->config, &orders, &block->servo, (uint32_t)whole_us);

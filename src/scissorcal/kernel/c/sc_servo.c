@@ -260,7 +260,7 @@ static effort effort_of_mode(const sc_servo_config *config, const sc_model *mode
                              const sc_reference *reference, sc_servo *servo, const way *since)
 {
     effort wanted = {0.0f, 0.0f};
-    if (servo->mode == SC_MODE_TRACK) {
+    if (servo->mode == SC_MODE_TRACK && !servo->ending) {
         wanted = track(config, reference, servo, since->dt);
     } else if (servo->mode == SC_MODE_RENDER) {
         wanted = render(config, model, servo, since);

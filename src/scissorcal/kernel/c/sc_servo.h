@@ -6,7 +6,8 @@
  * DAMP    torque = -damping * rate, no force
  *
  * All commands pass the same limits: at most torque_limit and force_limit, and from one command
- * that is sent to the next no faster than the slews. A command that is not finite becomes 0.
+ * that is sent to the next no faster than the slews; only to zero at once, on a state that is not
+ * usable, a fault, IDLE and a stop. A command that is not finite becomes 0.
  *
  * Time that passes is the host's (sc_servo_pass), so that neither a backlog of frames nor a device
  * that repeats itself changes what silence means.

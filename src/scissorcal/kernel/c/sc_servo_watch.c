@@ -17,7 +17,7 @@ enum {
 void sc_servo_stop(sc_servo *servo, uint32_t reason)
 {
     if (servo->stop_reason == SC_STOP_NONE) {
-        servo->stop_reason = reason;
+        servo->stop_reason = servo->ending != SC_STOP_NONE ? servo->ending : reason;
     }
 }
 
@@ -101,6 +101,9 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
     }
     sc_watch_pass(&servo->watch, elapsed_us);
     servo->ending_us = longer(servo->ending_us, elapsed_us);
+    if (servo->ending && servo->ending_us >= LONGEST_END_US) {
+        sc_servo_stop(servo, servo->ending); /* also where the device only repeats itself */
+    }
     servo->stale_us = longer(servo->stale_us, elapsed_us);
     servo->slew_us = longer(servo->slew_us, elapsed_us);
     if (servo->slew_us > config->tick_us) {
@@ -203,7 +206,7 @@ void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const 
 void sc_servo_finish_ending(sc_servo *servo, int driven)
 {
     const int let_go = servo->sent_torque == 0.0f && servo->sent_force == 0.0f;
-    if (servo->ending && (!driven || let_go || servo->ending_us >= LONGEST_END_US)) {
+    if (servo->ending && (!driven || let_go)) {
         sc_servo_stop(servo, servo->ending);
     }
 }

@@ -44,6 +44,10 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
             return 0;
         }
     }
+    if (config->ratio_torque > 0.0f &&
+        (config->least_ratio >= 1.0f || config->most_ratio <= 1.0f)) {
+        return 0;
+    }
     return isfinite(config->stop_low) && isfinite(config->stop_high);
 }
 
