@@ -53,8 +53,7 @@ def _struck(talk: Talk, torque: float) -> Stage[tuple[bool, float]]:
     state = yield Answer(torque=torque)
     flagged, largest = False, 0.0
     for _ in range(talk.ticks(REST_S)):
-        faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
-        state = yield RELEASE._replace(clear=faulty)
         flagged = flagged or bool(state.flags & StateFlag.TORQUE_SATURATED)
         largest = max(largest, abs(state.motor_torque))
+        state = yield RELEASE._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
     return flagged, largest
