@@ -151,6 +151,7 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "probe enable": ("", f"{_PROBE_MOTORS}: whether they follow ENABLE"),
     "probe lag": ("at most", f"{_PROBE_MOTORS}: from a state to the effect of its answer, ms"),
     "probe watchdog": ("at most", f"{_PROBE_MOTORS}: silence after which the device brakes, ms"),
+    "probe watchdog value": ("", f"{_PROBE_MOTORS}: whether BRAKE_AFTER_MS can be set"),
     "probe watchdog flags": ("at most", f"{_PROBE_MOTORS}: flags that are missing"),
     "probe fault clears": ("at most", f"{_PROBE_MOTORS}: 1 if it does not"),
     "probe blades move": ("", f"{_PROBE_MOTORS}: largest torque that was tried, mN m"),

@@ -71,6 +71,7 @@ UNNOTICED = {
     "watchdog deaf",
     "torque not clipped",
     "BRAKE_AFTER_MS refused",
+    "watchdog deaf, BRAKE_AFTER_MS refused",
 }
 """A capture ends well with them: they are harmless to it, or only 'scissorcal device probe' can
 tell them, before anything is captured."""

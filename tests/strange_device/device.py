@@ -87,7 +87,7 @@ class StrangeDevice:
         self._enabled = self._lost = self._fault = False
         self._fault_given = False
         self._silence_s = 0.0
-        self._brake_after_ms = 10.0
+        self._brake_after_ms = self.faults.brake_after_ms
         self._streaming = False
         self._streamed_s = 0.0
         self._sequence = 0

@@ -56,6 +56,8 @@ class Faults:
     watchdog_deaf: bool = False
     clips: bool = True
     refuses_brake_after: bool = False
+    brake_after_ms: float = 10.0
+    """At power-on."""
     motor_lag_s: float = 0.0005
     dry_Nm: float = 0.012
     inertia: float = 6e-4
@@ -121,6 +123,7 @@ FAULTS = {
     "watchdog deaf": Faults(watchdog_deaf=True),
     "torque not clipped": Faults(clips=False),
     "BRAKE_AFTER_MS refused": Faults(refuses_brake_after=True),
+    "watchdog deaf, BRAKE_AFTER_MS refused": Faults(refuses_brake_after=True, watchdog_deaf=True),
     "blades jam": Faults(jammed_at_rad=0.45),
     "no sheet": Faults(no_sheet=True),
 }

@@ -26,6 +26,7 @@ STILL = {
     "5 % of frames lost": "of the frames were lost",
     "5 % of frames garbled": "garbled",
     "watchdog deaf": "its watchdog is deaf",
+    "watchdog deaf, BRAKE_AFTER_MS refused": "withheld for 1050 ms with ENABLE in force",
 }
 """Refused before a torque was commanded."""
 

@@ -1,16 +1,38 @@
 """Does the device clip a torque above its stated limit? Only tried where one tick is harmless."""
 
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.device.probe.pulses import ATTEMPTS
 from scissorcal.device.probe.result import Estimate
-from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
+from scissorcal.device.probe.talk import RELEASE, Answer, Stage, StalledError, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, StateFlag
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
+CHECK = "clipping"
 ABOVE = 1.02
 """Above the limit by so much: a device that does not clip gives no more than that either."""
 SHORTEST_BRAKE_MS = 1.0
+ARRIVED_SHARE = 0.3
+"""Of the limit: a motor of 2 ms reaches 0.39 of its command within a tick of 1 ms."""
 REST_S = 0.05
+"""A strike is heard for so long; the next one waits until the blades rested for so long."""
+LONGEST_REST_S = 1.0
+STILL_RAD, STILL_STEPS = 0.002, 5.0
+"""Blades that stay within the larger of both are at rest, an encoder that jitters included."""
 SDS = 2.0
+
+
+@dataclass(frozen=True)
+class Strike:
+    """What one strike showed; ``told`` is False where it was braked or never arrived."""
+
+    flagged: bool
+    largest_Nm: float
+    told: bool
 
 
 def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Verdict:
@@ -18,13 +40,13 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
 
     The watchdog is set to 1 ms for it, so that a computer that stalls there gives three ticks of
     torque at most: with these and the least inertia the rate is bounded before it is tried. Then
-    it is set to ``brake_after_ms`` again.
+    it is set to ``brake_after_ms`` again, whatever happened. A strike that was braked or lost is
+    repeated from rest, each way by turns; if none arrives, nothing is told.
     """
     limit, bounds = talk.identity.torque_limit, talk.bounds
-    check = "clipping"
     if inertia is None or not inertia.mean > SDS * inertia.sd:
         why = "Clipping was not tried: the inertia is not known, so one tick might be too much."
-        return not_evaluated("probe.motors", check, why)
+        return not_evaluated("probe.motors", CHECK, why)
     longest_s = SHORTEST_BRAKE_MS * 1e-3 + 3.0 * talk.tick_s
     fastest = ABOVE * limit * longest_s / (inertia.mean - SDS * inertia.sd)
     if fastest > bounds.rate_rad_per_s:
@@ -32,29 +54,84 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
             f"Clipping was not tried: a tick at the limit ({limit:.3g} N m) could bring the blades "
             f"to {fastest:.2g} rad/s, and rig.probe allows {bounds.rate_rad_per_s:.2g}."
         )
-        return not_evaluated("probe.motors", check, why)
+        return not_evaluated("probe.motors", CHECK, why)
     try:
         talk.link.configure(ConfigKey.BRAKE_AFTER_MS, SHORTEST_BRAKE_MS)
     except DeviceError as error:
-        return not_evaluated("probe.motors", check, f"Clipping was not tried: {error}")
-    with talk.allowing(ABOVE * limit):
-        flagged, largest = talk.play(_struck(talk, ABOVE * limit))
-    talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
+        with suppress(DeviceError):  # it may have been set, and only its confirmation lost
+            talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
+        return not_evaluated("probe.motors", CHECK, f"Clipping was not tried: {error}")
+    try:
+        with talk.allowing(ABOVE * limit):
+            found = _strikes(talk, ABOVE * limit)
+    finally:
+        talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
+    return _judged(found, limit)
+
+
+def _judged(found: Strike, limit: float) -> Verdict:
+    if not found.told:
+        why = (
+            f"Clipping could not be told: in {ATTEMPTS} attempts the command of "
+            f"{ABOVE * limit:.3g} N m was lost, the watchdog (1 ms for this check) braked first, "
+            "or the blades did not rest. Close other programs on this computer, let go of the "
+            "handles, and probe again."
+        )
+        return not_evaluated("probe.motors", CHECK, why)
     good = "A torque above the stated limit is clipped and flagged."
     bad = (
         f"A command of {ABOVE * limit:.3g} N m was not flagged TORQUE_SATURATED (largest measured "
-        f"torque {largest:.3g} N m): the device must clip what exceeds its limit."
+        f"torque {found.largest_Nm:.3g} N m): the device must clip what exceeds its limit."
     )
-    return judge("probe.motors", check, float(not flagged), 0.0, good, bad)
+    return judge("probe.motors", CHECK, float(not found.flagged), 0.0, good, bad)
 
 
-def _struck(talk: Talk, torque: float) -> Stage[tuple[bool, float]]:
-    state = yield Answer()
-    state = yield Answer(torque=torque)
-    flagged, largest = False, 0.0
-    for _ in range(talk.ticks(REST_S)):
+def _strikes(talk: Talk, torque: float) -> Strike:
+    """Strike until one is told, each way by turns, a few times at most."""
+    found = Strike(flagged=False, largest_Nm=0.0, told=False)
+    for attempt in range(ATTEMPTS):
+        try:
+            found = _strike(talk, -torque if attempt % 2 else torque)
+        except StalledError:
+            if attempt == ATTEMPTS - 1:
+                raise
+            continue
+        if found.told:
+            break
+    return found
+
+
+def _strike(talk: Talk, torque: float) -> Strike:
+    """One strike and what was heard of it, frames that came several at once among them."""
+    begin = talk.play(_struck(talk, torque))
+    if begin is None:
+        return Strike(flagged=False, largest_Nm=0.0, told=False)
+    heard = talk.heard(begin)
+    flagged = bool(np.any(heard["flags"] & int(StateFlag.TORQUE_SATURATED)))
+    braked = bool(np.any(heard["flags"] & int(StateFlag.FAULT_LATCHED)))
+    largest = float(np.abs(heard["motor_torque"]).max())
+    arrived = largest >= ARRIVED_SHARE * talk.identity.torque_limit
+    return Strike(flagged, largest, told=flagged or (arrived and not braked))
+
+
+def _struck(talk: Talk, torque: float) -> Stage[int | None]:
+    """Wait for rest, strike for one tick, listen; where it was heard, None if rest never came."""
+    state = yield RELEASE
+    place, still = state.opening, 0
+    most = max(STILL_RAD, STILL_STEPS * talk.identity.opening_resolution)
+    for _ in range(talk.ticks(LONGEST_REST_S)):
         faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
         state = yield RELEASE._replace(clear=faulty)
-        flagged = flagged or bool(state.flags & StateFlag.TORQUE_SATURATED)
-        largest = max(largest, abs(state.motor_torque))
-    return flagged, largest
+        moved = abs(state.opening - place) > most
+        still = 0 if moved or faulty else still + 1
+        place = state.opening if moved else place
+        if still > talk.ticks(REST_S):
+            break
+    else:
+        return None
+    begin = talk.mark()
+    yield Answer()
+    state = yield Answer(torque=torque)
+    for _ in range(talk.ticks(REST_S)):
+        state = yield RELEASE._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
+    return begin

@@ -39,6 +39,8 @@ JITTER_STEPS = 5.0
 STEP_RATIO = 1.5
 """Halfway, in ratio, to the next count of an encoder that is counted by half or double."""
 REST_RAD = 0.002
+DEFAULT_BRAKE_MS = 10.0
+"""BRAKE_AFTER_MS of a device that was never told another (docs/protocol.md)."""
 LAG_LIMIT_MS = 10.0
 """BRAKE_AFTER_MS by default: later commands brake the device each time."""
 GAIN_SD = 0.1
@@ -106,9 +108,11 @@ def judge_watchdog(found: Watchdog, tick_ms: float) -> list[Verdict]:
             "measures the port).",
         )
     ]
-    if found.brake_after_ms is None:
-        verdicts.append(not_evaluated(MOTORS, "watchdog", found.refused))
-        return verdicts
+    if found.refused:
+        why = (
+            f"{found.refused} What it does without commands was judged by this value all the same."
+        )
+        verdicts.append(not_evaluated(MOTORS, "watchdog value", why))
     return verdicts + _brakes(found, tick_ms)
 
 
@@ -355,18 +359,24 @@ def _warned(check: str, value: float, limit: float, good: str, warn: str) -> Ver
 
 
 def _brakes(found: Watchdog, tick_ms: float) -> list[Verdict]:
-    asked = found.brake_after_ms or 0.0
+    asked = max(found.brake_after_ms, DEFAULT_BRAKE_MS if found.refused else 0.0)
     late = max(found.lags) * tick_ms
     most = 2.0 * asked + late
     if found.braked_ms is None:
         why = (
-            f"The device did not brake although commands were withheld for {asked + 50:.3g} ms "
-            "with ENABLE in force: its watchdog is deaf. Without it a computer that hangs leaves "
-            "the last torque on; correct the firmware (docs/protocol.md, Watchdog)."
+            "The device did not brake although commands were withheld for "
+            f"{found.withheld_ms:.4g} ms with ENABLE in force: its watchdog is deaf. Without it a "
+            "computer that hangs leaves the last torque on; correct the firmware "
+            "(docs/protocol.md, Watchdog)."
         )
         return [Verdict(MOTORS, "watchdog", "fail", None, most, why)]
-    said = f"Without commands the device brakes after {found.braked_ms:.3g} ms"
-    bad = f"{said}, {asked:.3g} ms were set: correct its watchdog."
+    said = f"Without commands the device brakes after {found.braked_ms:.4g} ms"
+    bad = f"{said}, {asked:.4g} ms were set: correct its watchdog."
+    if found.refused:
+        bad = (
+            f"{said}; it refuses BRAKE_AFTER_MS, and {asked:.4g} ms are due: correct its watchdog, "
+            "or set rig.line.brake_after_ms to what it does if that is meant."
+        )
     verdicts = [judge(MOTORS, "watchdog", found.braked_ms, most, f"{said}.", bad)]
     missing = [
         sentence

@@ -44,8 +44,10 @@ Progress = Callable[[float, str], None]
 
 REQUEST = (
     "Take everything out from between the blades, let go of the handles and keep clear: the motors "
-    "move the blades by up to {degrees:.2g} degrees each way."
+    "move the blades by up to {degrees:.2g} degrees each push, both ways"
 )
+REQUEST_SLEDGE = ", and the sledge by up to {millimetres:.2g} mm each push"
+REQUEST_CREEP = "; then the blades slowly to both stops ({degrees:.2g} degrees)"
 ROOM_PULSES = 40
 SWING_SHARE, SWING_MORE_NM = 1.35, 4e-3
 """A swing's torque: so many times breakaway and a little more, which accelerates well."""
@@ -89,8 +91,9 @@ def probe(
     """Check a rig before its motors run: sensors, clock, line, watchdog, signs, gains, mechanics.
 
     Nothing moves in the first second and a half; then pulses of torque grow until the blades move
-    by a few encoder steps each way, and small swings follow. Torque, angle and rate stay within
-    ``rig.probe``. ``confirm`` asks a person to clear the blades; a simulator clears them itself.
+    by a few encoder steps each way, and small swings follow. Torque, rate and the angle of each
+    push stay within ``rig.probe``. ``confirm`` asks a person to clear the blades; a simulator
+    clears them itself.
 
     Raises ProbeRefusedError (a DeviceError), with the cause and the remedy, at the first stage
     that finds something wrong, before the next one moves anything; InputError where nobody can be
@@ -98,7 +101,7 @@ def probe(
     """
     identity = link.identity
     tell = progress or (lambda done, sentence: None)
-    _clear(link, confirm, recipe.rig.probe.largest_angle_deg)
+    _clear(link, confirm, request_of(recipe, identity))
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
         ProbeResult(rig_name(identity), identity_digest(identity), made, recipe.rig.motor_sign)
@@ -128,7 +131,7 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
     finding.add(judge_watchdog(watched, identity.tick_us * 1e-3), **_of_watchdog(watched, talk))
     tell(0.5, "small pulses of torque")
     _push(talk, finding, quiet, recipe)
-    if identity.capabilities & Capability.ADVANCE_MOTOR and identity.force_limit > 0.0:
+    if _pushes_sledge(identity):
         tell(0.85, "small pulses of force on the sledge")
         _push_sledge(talk, finding, recipe)
     brake_after_ms = recipe.rig.line.brake_after_ms
@@ -179,7 +182,22 @@ def identity_digest(identity: Identity) -> str:
     return digest(identity_facts(identity))
 
 
-def _clear(link: Link, confirm: Confirm | None, degrees: float) -> None:
+def request_of(recipe: Recipe, identity: Identity) -> str:
+    """What a person is asked before a probe: to clear the blades, and what will move how far."""
+    request = REQUEST.format(degrees=recipe.rig.probe.largest_angle_deg)
+    if _pushes_sledge(identity):
+        request += REQUEST_SLEDGE.format(millimetres=1e3 * SLEDGE_WAY_M)
+    if recipe.rig.probe.creep:
+        apart = math.degrees(identity.opening_max - identity.opening_min)
+        request += REQUEST_CREEP.format(degrees=apart)
+    return request + "."
+
+
+def _pushes_sledge(identity: Identity) -> bool:
+    return bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0.0
+
+
+def _clear(link: Link, confirm: Confirm | None, request: str) -> None:
     if is_simulator(link.identity):
         link.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
         link.configure(ConfigKey.MATERIAL, 0.0)
@@ -189,7 +207,7 @@ def _clear(link: Link, confirm: Confirm | None, degrees: float) -> None:
             "The probe must ask a person to clear the blades first: pass a confirm callback that "
             "shows a sentence and returns when that is done."
         )
-    confirm(REQUEST.format(degrees=degrees))
+    confirm(request)
 
 
 def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:

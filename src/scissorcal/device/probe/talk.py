@@ -157,10 +157,29 @@ class Talk(AbstractContextManager["Talk"]):
             self.bounds = before
 
     def release(self) -> None:
-        """Switch the motors off, three times, in case a command is lost."""
+        """Switch the motors off, three times, in case a command is lost.
+
+        The first three do not wait for a state: a device that fell silent may still listen.
+        """
+        self._send_release()
         with suppress(DeviceError):
             for _ in range(RELEASE_COMMANDS):
                 self._answer(self._next_state(), RELEASE)
+
+    def _send_release(self) -> None:
+        """Send zero without ENABLE to the last state, whether or not another one comes."""
+        self._frame = None
+        if not self._rows:
+            return
+        command = Command(0, int(self._rows[-1][0]) % U32, 0.0, 0.0)
+        for _ in range(RELEASE_COMMANDS):
+            with suppress(DeviceError, OSError):
+                if isinstance(self.link, PortLink):
+                    self.link.send(command)
+                else:
+                    self._frame = encode(command)
+                    for state in self._pass():
+                        self._note(state)
 
     def __exit__(self, *_: object) -> None:
         self.release()
@@ -279,8 +298,8 @@ class Talk(AbstractContextManager["Talk"]):
             raise (StalledError if stalled else RunawayError)(
                 f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, beyond "
                 f"what the recipe allows ({allowed}). Check that no hand, spring or gravity moves "
-                "them and that the encoder's counts are right, or raise these keys. The motors are "
-                "off."
+                "them and that the encoder's counts are right, or raise these keys. The motors "
+                "are off."
             )
 
     def _what_is_wrong(self, state: State) -> str:

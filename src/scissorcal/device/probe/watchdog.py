@@ -14,6 +14,8 @@ LONGEST_TICKS_S = 0.1
 PAUSES = (7, 11, 5, 13, 9, 6)
 """Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
 LATER_S = 0.05
+LONGEST_BRAKE_MS = 1000.0
+"""As in the protocol: no device has a longer BRAKE_AFTER_MS, whatever it refuses."""
 
 
 @dataclass(frozen=True)
@@ -21,14 +23,16 @@ class Watchdog:
     """What ENABLE and silence do.
 
     ``lags`` (ticks): from the state that a command answers to the first state that shows it.
-    ``brake_after_ms`` is the value in force, None where the device refuses to tell;
-    ``braked_ms`` the silence after which it braked, None where it did not.
+    ``brake_after_ms`` is the value in force, as asked for where the device refuses it; ``refused``
+    says so, and is empty where it does not. Commands were withheld for at most ``withheld_ms``;
+    ``braked_ms`` is the silence after which it braked, None where it did not.
     """
 
     lags: tuple[int, ...]
     never_enabled: bool
-    brake_after_ms: float | None
+    brake_after_ms: float
     refused: str
+    withheld_ms: float
     braked_ms: float | None
     latched: bool
     lost_shown: bool
@@ -39,23 +43,26 @@ class Watchdog:
 def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
     """Enable and release the motors at zero torque, then withhold commands.
 
-    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays.
+    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays. A device that refuses it has a value of
+    its own, so commands are withheld for longer than any that the protocol allows.
     """
     lags = talk.play(_toggled(talk))
     if not lags:
-        return Watchdog((), True, None, "", None, False, False, False, False)
+        return Watchdog((), True, brake_after_ms, "", 0.0, None, False, False, False, False)
     refused, in_force = "", brake_after_ms
     try:
         in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
     except DeviceError as error:
         refused = str(error)
-    braked, latched, shown = talk.play(_silenced(talk, in_force))
+    withheld_s = 1e-3 * (LONGEST_BRAKE_MS if refused else in_force) + LATER_S
+    braked, latched, shown = talk.play(_silenced(talk, withheld_s))
     lost_cleared, fault_cleared = talk.play(_recovered(talk))
     return Watchdog(
         tuple(lags),
         False,
-        None if refused else in_force,
+        in_force,
         refused,
+        1e3 * withheld_s,
         braked,
         latched,
         shown,
@@ -88,7 +95,7 @@ def _toggled(talk: Talk) -> Stage[list[int]]:
     return lags
 
 
-def _silenced(talk: Talk, after_ms: float) -> Stage[tuple[float | None, bool, bool]]:
+def _silenced(talk: Talk, longest_s: float) -> Stage[tuple[float | None, bool, bool]]:
     """Withhold commands; return the silence until the brake (ms), and which flags showed."""
     state = yield RELEASE
     for _ in range(talk.ticks(LATER_S) + CLEARINGS):
@@ -96,7 +103,7 @@ def _silenced(talk: Talk, after_ms: float) -> Stage[tuple[float | None, bool, bo
         if not state.flags & StateFlag.FAULT_LATCHED and state.flags & StateFlag.MOTOR_ENABLED:
             break
     last = state.sequence
-    for _ in range(talk.ticks(after_ms * 1e-3 + LATER_S)):
+    for _ in range(talk.ticks(longest_s)):
         state = yield None
         if state.flags & (StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST):
             silent = ((state.sequence - last) % 2**32) * talk.tick_s
