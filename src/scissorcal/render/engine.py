@@ -108,10 +108,25 @@ def render(
             watch.record(samples)
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
+    result = _result(motion, watch, package, applied, admission, warnings)
+    if writer:
+        _note(writer, result, result.warnings[len(warnings) :])
+    return result
+
+
+def _result(
+    motion: Motion,
+    watch: Watch,
+    package: ModelPackage,
+    applied: AppliedLimits,
+    admission: Admission,
+    warnings: tuple[str, ...],
+) -> RenderResult:
+    """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
     report = motion.report()
     latency = watch.latency
     limited = watch.limited / max(1, watch.frames)
-    result = RenderResult(
+    return RenderResult(
         seconds=watch.frames * motion.tick_s,
         frames=report.counters.frames,
         strokes=watch.strokes,
@@ -132,12 +147,9 @@ def render(
         limits=applied,
         admission=admission,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, identity.tick_us, admission),
+        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission),
         warnings=warnings + _limited_warning(limited, applied),
     )
-    if writer:
-        _note(writer, result, result.warnings[len(warnings) :])
-    return result
 
 
 def open_writer(
