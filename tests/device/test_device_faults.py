@@ -3,14 +3,20 @@
 The whole table, with what is said and the largest torque and rate: benchmarks/device_faults.py.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from scissorcal.device.probe.probe import probe
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StopReason
-from tests.strange_device import FAULTS, Faults
-from tests.strange_device.trials import Outcome, capture_trial
+from scissorcal.package import ModelPackage
+from scissorcal.render.rig_facts import rig_facts, with_probe
+from tests.render.conftest import paper as paper
+from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+from tests.strange_device.mechanics import Hand
+from tests.strange_device.trials import Outcome, capture_trial, render_trial, short_recipe
 
 STOPS = {
     "motor reversed": "RUNAWAY",
@@ -128,6 +134,35 @@ def test_a_piece_that_is_missing_is_told_by_its_number(tmp_path: Path) -> None:
     assert said.recording is not None
     assert said.recording.unloaded == {0, 2}
     assert any("put in a fresh one" in note for note in said.recording.notes)
+
+
+@pytest.mark.parametrize("zero_N", [-2.0, 0.5, 3.0])
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_zero_of_the_force_sensor_hides_no_missing_piece(
+    zero_N: float, missing: bool, tmp_path: Path
+) -> None:
+    faults = Faults(force_zero_N=zero_N, measured_zero_Nm=0.02, no_sheet=missing)
+    said = capture_trial("none", "cut", tmp_path, faults)
+    assert said.exit_code == 0
+    assert said.recording is not None
+    assert said.recording.unloaded == ({0, 2} if missing else frozenset())
+
+
+def test_the_probe_s_zero_of_the_force_sensor_is_taken_off_in_a_rendering(
+    paper: ModelPackage, tmp_path: Path
+) -> None:
+    """A hand that rests on blades that rest, at a sensor that shows 3 N without it."""
+    faults, hand = Faults(force_zero_N=3.0), Hand(strokes=0)
+    found = probe(VirtualPort(StrangeDevice(faults)), short_recipe(), confirm=lambda _: None)
+    assert found.handle_zero_N == pytest.approx(3.0, abs=0.05)
+    rig = with_probe(rig_facts(paper), found)
+    said = render_trial("none", paper, tmp_path, faults, hand=hand, rig=rig)
+    assert said.stop == ""
+    assert said.exit_code in (0, 3), said.said
+    blind = replace(rig, handle_zero_N=0.0)
+    (tmp_path / "blind").mkdir()
+    unknown = render_trial("none", paper, tmp_path / "blind", faults, hand=hand, rig=blind)
+    assert unknown.stop == "OPENING_STANDS"
 
 
 def test_every_fault_is_in_one_of_the_tables() -> None:

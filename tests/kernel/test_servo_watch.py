@@ -52,6 +52,7 @@ class Joint:
     late: int = 1  # ticks until a command acts
     measured: Callable[[float], float] = lambda torque: torque
     push: Callable[[int, float], float] = lambda tick, rate: 0.0  # of a hand [N m]
+    force_zero: float = 0.0  # of the sensor [N]
     seen: Callable[[int, float], float] = lambda tick, opening: opening
     clock: Callable[[int], int] = lambda tick: 1000 * tick
     host_us: int = 1000
@@ -75,7 +76,7 @@ class Joint:
                 self.seen(tick, self.opening),
                 -0.02,
                 self.measured(torque),
-                -push / 0.06,
+                -push / 0.06 + self.force_zero,
             )
             command = servo.step(state)
             enabled = bool(command.flags & 1)
@@ -227,6 +228,28 @@ def test_a_hand_that_rests_is_no_fault() -> None:
     assert joint.run(servo, 3000) is StopReason.NONE
 
 
+@pytest.mark.parametrize(("zero", "reason"), [(3.0, "NONE"), (0.0, "OPENING_STANDS")])
+def test_a_known_zero_of_the_force_sensor_is_no_torque(zero: float, reason: str) -> None:
+    """Blades at rest, a sensor that shows 3 N without a hand."""
+    config = replace(CONFIG, watch=replace(WATCH, handle_zero=zero))
+    joint = Joint(force_zero=3.0)
+    servo = Servo(make_tables(), config)
+    servo.engage(Mode.RENDER)
+    assert joint.run(servo, 3000) is StopReason[reason]
+
+
+def test_a_zero_of_the_measured_torque_is_no_torque_at_rest_either() -> None:
+    """Taken with the motors off, and of a size at which blades would not rest."""
+    watch = replace(WATCH, ratio_torque=0.0)
+    servo = Servo(make_tables(), replace(CONFIG, watch=watch))
+    joint = Joint(measured=lambda torque: torque + 0.2)
+    joint.run(servo, 300)
+    servo.engage(Mode.RENDER)
+    joint = replace(joint, clock=lambda tick: 1000 * (tick + 300), commands=[])
+    assert _later(joint, 300).run(servo, 3000) is StopReason.NONE
+    assert servo.watched["opening_stands"] < 0.5
+
+
 @pytest.mark.parametrize("ratio", [0.9, 1.05])
 def test_a_clock_that_is_wrong_is_told_at_rest_already(ratio: float) -> None:
     joint = Joint(clock=lambda tick: round(1000 * ratio * tick))
@@ -273,6 +296,8 @@ def test_an_end_cannot_be_ordered_away() -> None:
 def test_a_watch_needs_sound_thresholds() -> None:
     with pytest.raises(ValueError, match="swing_rate"):
         WatchConfig(swing_rate=-1.0)
+    with pytest.raises(ValueError, match="handle_zero"):
+        WatchConfig(handle_zero=math.nan)
     with pytest.raises(ValueError, match="below 1"):
         WatchConfig(ratio_torque=0.01, least_ratio=1.2, most_ratio=1.4)
 

@@ -18,7 +18,9 @@ from scissorcal.render.admission_rule import (
     allowed_stiffness,
     delayed_stiffness,
 )
+from scissorcal.render.cures import stated_cures
 from scissorcal.render.derating import felt_change, needs_of, softened
+from scissorcal.render.result import _admitted
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables
 from tests.render.test_engine import rig
@@ -133,6 +135,60 @@ def test_each_stated_cure_cures(paper: ModelPackage) -> None:
     assert allowed_stiffness(replace(coarse, coulomb_Nm=rough), 0.3) > 0.9 * needed
     finer = float(step.split("step of ")[1].split(" rad")[0])
     assert allowed_stiffness(replace(coarse, encoder_step_rad=finer), 0.3) > 0.9 * needed
+
+
+def test_cures_that_act_only_together_say_so(paper: ModelPackage) -> None:
+    """A coarse encoder and a delay: each figure by itself leaves the other."""
+    needed = needs_of(paper.tables, LIMIT).stiffness
+    coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 2000)
+    cures = stated_cures(coarse, HAND, RATE, needed)
+    assert len(cures) == 4
+    assert all(", and together with it " in sentence for sentence in cures)
+    for sentence in cures:
+        cured, hand = coarse, HAND
+        if "friction of" in sentence:
+            dry = float(sentence.split("friction of ")[1].split(" mN m")[0]) * 1e-3
+            cured = replace(cured, coulomb_Nm=dry)
+        else:
+            step = float(sentence.split("step of ")[1].split(" rad")[0])
+            cured = replace(cured, encoder_step_rad=step)
+        assert allowed_stiffness(cured, hand, RATE) < 0.999 * needed
+        if "delay of" in sentence:
+            delay = float(sentence.split("delay of ")[1].split(" ms")[0]) * 1e-3
+            cured = replace(cured, late_s=delay - 0.5 * cured.tick_s)
+        else:
+            hand += float(sentence.split("together with it ")[1].split(" mN")[0]) * 1e-3
+        assert allowed_stiffness(cured, hand, RATE) >= 0.999 * needed
+
+
+def test_no_cure_is_a_delay_of_nothing() -> None:
+    """A rig that takes no energy at all needs some: no delay is short enough."""
+    free = replace(RIG, coulomb_Nm=0.0, damping_Nm_s_per_rad=0.0)
+    cures = stated_cures(free, 0.0, RATE, 10.0)
+    assert not any("step of 0 rad" in sentence or "delay of 0 ms" in sentence for sentence in cures)
+    assert all("friction" in sentence for sentence in cures)
+    assert any("together" in sentence for sentence in cures)
+
+
+def test_a_delay_below_half_the_tick_names_the_tick() -> None:
+    fine = replace(RIG, encoder_step_rad=1e-7)
+    quick, _ = stated_cures(fine, 0.0, RATE, 100.0)
+    assert "with a tick below" in quick
+
+
+def test_friction_alone_without_a_known_dry_friction_is_refused(paper: ModelPackage) -> None:
+    """A package of friction only needs no stiffness, and blades still have to rest."""
+    flat = Table([0.0, 1e-2], [0.0, 0.0], [0.0, 0.0])
+    tables = replace(paper.tables, fracture_energy=0.0, response=flat)
+    assert needs_of(tables, LIMIT).friction_Nm > 0.0
+    with pytest.raises(InputError, match="Capture friction again"):
+        admit(tables, replace(RIG, coulomb_Nm=0.0), HAND, LIMIT, RATE)
+
+
+def test_what_was_rendered_where_nothing_is_allowed_fails(paper: ModelPackage) -> None:
+    found = admit(paper.tables, RIG, HAND, LIMIT, RATE)
+    assert _admitted(found).status == "pass"
+    assert _admitted(replace(found, allowed_in_hand=0.0)).status == "fail"
 
 
 def test_friction_near_rest_follows_the_encoder_and_the_delay(paper: ModelPackage) -> None:

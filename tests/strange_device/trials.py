@@ -17,6 +17,7 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.render import open_writer as open_render_writer
 from scissorcal.render import render
+from scissorcal.render.rig_facts import RigFacts
 from scissorcal.verdicts import failed
 
 from .device import StrangeDevice
@@ -98,9 +99,15 @@ def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = No
 
 
 def render_trial(
-    name: str, package: ModelPackage, folder: Path, faults: Faults | None = None
+    name: str,
+    package: ModelPackage,
+    folder: Path,
+    faults: Faults | None = None,
+    *,
+    hand: Hand | None = None,
+    rig: RigFacts | None = None,
 ) -> Outcome:
-    """Render on a device with one fault, a hand at the handles."""
+    """Render on a device with one fault, a hand at the handles; ``rig`` is what is known of it."""
     device = StrangeDevice(faults or FAULTS[name], seed=SEED)
     device.sledge.place = RENDER_ADVANCE_M
     device.blades.place = Hand().high
@@ -114,7 +121,8 @@ def render_trial(
                 package,
                 seconds=RENDER_S,
                 writer=writer,
-                confirm=lambda request: device.grasp(Hand()),
+                confirm=lambda request: device.grasp(hand or Hand()),
+                rig=rig,
             )
         wrong = failed(result.verdicts)
         return "; ".join(f"{v.check}: {v.why}" for v in wrong) if wrong else "done"

@@ -112,7 +112,7 @@ def capture_friction(
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
     gains = _gains(link, recipe, "friction", probe, writer)
-    with _motion_for(link, recipe, plan, gains) as motion:
+    with _motion_for(link, recipe, plan, gains, probe) as motion:
         Loader(motion, recorder, confirm).clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
         drive = _Drive(motion, recorder, plan, progress)
@@ -143,7 +143,7 @@ def capture_cut(
     recorder = Recorder(writer, coverage)
     gains = _gains(link, recipe, "cut", probe, writer)
     if hand:
-        with _motion_for(link, recipe, None, gains) as motion:
+        with _motion_for(link, recipe, None, gains, probe) as motion:
             loader = Loader(motion, recorder, confirm)
             tell = progress or _silent
             hand_strokes(
@@ -151,7 +151,7 @@ def capture_cut(
             )
             return _finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan, gains) as motion:
+    with _motion_for(link, recipe, plan, gains, probe) as motion:
         loader = Loader(motion, recorder, confirm)
         loader.clear(CLEAR_REQUEST)
         drive = _Drive(motion, recorder, plan, progress)
@@ -170,10 +170,12 @@ def servo_config(
     identity: Identity,
     duration_s: float = 0.0,
     gains: CaptureGains | None = None,
+    handle_zero_N: float = 0.0,
 ) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
 
-    ``gains`` are those of `capture_gains`, by default those of a rig that nobody probed.
+    ``gains`` are those of `capture_gains`, by default those of a rig that nobody probed;
+    ``handle_zero_N`` is what the force sensor shows without a hand.
 
     A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
     samples only, so the fault is cleared, unless there are more than one per second.
@@ -203,7 +205,8 @@ def servo_config(
         tick_us=identity.tick_us,
         motor_sign=recipe.rig.motor_sign,
         watch=replace(
-            watches_of(identity, torque_limit, limits.held_at_limit_s), still_rad=control.still_rad
+            watches_of(identity, torque_limit, limits.held_at_limit_s, handle_zero_N),
+            still_rad=control.still_rad,
         ),
     )
 
@@ -273,6 +276,8 @@ class _Drive:
     def idle(self) -> None:
         """Record with the motors off, which shows the sensor zeros."""
         for samples in self._motion.idle(IDLE_S):
+            if self._load and self._done == 0:
+                self._load.rest(samples)
             self._take(samples, "motors off, measuring sensor zeros")
 
     def _take(self, samples: Samples, sentence: str) -> None:
@@ -303,8 +308,11 @@ def _gains(
     return gains
 
 
-def _motion_for(link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains) -> Motion:
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains)
+def _motion_for(
+    link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains, probe: ProbeResult | None
+) -> Motion:
+    zero_N = probe.handle_zero_N if probe else 0.0
+    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains, zero_N)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     return open_motion(link, config, longest_reference=longest)
 

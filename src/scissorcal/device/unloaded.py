@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.kernel import StateFlag
 from scissorcal.recording import Stroke
 
 LEAST_SHARE = 0.1
@@ -19,22 +20,32 @@ class LoadWatch:
 
     A stroke cuts where closing takes more torque than friction alone. Friction is what the blades
     take to open again, over the later half of the return, where they are free of the material.
-    Nothing of the rig has to be known.
+    Nothing of the rig has to be known: the zeros of its sensors are taken from samples at rest.
     """
 
     def __init__(self, strokes: Sequence[Stroke], handle_radius_m: float) -> None:
         self._strokes = strokes
         self._radius = handle_radius_m
         self._at = -1
+        self._rests: list[NDArray[np.float64]] = []
+        self._zero = 0.0
         self._drives: list[NDArray[np.float64]] = []
         self._closing: tuple[Stroke, float] | None = None
         self._largest = 0.0
+
+    def rest(self, samples: NDArray[np.void]) -> None:
+        """Take samples with the motors off and nobody at the handles: what they show is zero."""
+        off = (samples["flags"] & StateFlag.MOTOR_ENABLED) == 0
+        drive = self._drive(samples[off])
+        self._rests.append(drive[np.isfinite(drive)])
+        known = np.concatenate(self._rests)
+        self._zero = float(np.mean(known)) if len(known) else 0.0
 
     def take(self, samples: NDArray[np.void]) -> list[Stroke]:
         """Take a block of samples; returns closing strokes that turn out to have cut nothing."""
         found = []
         labels = samples["stroke"]
-        drive = samples["motor_torque"] - self._radius * samples["handle_force"]
+        drive = self._drive(samples) - self._zero
         for part in np.split(np.arange(len(labels)), np.flatnonzero(np.diff(labels)) + 1):
             if len(part) == 0:
                 continue
@@ -44,6 +55,10 @@ class LoadWatch:
                 self._at = label
             self._drives.append(drive[part])
         return found
+
+    def _drive(self, samples: NDArray[np.void]) -> NDArray[np.float64]:
+        drive = samples["motor_torque"] - self._radius * samples["handle_force"]
+        return np.asarray(drive, dtype=np.float64)
 
     def _end(self) -> list[Stroke]:
         """The stroke that was running is over."""

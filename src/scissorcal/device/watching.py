@@ -37,10 +37,13 @@ HOST_CLOCK_SHARE = 0.05
 0.1 s."""
 
 
-def watches_of(identity: Identity, torque_limit: float, held_at_limit_s: float) -> WatchConfig:
+def watches_of(
+    identity: Identity, torque_limit: float, held_at_limit_s: float, handle_zero_N: float = 0.0
+) -> WatchConfig:
     """The watches over one rig, of which commands stay within ``torque_limit`` (N m).
 
-    A served virtual rig stands still while its computer is busy, so its clock is not compared with
+    ``handle_zero_N`` is what a probe found that the force sensor shows without a hand. A
+    served virtual rig stands still while its computer is busy, so its clock is not compared with
     the computer's.
     """
     sensor = bool(identity.capabilities & Capability.HANDLE_FORCE_SENSOR)
@@ -64,4 +67,5 @@ def watches_of(identity: Identity, torque_limit: float, held_at_limit_s: float) 
         stop_high=identity.opening_max,
         stop_margin=STOP_MARGIN_RAD,
         handle_radius=identity.handle_radius if sensor else 0.0,
+        handle_zero=handle_zero_N if sensor else 0.0,
     )

@@ -9,6 +9,7 @@ from scissorcal.kernel.stop_reason import StopReason
 
 _FIRST = int(lib.SC_STOP_WATCHED)
 _COUNT = int(lib.SC_WATCHES)
+_LEAST = {"stop_low": -math.pi, "stop_high": -math.pi, "handle_zero": -math.inf}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,10 +25,11 @@ class WatchConfig:
     measured place stays exactly the same, the opening under a torque of at least ``still_torque``
     (N m). Without a reference: torques of motor and hand differ by ``still_torque`` for half a
     second, and the opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a
-    force sensor.
+    force sensor, which shows ``handle_zero`` (N) without a hand.
     ``least_ratio``, ``most_ratio``: measured over commanded torque, where torques of at least
     ``ratio_torque`` (N m) act. ``clock_share``, ``host_clock_share``: device clock against its
-    ticks, and against this computer. Raises ValueError for a number that is not finite or below 0.
+    ticks, and against this computer. Raises ValueError for a number that is not finite or below 0,
+    where it is no place and no zero.
     """
 
     held_s: float = 0.0
@@ -48,13 +50,16 @@ class WatchConfig:
     stop_high: float = 0.0
     stop_margin: float = 0.0
     handle_radius: float = 0.0
+    handle_zero: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            least = -math.pi if field.name in ("stop_low", "stop_high") else 0.0
+            least = _LEAST.get(field.name, 0.0)
             if not (math.isfinite(value) and value >= least):
-                raise ValueError(f"watch.{field.name} = {value}: give a finite number from 0 on.")
+                raise ValueError(
+                    f"watch.{field.name} = {value}: give a finite number from {least:.4g} on."
+                )
         if self.ratio_torque > 0 and not self.least_ratio < 1 < self.most_ratio:
             raise ValueError("least_ratio must be below 1 and most_ratio above 1.")
 

@@ -68,6 +68,11 @@ class ProbeResult:
     verdicts: tuple[Verdict, ...] = ()
     format: Literal["scissorcal-probe/1"] = FORMAT
 
+    @property
+    def handle_zero_N(self) -> float:  # noqa: N802  (N is the unit)
+        """What the force sensor shows without a hand; 0 where nobody found it."""
+        return 0.0 if self.force_zero_N is None else self.force_zero_N.mean
+
     def as_dict(self) -> dict[str, Any]:
         """Give the probe as plain values, for JSON; facts that are not finite are left out."""
         facts = {name: value for name, value in self.facts.items() if math.isfinite(value)}

@@ -14,14 +14,12 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, Identity, ModelTables, PassivityConfig
 from scissorcal.package import ModelPackage
 from scissorcal.render.admission_rule import (
-    MARGIN,
     OSCILLATION_RATE,
     LoopFacts,
     allowed_damper,
     allowed_stiffness,
-    delayed_stiffness,
-    dissipation,
 )
+from scissorcal.render.cures import stated_cures
 from scissorcal.render.derating import Needs, felt_change, needs_of, softened
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
@@ -46,7 +44,7 @@ class Admission:
     is rendered. ``friction_width_rad`` is over which opening rendered friction
     builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was
     checked. ``sources`` say where each comes from, ``reasons`` what was done and why, ``cures``
-    what would make it unnecessary.
+    what would make it unnecessary, each by itself.
     """
 
     facts: LoopFacts | None
@@ -105,8 +103,10 @@ def admit(
         return _unchecked(needs, hand)
     rate = max(rate, OSCILLATION_RATE)
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
+    cures = stated_cures(facts, hand, rate, needs.stiffness)
+    if not held > 0.0:
+        raise InputError(_nothing_allowed(facts, cures))
     steepest, left = _soften(tables, needs.stiffness, held, limit)
-    cures = _cures(facts, hand, rate, needs)
     if left > held or left < LEAST_FACTOR * needs.stiffness:
         raise InputError(
             f"This rig cannot render the package stably: {needs.stiffness:.3g} N m/rad are needed "
@@ -258,27 +258,11 @@ def _damped(needs: Needs, share: float) -> tuple[str, ...]:
     )
 
 
-def _cures(facts: LoopFacts, hand: float, rate: float, needs: Needs) -> tuple[str, ...]:
-    """What would make the package pass: delay, damping, encoder; each alone, where it can."""
-    wanted = needs.stiffness
-    cures = []
-    cap = 2.0 * facts.coulomb_Nm / facts.encoder_step_rad
-    if cap < wanted:
-        dry = 0.5 * wanted * facts.encoder_step_rad
-        cures.append(
-            f"Dry friction of {dry * 1e3:.2g} mN m (now {facts.coulomb_Nm * 1e3:.2g}), for this "
-            "encoder."
-        )
-    if 0.0 < cap < wanted:
-        step = 2.0 * facts.coulomb_Nm / wanted
-        cures.append(f"An encoder step of {step:.1g} rad (now {facts.encoder_step_rad:.1g}).")
-    if delayed_stiffness(facts, hand, rate) < wanted:
-        taken = dissipation(facts, hand, rate)
-        delay = MARGIN * taken / wanted
-        more = wanted * facts.delay_s / MARGIN - taken
-        cures.append(
-            f"A delay of {delay * 1e3:.2g} ms, half a tick included (now "
-            f"{facts.delay_s * 1e3:.2g} ms)."
-        )
-        cures.append(f"{more * 1e3:.2g} mN m s/rad more damping, of the rig or of the hand.")
-    return tuple(cures)
+def _nothing_allowed(facts: LoopFacts, cures: tuple[str, ...]) -> str:
+    known = f"known to be at least {facts.coulomb_Nm * 1e3:.2g} mN m"
+    again = "Capture friction again, for longer, so that its lower end is above 0. "
+    return (
+        f"This rig cannot render the package stably: its dry friction is {known}, and without any "
+        "the blades find no rest between two counts of the encoder, however soft the material. "
+        f"What would cure it: {again}{' '.join(cures)}"
+    ).rstrip()

@@ -80,7 +80,8 @@ def render(
 
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
-    inertia and delay, by default the package's friction fit. The result's ``admission`` states it.
+    inertia, delay and the force sensor's zero, by default the package's friction fit. The result's
+    ``admission`` states it.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; DeviceError where the rig fails, and
@@ -92,7 +93,7 @@ def render(
     mismatches = _mismatches(package, identity)
     admission = admit_package(package, identity, rig, applied.torque_Nm)
     warnings = package.warnings + mismatches + _admitted(admission)
-    config = _servo_config(applied, admission, identity, seconds)
+    config = _servo_config(applied, admission, identity, seconds, rig)
     config = replace(config, motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
@@ -108,10 +109,25 @@ def render(
             watch.record(samples)
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
+    result = _result(motion, watch, package, applied, admission, warnings)
+    if writer:
+        _note(writer, result, result.warnings[len(warnings) :])
+    return result
+
+
+def _result(
+    motion: Motion,
+    watch: Watch,
+    package: ModelPackage,
+    applied: AppliedLimits,
+    admission: Admission,
+    warnings: tuple[str, ...],
+) -> RenderResult:
+    """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
     report = motion.report()
     latency = watch.latency
     limited = watch.limited / max(1, watch.frames)
-    result = RenderResult(
+    return RenderResult(
         seconds=watch.frames * motion.tick_s,
         frames=report.counters.frames,
         strokes=watch.strokes,
@@ -132,12 +148,9 @@ def render(
         limits=applied,
         admission=admission,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, identity.tick_us, admission),
+        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission),
         warnings=warnings + _limited_warning(limited, applied),
     )
-    if writer:
-        _note(writer, result, result.warnings[len(warnings) :])
-    return result
 
 
 def open_writer(
@@ -195,8 +208,13 @@ def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -
 
 
 def _servo_config(
-    applied: AppliedLimits, admission: Admission, identity: Identity, seconds: float
+    applied: AppliedLimits,
+    admission: Admission,
+    identity: Identity,
+    seconds: float,
+    rig: RigFacts | None,
 ) -> ServoConfig:
+    zero_N = rig.handle_zero_N if rig else 0.0
     return ServoConfig(
         torque_limit=applied.torque_Nm,
         torque_slew=applied.torque_slew_Nm_per_s,
@@ -211,7 +229,7 @@ def _servo_config(
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
         passivity=passivity_config(admission, identity),
-        watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s),
+        watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s, zero_N),
     )
 
 

@@ -1,5 +1,6 @@
 """The result of a rendering: latency, losses, energy, and verdicts."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,7 +157,8 @@ def _admitted(admission: Admission) -> Verdict:
     why = " ".join(admission.reasons)
     if not admission.evaluated:
         return not_evaluated(SCOPE, "admission", f"{why} {' '.join(admission.cures)}")
-    share = admission.rendered / admission.allowed_in_hand
+    allowed = admission.allowed_in_hand
+    share = admission.rendered / allowed if allowed > 0.0 else math.inf
     return judge(SCOPE, "admission", share, 1.0, why)
 
 

@@ -31,6 +31,7 @@ class RigFacts:
     """What is known of the rig itself, None where nobody measured it; see LoopFacts.
 
     ``source`` says where friction and inertia come from, ``late_source`` the delay.
+    ``handle_zero_N`` is what the force sensor shows without a hand, 0 where nobody measured it.
     """
 
     coulomb_Nm: float | None = None
@@ -39,6 +40,7 @@ class RigFacts:
     late_s: float | None = None
     source: str = ""
     late_source: str = ""
+    handle_zero_N: float = 0.0
 
 
 def rig_facts(package: ModelPackage) -> RigFacts:
@@ -67,13 +69,13 @@ def fitted_facts(parameters: Sequence[Fitted], least: float, source: str) -> Rig
 
 
 def with_probe(rig: RigFacts, probe: ProbeResult | None) -> RigFacts:
-    """Add what a probe measured: its delay (upper end), and what nothing else has.
+    """Add what a probe measured: its delay (upper end), its zero, and what nothing else has.
 
     Friction and inertia of a probe are rough, so a fit's count where there is one.
     """
     if probe is None:
         return rig
-    found, name = rig, f"the probe of {probe.made_at}"
+    found, name = replace(rig, handle_zero_N=probe.handle_zero_N), f"the probe of {probe.made_at}"
     if probe.delay_s is not None:
         late_s = max(probe.delay_s.interval[1], 0.0)
         found = replace(found, late_s=late_s, late_source=name)

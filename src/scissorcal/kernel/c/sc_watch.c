@@ -48,7 +48,8 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
         (config->least_ratio >= 1.0f || config->most_ratio <= 1.0f)) {
         return 0;
     }
-    return isfinite(config->stop_low) && isfinite(config->stop_high);
+    return isfinite(config->stop_low) && isfinite(config->stop_high) &&
+           isfinite(config->handle_zero);
 }
 
 void sc_watch_pass(sc_watch *watch, uint32_t elapsed_us)
@@ -189,7 +190,8 @@ static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch
                over(watch, SC_WATCH_STILL,
                     fminf(moved / config->still_rad, pushed / config->still_torque), 1.0f);
     }
-    const float drive = in->measured - config->handle_radius * in->handle_force;
+    const float hand = config->handle_radius * (in->handle_force - config->handle_zero);
+    const float drive = in->measured - watch->zero - hand;
     const float share = in->time_s / (SMOOTH_S + in->time_s);
     watch->still_aim = in->aim_opening;
     watch->still_aim_advance = in->aim_advance;

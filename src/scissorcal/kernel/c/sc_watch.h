@@ -43,6 +43,7 @@ typedef struct {
     float stop_low, stop_high; /* openings of the stops [rad] ... */
     float stop_margin;       /* ... and how far from both a stop is none */
     float handle_radius;     /* of a rig that measures the force of the hand [m]; else 0 */
+    float handle_zero;       /* what its sensor shows without a hand [N] */
 } sc_watch_config;
 
 /* What a state says, and what was in force until it came. */
