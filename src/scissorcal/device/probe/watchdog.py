@@ -24,7 +24,7 @@ class Watchdog:
 
     ``lags`` (ticks): from the state that a command answers to the first state that shows it.
     ``brake_after_ms`` is the value in force, as asked for where the device refuses it; ``refused``
-    says so, and is empty where it does not. Commands were withheld for at most ``withheld_ms``;
+    is why, empty where it takes the value. Commands were withheld for at most ``withheld_ms``;
     ``braked_ms`` is the silence after which it braked, None where it did not.
     """
 
@@ -43,8 +43,8 @@ class Watchdog:
 def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
     """Enable and release the motors at zero torque, then withhold commands.
 
-    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays. A device that refuses it has a value of
-    its own, so commands are withheld for longer than any that the protocol allows.
+    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays. A device that refuses it keeps another
+    value, so commands are withheld for longer than any that the protocol allows.
     """
     lags = talk.play(_toggled(talk))
     if not lags:
