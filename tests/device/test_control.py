@@ -192,6 +192,10 @@ def test_a_known_delay_counts_where_the_probe_told_no_inertia() -> None:
     assert "found delay, and could not tell inertia and dry friction" in found.verdicts[0].why
     with pytest.raises(DeviceError, match=r"acts 5 ms after.*largest_torque_Nm"):
         capture_gains(recipe, IDENTITY, "cut", probed)
+    keys = {"opening_kp_Nm_per_rad": 1.0, "opening_kd_Nm_s_per_rad": 0.02}
+    stated = changed("paper-80gsm", rig__control={**keys, "opening_ki_Nm_per_rad_s": 5.0})
+    ours = capture_gains(stated, IDENTITY, "friction", probed)
+    assert (ours.opening, ours.verdicts[0].status) == (Gains(1.0, 0.02, 5.0), "fail")
     blind = Probed.of(replace(result, delay_s=None))
     told = capture_gains(recipe, IDENTITY, "cut", blind)
     assert told.opening == TYPICAL.opening
