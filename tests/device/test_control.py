@@ -22,6 +22,7 @@ from scissorcal.device.paths import PathBuilder
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recording.probe import Estimate, ProbeResult
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 from tests.strange_device.device import StrangeDevice
@@ -179,6 +180,26 @@ def test_without_a_probe_the_gains_are_typical() -> None:
     found = capture_gains(builtin_recipe("paper-80gsm"), IDENTITY, "cut", None)
     assert found == TYPICAL
     assert "device probe" in found.verdicts[0].why
+
+
+def test_a_known_delay_counts_where_the_probe_told_no_inertia() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    result = ProbeResult("rig", "0", "2026-11-22T20:00:00+00:00", delay_s=Estimate(5e-3, 1e-4))
+    probed = Probed.of(result)
+    assert probed is not None
+    found = capture_gains(recipe, IDENTITY, "friction", probed)
+    assert found.opening.kp < 0.5
+    assert "found delay, and could not tell inertia and dry friction" in found.verdicts[0].why
+    with pytest.raises(DeviceError, match=r"acts 5 ms after.*largest_torque_Nm"):
+        capture_gains(recipe, IDENTITY, "cut", probed)
+    keys = {"opening_kp_Nm_per_rad": 1.0, "opening_kd_Nm_s_per_rad": 0.02}
+    stated = changed("paper-80gsm", rig__control={**keys, "opening_ki_Nm_per_rad_s": 5.0})
+    ours = capture_gains(stated, IDENTITY, "friction", probed)
+    assert (ours.opening, ours.verdicts[0].status) == (Gains(1.0, 0.02, 5.0), "fail")
+    blind = Probed.of(replace(result, delay_s=None))
+    told = capture_gains(recipe, IDENTITY, "cut", blind)
+    assert told.opening == TYPICAL.opening
+    assert "found nothing, and could not tell" in told.verdicts[0].why
 
 
 def swung(faults: Faults, gains: CaptureGains, identity: Identity) -> tuple[float, float]:

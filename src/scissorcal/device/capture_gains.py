@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from scissorcal.device.control import Axis, Gains, Margins, PHASE_MARGIN_deg, loop_margins
-from scissorcal.device.control_design import Demand, design_gains
+from scissorcal.device.control_design import Demand, Design, design_gains
 from scissorcal.device.trajectory import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
@@ -39,31 +39,58 @@ ADVANCE_FACTOR = 2.0
 """A sledge with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half or
 double."""
 
+TYPICAL_INERTIA_kg_m2, TYPICAL_INERTIA_SD_kg_m2, TYPICAL_COULOMB_Nm = 2e-4, 1e-4, 0.015
+"""Of scissors whose inertia no probe told: it may be double or half of that."""
+
 
 @dataclass(frozen=True)
 class Probed:
     """What a probe found of the opening axis, with standard deviations.
 
-    ``delay_s``: from a measurement to the torque that answers it, through line, host and motor.
+    ``delay_s``: from a measurement to the torque that answers it, through line, host and motor;
+    None where the probe did not find it. ``missing`` names what it did not find: inertia and dry
+    friction are a typical rig's then.
     """
 
     inertia_kg_m2: float
     inertia_sd_kg_m2: float
     viscous_Nm_s_per_rad: float
     coulomb_Nm: float
-    delay_s: float
+    delay_s: float | None
+    missing: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, probe: ProbeResult | None) -> "Probed | None":
-        """Of a probe; None where it found no inertia, dry friction or delay."""
+        """Of a probe; None without one."""
         if probe is None:
             return None
         inertia, delay, dry = probe.inertia_kg_m2, probe.delay_s, probe.coulomb_Nm
-        if inertia is None or delay is None or dry is None:
-            return None
+        found = {"inertia": inertia, "dry friction": dry, "delay": delay}
+        missing = tuple(name for name, value in found.items() if value is None)
         viscous = probe.viscous_Nm_s_per_rad
-        damping = 0.0 if viscous is None else viscous.mean
-        return cls(inertia.mean, inertia.sd, damping, dry.mean, delay.mean)
+        damping = 0.0 if viscous is None or inertia is None else viscous.mean
+        return cls(
+            TYPICAL_INERTIA_kg_m2 if inertia is None else inertia.mean,
+            TYPICAL_INERTIA_SD_kg_m2 if inertia is None else inertia.sd,
+            damping,
+            TYPICAL_COULOMB_Nm if dry is None else dry.mean,
+            None if delay is None else delay.mean,
+            missing,
+        )
+
+    @property
+    def lack(self) -> str:
+        """What the probe found and what not, and what to do; empty where it found all."""
+        if not self.missing:
+            return ""
+        names = ("inertia", "dry friction", "delay")
+        known = [name for name in names if name not in self.missing]
+        found = f"The probe found {' and '.join(known)}" if known else "The probe found nothing"
+        return (
+            f"{found}, and could not tell {' and '.join(self.missing)}: free the blades or raise "
+            "rig.probe.largest_torque_Nm and run 'scissorcal device probe' again, or state gains "
+            "in rig.control."
+        )
 
 
 @dataclass(frozen=True)
@@ -109,12 +136,13 @@ def capture_gains(
     the plan because of the delay.
     """
     stated = _stated(recipe)
-    if probed is None:
+    if probed is None or probed.delay_s is None:
         opening, advance = (
             _merged(own, typical)
             for own, typical in zip(stated, (TYPICAL.opening, TYPICAL.advance), strict=True)
         )
-        return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, STILL_RAD, TYPICAL.verdicts)
+        verdicts = TYPICAL.verdicts if probed is None else (_undelayed(probed),)
+        return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, STILL_RAD, verdicts)
     axes = _axes(recipe, identity, probed)
     demands = _demands(recipe, kind)
     cutoffs = tuple(share * 1e6 / identity.tick_us for share in CUTOFFS_PER_TICK)
@@ -124,13 +152,17 @@ def capture_gains(
         if all(value is not None for value in own):
             gains, at = Gains(*(float(value or 0.0) for value in own)), cutoffs[:1]
         else:
-            design = design_gains(axis, demand, cutoffs, name)
+            design = _designed(axis, demand, cutoffs, name, probed.lack)
             gains, at = _merged(own, design.gains), (design.axis.rate_cutoff_Hz,)
         cutoffs = at if name == "opening" else cutoffs
-        margins.append(_checked(axis.filtered(at[0]), gains, name))
+        filtered = axis.filtered(at[0])
+        assumed = name == "opening" and "inertia" in probed.missing
+        margins.append(
+            loop_margins(filtered, gains) if assumed else _checked(filtered, gains, name)
+        )
         found.append(gains)
     still = max(STILL_RAD, HELD_BACK * probed.coulomb_Nm / found[0].kp)
-    verdicts = (_verdict(margins, axes[0].delay_s),)
+    verdicts = (_verdict(margins, axes[0].delay_s, probed.lack),)
     return CaptureGains(found[0], found[1], cutoffs[0], still, verdicts)
 
 
@@ -163,7 +195,7 @@ def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axi
     """Opening and advance as the controller meets them; the filter of the rate is still open."""
     torque = COUNT_SHARE * min(recipe.limits.torque_Nm, identity.torque_limit)
     force = COUNT_SHARE * min(recipe.limits.force_N, identity.force_limit)
-    tick, delay = identity.tick_us * 1e-6, max(0.0, probed.delay_s)
+    tick, delay = identity.tick_us * 1e-6, max(0.0, probed.delay_s or 0.0)
     factor = 1.0 + SURE * probed.inertia_sd_kg_m2 / probed.inertia_kg_m2
     opening = Axis(
         inertia=probed.inertia_kg_m2,
@@ -228,11 +260,25 @@ def _checked(axis: Axis, gains: Gains, name: str) -> Margins:
     )
 
 
-def _verdict(margins: list[Margins], delay_s: float) -> Verdict:
+def _designed(
+    axis: Axis, demand: Demand, cutoffs: tuple[float, ...], name: str, lack: str
+) -> Design:
+    try:
+        return design_gains(axis, demand, cutoffs, name)
+    except DeviceError as error:
+        raise DeviceError(f"{error} {lack}".rstrip()) from None
+
+
+def _undelayed(probed: Probed) -> Verdict:
+    why = f"The gains are those of a typical rig, which is answered within 1 ms. {probed.lack}"
+    return not_evaluated("device", "control margin", why)
+
+
+def _verdict(margins: list[Margins], delay_s: float, lack: str) -> Verdict:
     worst = min(margins, key=lambda one: one.phase_deg)
     said = (
         f"The capture's gains have {worst.phase_deg:.0f} degrees of phase margin and a gain margin "
-        f"of {worst.gain:.1f} at a delay of {1e3 * delay_s:.2g} ms."
-    )
+        f"of {worst.gain:.1f} at a delay of {1e3 * delay_s:.2g} ms. {lack}"
+    ).rstrip()
     remedy = """ Lower the gains in rig.control, or set them to "auto"."""
     return judge("device", "control margin", worst.phase_deg, PHASE_MARGIN_deg, said, said + remedy)
