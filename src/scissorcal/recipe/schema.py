@@ -104,8 +104,8 @@ class Probe(Section):
     """How far the probe may go before the first motor run, and how long it counts.
 
     The blades are pushed by growing torques up to ``largest_torque_Nm`` until they move, each push
-    no farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. ``creep`` lets it
-    move slowly to both stops, which shows whether the encoder counts the whole range. A probe of
+    no farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. ``creep`` lets
+    it move slowly to both stops, which shows whether the encoder counts the whole range. A probe of
     the same rig counts for ``max_age_h``.
     """
 
