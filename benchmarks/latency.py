@@ -15,6 +15,7 @@ device, which in a lab has a processor of its own).
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -103,7 +104,9 @@ def measure(
         else:
             own = [sys.executable, "-W", "ignore", "-m", "benchmarks.latency", "--run"]
             command = [*own, subject, port, str(options.seconds), load]
-        said = subprocess.run([*rights, *command], cwd=folder, capture_output=True, text=True)
+        found = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}  # from another folder
+        words = [*rights, *command]
+        said = subprocess.run(words, cwd=folder, env=found, capture_output=True, text=True)
         if said.returncode:
             raise SystemExit(said.stderr)
     figures = json.loads(device.communicate("end\n")[0])
