@@ -72,7 +72,7 @@ def open_writer(
 ) -> RecordingWriter:
     """Open the recording of a capture and write all that is known before it starts.
 
-    ``recipe_toml`` is the recipe's text, as it stands in its file; ``probe`` what a probe of this
+    ``recipe_toml`` is the recipe's text, unchanged; ``probe`` what a probe of this
     rig found. Raises as RecordingWriter does, and as the plan of the capture does.
     """
     identity = link.identity

@@ -7,7 +7,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from scissorcal.device.link import Link
-from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples
+from scissorcal.device.motion import (
+    BLOCK_S,
+    RELEASE_COMMANDS,
+    SILENCE_S,
+    Motion,
+    MotionReport,
+    Samples,
+)
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag
 from scissorcal.errors import DeviceError
@@ -20,9 +27,6 @@ from scissorcal.kernel import (
     ServoConfig,
     StopReason,
 )
-
-RELEASE_COMMANDS = 3
-SILENCE_S = 1.0
 
 
 @runtime_checkable

@@ -29,6 +29,10 @@ Samples = NDArray[np.void]
 BLOCK_S = 0.05
 STOP_MARGIN_RAD = 0.05
 """Openings are usable up to so far beyond the stops that a device states."""
+SILENCE_S = 1.0
+"""A device that sends nothing for so long is gone; `LoopBlock.create` has it in milliseconds."""
+RELEASE_COMMANDS = 3
+"""Zero commands at the end of a run, in case one is garbled; as FAREWELLS in sc_loop.c."""
 
 
 @dataclass(frozen=True)

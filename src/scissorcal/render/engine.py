@@ -164,7 +164,7 @@ def open_writer(
 ) -> RecordingWriter:
     """Open the recording of a rendering; the package's manifest travels in it.
 
-    ``recipe_toml`` is the recipe's text as it stands in its file, ``probe`` what a probe of this
+    ``recipe_toml`` is the recipe's text, unchanged, ``probe`` what a probe of this
     rig found. Raises as RecordingWriter does.
     """
     writer = RecordingWriter(

@@ -74,8 +74,8 @@ def test_a_refused_rig_is_probed_again(workspace: Workspace) -> None:
     kept = last_probe(workspace)
     assert kept is not None
     assert any(verdict.status == "fail" for verdict in kept.verdicts)
-    mended = VirtualPort(StrangeDevice(seed=1))
-    ensure_probed(workspace, mended, recipe, say=said.append, confirm=lambda request: None)
+    repaired = VirtualPort(StrangeDevice(seed=1))
+    ensure_probed(workspace, repaired, recipe, say=said.append, confirm=lambda request: None)
     assert "the last probe refused it" in said[0]
 
 

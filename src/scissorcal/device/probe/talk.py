@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging
-from scissorcal.device.motion import STOP_MARGIN_RAD
+from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S, STOP_MARGIN_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag, decode, encode
 from scissorcal.kernel.servo import OPENING_RATE_LIMIT
 
 Done = TypeVar("Done")
 
-SILENCE_S = 1.0
-"""As in the servo: a device that sends nothing for a second is gone."""
-RELEASE_COMMANDS = 3
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
 STALL_TICKS = 5
