@@ -32,9 +32,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "calibration": {"kernel", "model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
     "render": {"kernel", "device", "package", "recipe", "recording"},
-    "report": {"model", "vision", "calibration", "package", "recipe", "recording"},
-    "workday": LOWEST | MIDDLE,
-    "cli": LOWEST | MIDDLE | {"workday"},
+    "report": {"model", "vision", "calibration", "package", "recipe", "recording", "bench"},
+    "bench": LOWEST | {"vision", "device", "calibration", "package", "render"},
+    "workday": LOWEST | MIDDLE | {"bench"},
+    "cli": LOWEST | MIDDLE | {"workday", "bench"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},
     "<root>": {"library", "package"},
 }

@@ -22,6 +22,10 @@ _PROBE_SENSORS = "the sensors, before a motor runs"
 _PROBE_MOTORS = "the motors, before they run in earnest"
 
 MEANINGS: dict[str, tuple[Limit, str]] = {
+    "bench wrong": (
+        "at most",
+        "whether each answer of model and kernel is right or refused: how many are neither",
+    ),
     "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
     "fit optimum": ("at least", f"{_SEARCH}: starts that ended there"),
     "fit k-hat": ("at most", f"{_INTERVALS}: tail index of the importance weights"),
@@ -98,6 +102,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         TORQUE + "difference of two halves' predictions against what they claim, p-value",
     ),
     "verify prior": ("at most", "what is the prior's: sensitivity to its power"),
+    "capture until tolerance": (
+        "at least",
+        TORQUE + "share of the felt places whose band is within the scene's tolerance, as it ended",
+    ),
     "package bound": ("at most", TORQUE + "error of the tables over the scene, N m"),
     "package bound share": ("at most", TORQUE + "error of the tables, share of the largest torque"),
     "package extremes": ("at most", "the motors: steps that gave no number"),

@@ -115,6 +115,19 @@ static void check_any_blades(void)
     CHECK(scanned.most <= MOST_SCANNED, "any blades");
 }
 
+/* Behind a nick the edge leans back where the blade is turned far enough: refused there alone. */
+static void check_that_it_leans(sc_model *model, const char *title)
+{
+    sc_crack state = {0.0f, 0, 0, 0};
+    sc_step_output out;
+    sc_model_edge_slopes(model);
+    CHECK(model->flattest < -0.2f && model->steepest > 0.2f, title);
+    sc_model_step(model, &state, 0.4f, -0.1f, -0.03f, &out);
+    CHECK(!(out.flags & SC_STEP_INVALID), title);
+    sc_model_step(model, &state, 3.0f, -0.1f, -0.03f, &out);
+    CHECK((out.flags & SC_STEP_INVALID) != 0 && out.torque == 0.0f, title);
+}
+
 /* A nick in the edge: the release rises behind it, so that the first place must be scanned for. */
 static void check_a_nick(void)
 {
@@ -131,6 +144,7 @@ static void check_a_nick(void)
     }
     model.release_falls = sc_model_release_falls(&model);
     CHECK(model.release_falls == 0, one.title);
+    check_that_it_leans(&model, one.title);
     random_steps(&model, 2000, one.title, &quick, &scanned);
     CHECK(quick.steps == 0 && scanned.most <= MOST_SCANNED, one.title);
     model.fracture_energy = 0.0f;

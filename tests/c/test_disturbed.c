@@ -92,6 +92,8 @@ static sc_watch_config watches(const sc_servo_config *c)
                                .still_rad = 0.02f,
                                .still_m = 0.005f,
                                .still_torque = 0.1f,
+                               .rest_torque = 0.1f,
+                               .jitter_s = 0.5f,
                                .least_ratio = 0.7f,
                                .most_ratio = 1.4f,
                                .ratio_torque = 0.01f,

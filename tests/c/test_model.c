@@ -1,6 +1,7 @@
 #include "check.h"
 #include "json.h"
 #include "models.h"
+#include "sc_table16.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -44,6 +45,52 @@ static void check_tables(const char *folder)
         room.x[1] = NAN;
         CHECK(!sc_table_is_sound(&table), title);
     }
+    json_free(&vectors);
+}
+
+enum { NUMBERS = SC_TABLE_MAX };
+
+static sc_row16 load_row(const json *one, const char *numbers, const char *row, int16_t *room)
+{
+    const json *from = json_get(one, numbers), *scale = json_get(one, row);
+    const sc_row16 loaded = {room, (float)scale->items[0].number, (float)scale->items[1].number};
+    for (size_t i = 0; i < from->size && i < NUMBERS; i++) {
+        room[i] = (int16_t)from->items[i].number;
+    }
+    return loaded;
+}
+
+static void check_stored_tables(const char *folder)
+{
+    json vectors = json_load(folder, "tables.json");
+    const json *cases = json_get(&vectors, "stored");
+    for (size_t i = 0; i < cases->size; i++) {
+        static int16_t numbers[3][NUMBERS];
+        static storage room, wanted;
+        const json *one = &cases->items[i];
+        const char *title = json_text(one, "title");
+        sc_table table;
+        sc_table16 stored = {load_row(one, "x_numbers", "x_row", numbers[0]),
+                             load_row(one, "y_numbers", "y_row", numbers[1]),
+                             load_row(one, "slope_numbers", "slope_row", numbers[2]), 0};
+        stored.size = (int32_t)json_floats(json_get(one, "x"), wanted.x, SC_TABLE_MAX);
+        json_floats(json_get(one, "y"), wanted.y, SC_TABLE_MAX);
+        json_floats(json_get(one, "slope"), wanted.slope, SC_TABLE_MAX);
+        CHECK(sc_table16_decode(&stored, room.x, room.y, room.slope, &table), title);
+        CHECK(table.size == stored.size && table.area == NULL, title);
+        for (int32_t k = 0; k < table.size; k++) {
+            NEAR(table.x[k], wanted.x[k], 0.0, "x", title);
+            NEAR(table.y[k], wanted.y[k], 0.0, "y", title);
+            NEAR(table.slope[k], wanted.slope[k], 0.0, "slope", title);
+        }
+        numbers[0][1] = numbers[0][0];
+        CHECK(!sc_table16_decode(&stored, room.x, room.y, room.slope, &table), title);
+        stored.size = 1;
+        CHECK(!sc_table16_decode(&stored, room.x, room.y, room.slope, &table), title);
+        stored.size = SC_TABLE_MAX + 1;
+        CHECK(!sc_table16_decode(&stored, room.x, room.y, room.slope, &table), title);
+    }
+    CHECK(cases->size > 0, "stored tables");
     json_free(&vectors);
 }
 
@@ -173,7 +220,9 @@ int main(int argc, char **argv)
     const char *folder = argc > 1 ? argv[1] : "../golden";
     json vectors = json_load(folder, "model.json");
     const json *cases = json_get(&vectors, "cases");
+    check_stored_tables(argv[1]);
     check_tables(folder);
+    check_stored_tables(folder);
     check_soundness(&cases->items[0]);
     for (size_t i = 0; i < cases->size; i++) {
         check_steps(&cases->items[i]);

@@ -10,6 +10,8 @@ from scissorcal.recipe.schema import Line
 from scissorcal.workday.rigs import line_of, open_rig
 from tests.device.recipes import changed
 
+from .conftest import Cli
+
 
 def test_the_option_goes_before_the_recipe() -> None:
     recipe = changed("paper-80gsm", rig__line={"baud": 460800, "brake_after_ms": 25.0})
@@ -21,6 +23,12 @@ def test_the_option_goes_before_the_recipe() -> None:
 def test_impossible_lines_are_refused(keys: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="line"):
         changed("paper-80gsm", rig__line=keys)
+
+
+def test_an_impossible_rate_is_refused_in_a_sentence(cli: Cli) -> None:
+    said = cli("device", "doctor", "--device", "sim", "--baud", "5")
+    assert said.code == 2
+    assert "'--baud': It must be greater than or equal to 9600." in said.err
 
 
 def test_the_device_is_told_how_long_to_wait() -> None:

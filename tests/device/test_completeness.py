@@ -15,6 +15,7 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.until import UNTIL_MARK, UntilMark
 from tests.device.recipes import short
 
 RECIPE = short("paper-80gsm")
@@ -224,3 +225,34 @@ def test_a_hand_is_held_to_sheets_alone(tmp_path):
     result = completeness([count_recorded(byhand, CUT, "cut")], CUT, "cut")
     assert result.cells == ()
     assert [(s.planned, s.recorded) for s in result.sheets] == [(2, 2), (2, 2)]
+
+
+def marked(ended: str, within: float = 0.9) -> str:
+    mark = UntilMark(ended, 4, 2, 1.0, 0.5, within, 0.03, 0.07, 0.95, why="Friction is widest.")
+    return mark.as_text()
+
+
+def test_a_capture_until_the_tolerance_is_judged_by_whether_it_was_reached(recording):
+    """Not by the recipe's list: it planned what it chose."""
+    few = replace(recording, strokes=recording.strokes[:2], marks=((UNTIL_MARK, marked("")),))
+    went_on = count_recorded(few, RECIPE, "friction")
+    (missing,) = found(went_on, None).missing
+    assert missing.startswith("the scene's tolerance: 4 strokes, 1.0 min")
+    marks = (*few.marks, (UNTIL_MARK, marked("tolerance", 0.96)))
+    reached = count_recorded(replace(few, marks=marks), RECIPE, "friction")
+    assert found(reached, None).missing == ()
+    assert len(found(reached, None).strokes) == 2
+    gave_up = replace(few, marks=((UNTIL_MARK, marked("out of reach")),))
+    (missing,) = found(count_recorded(gave_up, RECIPE, "friction"), None).missing
+    assert missing.endswith("Friction is widest.")
+    both = completeness([went_on, reached], RECIPE, "friction", None)
+    assert both.missing == ()
+    assert completeness([reached, went_on], RECIPE, "friction", None).missing
+
+
+def test_a_capture_of_the_list_beside_one_until_the_tolerance_keeps_its_own_plan(recording):
+    listed = count_recorded(recording, RECIPE, "friction")
+    marks = ((UNTIL_MARK, marked("tolerance")),)
+    short_one = replace(recording, strokes=recording.strokes[:2], marks=marks)
+    other = count_recorded(short_one, RECIPE, "friction")
+    assert completeness([listed, other], RECIPE, "friction", None).missing == ()

@@ -154,15 +154,46 @@ def test_the_probe_s_zero_of_the_force_sensor_is_taken_off_in_a_rendering(
     """A hand that rests on blades that rest, at a sensor that shows 3 N without it."""
     faults, hand = Faults(force_zero_N=3.0), Hand(strokes=0)
     found = probe(VirtualPort(StrangeDevice(faults)), short_recipe(), confirm=lambda _: None)
-    assert found.handle_zero_N == pytest.approx(3.0, abs=0.05)
+    assert found.rest.handle_zero_N == pytest.approx(3.0, abs=0.05)
     rig = with_probe(rig_facts(paper), found)
     said = render_trial("none", paper, tmp_path, faults, hand=hand, rig=rig)
     assert said.stop == ""
     assert said.exit_code in (0, 3), said.said
-    blind = replace(rig, handle_zero_N=0.0)
+    blind = replace(rig, rest=replace(rig.rest, handle_zero_N=0.0))
     (tmp_path / "blind").mkdir()
     unknown = render_trial("none", paper, tmp_path / "blind", faults, hand=hand, rig=blind)
     assert unknown.stop == "OPENING_STANDS"
+
+
+@pytest.mark.parametrize(
+    ("noise_rad", "period_s", "seconds"),
+    [(0.0, 0.33, 1.0), (5e-5, 2.0, 0.3)],
+    ids=["fast strokes, a known friction", "gentle strokes, an encoder that jitters"],
+)
+def test_an_encoder_that_sticks_in_a_rendering_stops_it(
+    noise_rad: float, period_s: float, seconds: float, paper: ModelPackage, tmp_path: Path
+) -> None:
+    """Told from what the probe measured; without the fault nothing stops."""
+    sound, hand = Faults(encoder_noise_rad=noise_rad), Hand(period_s=period_s, strokes=20)
+    found = probe(VirtualPort(StrangeDevice(sound)), short_recipe(), confirm=lambda _: None)
+    assert found.rest.jitters == (noise_rad > 0.0)
+    rig = with_probe(rig_facts(paper), found)
+    stuck = replace(sound, encoder_stuck_at_s=2.0)
+    said = render_trial("none", paper, tmp_path, stuck, hand=hand, rig=rig)
+    assert said.stop == "OPENING_STANDS"
+    assert 2.2 < said.time_s < 2.0 + seconds
+    (tmp_path / "sound").mkdir()
+    assert render_trial("none", paper, tmp_path / "sound", sound, hand=hand, rig=rig).stop == ""
+
+
+def test_a_stuck_encoder_that_friction_may_hold_is_told_at_the_end(
+    paper: ModelPackage, tmp_path: Path
+) -> None:
+    said = render_trial("encoder stuck", paper, tmp_path)
+    assert said.exit_code == 0
+    assert said.recording is not None
+    assert "did not change by a single count" in said.said
+    assert any("a single count" in note for note in said.recording.notes)
 
 
 def test_every_fault_is_in_one_of_the_tables() -> None:

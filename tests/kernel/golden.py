@@ -148,7 +148,38 @@ def table_vectors() -> dict[str, Any]:
                 "integral": [curve.area(x) for x in places],
             }
         )
-    return {"format": "scissorcal-golden-tables/1", "tolerance": 1e-5, "tables": cases}
+    return {
+        "format": "scissorcal-golden-tables/1",
+        "tolerance": 1e-5,
+        "tables": cases,
+        "stored": stored_tables(),
+    }
+
+
+def stored_tables() -> list[dict[str, Any]]:
+    """Tables in 16-bit numbers, and the float32 that is decoded from them, to the last bit."""
+    rng = np.random.default_rng(16)
+    shapes = {
+        "the ends of 16 bits": ([-32768, 0, 32767], [-32768, -1, 32767], [32767, 0, -32768]),
+        "64 knots": (
+            np.linspace(-32768, 32767, 64).round().astype(int).tolist(),
+            *rng.integers(-32768, 32768, (2, 64)).tolist(),
+        ),
+    }
+    scales = [
+        [(32768 * 3.0 * 2.0**-30, 3.0 * 2.0**-30), (0.0, 255 * 2.0**-20), (-7.25, 129 * 2.0**-14)],
+        [(0.0123456789, 201 * 2.0**-36), (1e-3, 0.0), (single(1 / 3), 171 * 2.0**-9)],
+    ]
+    cases = []
+    for (title, numbers), rows in zip(shapes.items(), scales, strict=True):
+        case: dict[str, Any] = {"title": title}
+        for name, row, (offset, scale) in zip(("x", "y", "slope"), numbers, rows, strict=True):
+            offset = single(offset)
+            case[f"{name}_numbers"], case[f"{name}_row"] = row, [offset, scale]
+            # in double the product is exact, so that float32 alone rounds
+            case[name] = [single(offset + scale * q) for q in row]
+        cases.append(case)
+    return cases
 
 
 def _table(table: Table) -> dict[str, list[float]]:

@@ -1,5 +1,6 @@
 """The walk of a crack in C: against its plain twin, its energy, closed forms, and the extremes."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -207,3 +208,31 @@ def test_the_golden_vectors_are_the_python_references():
             scale = np.abs(twin[name]).max()
             assert case[name] == pytest.approx(twin[name], abs=1e-10 * scale), name
         assert case["jumps"] == twin["jumps"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("tick_s", 0.0),
+        ("kappa", np.nan),
+        ("kappa", 1.5),
+        ("damping_s_per_m", -1.0),
+        ("tough", np.array([])),
+        ("tough", np.array([np.inf])),
+        ("tough_step", 0.0),
+        ("upper_face_m", np.nan),
+        ("moving_blades", 3),
+    ],
+)
+def test_a_law_that_no_crack_has_is_refused(name, value):
+    law = crack_law(cutting(), TICK_S)
+    with pytest.raises(ValueError, match="no law of a crack"):
+        dataclasses.replace(law, **{name: value})
+
+
+def test_a_motion_that_is_not_finite_is_refused():
+    law = crack_law(cutting(), TICK_S)
+    opening, advance = strokes(50)
+    opening[7] = np.nan
+    with pytest.raises(ValueError, match="finite"):
+        walk_crack(law, opening, advance)

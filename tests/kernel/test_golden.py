@@ -13,10 +13,12 @@ from scissorcal.kernel import (
     Kernel,
     Mode,
     ModelTables,
+    Row16,
     Servo,
     ServoConfig,
     State,
     Table,
+    Table16,
     crc16,
     decode,
     encode,
@@ -104,6 +106,17 @@ def test_tables(case: dict[str, Any]) -> None:
         expected = np.array(case[name])
         error = np.abs(table.evaluate(case["at"], held=held) - expected)
         assert error.max() <= TABLES["tolerance"] * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("case", TABLES["stored"], ids=titles(TABLES["stored"]))
+def test_stored_tables(case: dict[str, Any]) -> None:
+    names = ("x", "y", "slope")
+    numbers = np.array([case[f"{name}_numbers"] for name in names], dtype=np.int16)
+    first, second, third = (Row16(*case[f"{name}_row"]) for name in names)
+    table = Table16(numbers, (first, second, third)).decoded()
+    for name, row, part in zip(names, (first, second, third), numbers, strict=True):
+        assert getattr(table, name).tolist() == case[name]
+        assert row.values(part).tolist() == case[name]
 
 
 @pytest.mark.parametrize("case", MODEL["cases"], ids=titles(MODEL["cases"]))

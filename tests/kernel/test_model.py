@@ -8,6 +8,8 @@ import pytest
 from scissorcal.kernel import Kernel, StepFlag, Table
 from tests.kernel.zoo import (
     BLADE_LENGTH,
+    EDGE_OFFSET,
+    EDGE_TAPER,
     REFERENCE,
     arc_edge,
     line_edge,
@@ -351,3 +353,29 @@ def test_extremes_of_material_cut_at_the_energy_they_need(
     if advanced.any() and depth > 1e-7:  # below, float32 cannot tell the indentation
         np.testing.assert_allclose(-out["force"][advanced], toughness, rtol=0.02)
     assert all(np.isfinite(out[name]).all() for name in out.dtype.names)
+
+
+def nicked_edge(depth: float) -> Table:
+    """A line with a nick of 2 mm at 35 mm."""
+    s = np.linspace(0.0, BLADE_LENGTH, 151)
+    away = (s - 0.035) / 0.002
+    nick = -depth * np.exp(-(away**2))
+    return Table(s, EDGE_OFFSET + EDGE_TAPER * s + nick, EDGE_TAPER - 2.0 * away / 0.002 * nick)
+
+
+def test_an_edge_that_leans_back_is_refused_at_the_openings_where_it_does() -> None:
+    """Behind a steep nick more than one point of the edge stands over a place."""
+    kernel = Kernel(make_tables(edge=nicked_edge(3e-3), opening_max=2.0))
+    shallow, deep = kernel.step(0.4, -0.1, -0.03), kernel.step(1.6, -0.1, -0.03)
+    assert not shallow.flags & StepFlag.INVALID
+    assert deep.flags & StepFlag.INVALID
+    assert deep.torque == deep.force == 0.0
+    torque = kernel.torque([0.4, 1.6, 3.5], -0.1, 0.03)
+    assert np.isfinite(torque).tolist() == [True, False, False]
+
+
+def test_a_smooth_edge_is_refused_only_where_it_stands_upright() -> None:
+    kernel = Kernel(make_tables(moving_blades=1, opening_max=2.0))
+    limit = math.acos(0.05) - math.radians(2.0)
+    for opening, refused in ((limit - 0.01, False), (limit + 0.01, True)):
+        assert bool(kernel.step(opening, 0.0, -0.03).flags & StepFlag.INVALID) is refused

@@ -19,6 +19,7 @@ WATCH = WatchConfig(
     still_rad=0.03,
     still_m=0.005,
     still_torque=0.05,
+    rest_torque=0.05,
     least_ratio=0.7,
     most_ratio=1.4,
     ratio_torque=0.005,
@@ -53,6 +54,7 @@ class Joint:
     measured: Callable[[float], float] = lambda torque: torque
     push: Callable[[int, float], float] = lambda tick, rate: 0.0  # of a hand [N m]
     force_zero: float = 0.0  # of the sensor [N]
+    force_noise: Callable[[int], float] = lambda tick: 0.0
     seen: Callable[[int, float], float] = lambda tick, opening: opening
     clock: Callable[[int], int] = lambda tick: 1000 * tick
     host_us: int = 1000
@@ -76,7 +78,7 @@ class Joint:
                 self.seen(tick, self.opening),
                 -0.02,
                 self.measured(torque),
-                -push / 0.06 + self.force_zero,
+                -push / 0.06 + self.force_zero + self.force_noise(tick),
             )
             command = servo.step(state)
             enabled = bool(command.flags & 1)
@@ -226,6 +228,58 @@ def test_a_hand_that_rests_is_no_fault() -> None:
     servo = Servo(make_tables(), CONFIG)
     servo.engage(Mode.RENDER)
     assert joint.run(servo, 3000) is StopReason.NONE
+
+
+@pytest.mark.parametrize("seconds", [20, pytest.param(600, marks=pytest.mark.slow)])
+def test_no_hand_that_holds_blades_still_is_a_stuck_encoder(seconds: int) -> None:
+    """It trembles and leans this way and that, up to and beyond what friction holds; encoder steps
+    of 40 urad, a noisy force sensor, and blades that rest most of the time."""
+    rng = np.random.default_rng(7)
+    turns, phases = rng.uniform(0.2, 3.0, 8), rng.uniform(0.0, 6.28, 8)
+    noise = rng.normal(0.0, 0.02, 20_000)
+
+    def push(tick: int, rate: float) -> float:
+        time = 1e-3 * tick
+        aim = 0.6 + 6e-4 * float(np.sin(turns * time + phases).sum())
+        tremor = 4e-3 * math.sin(56.0 * time)
+        return 8.0 * (aim - joint.opening) - 0.02 * rate + tremor
+
+    joint = Joint(
+        push=push,
+        seen=lambda tick, opening: 4e-5 * math.floor(opening / 4e-5),
+        force_noise=lambda tick: float(noise[tick % len(noise)]),
+    )
+    config = replace(CONFIG, watch=replace(WATCH, rest_torque=2.0 * FRICTION, rest_share=0.4))
+    servo = Servo(make_tables(), config)
+    servo.engage(Mode.RENDER)
+    assert joint.run(servo, 1000 * seconds) is StopReason.NONE
+    assert 0.3 < servo.watched["opening_stands"] < 0.8
+
+
+@pytest.mark.parametrize("mode", [Mode.TRACK, Mode.RENDER])
+def test_an_encoder_that_jitters_and_then_repeats_a_reading_is_stuck(mode: Mode) -> None:
+    """Noise of one encoder step; the blades rest, or are moved gently by a hand."""
+    noise = np.random.default_rng(3).normal(0.0, 4e-5, 60_000)
+
+    def run(stuck_from: int, ticks: int) -> tuple[StopReason, int]:
+        config = replace(CONFIG, rate_cutoff_Hz=30.0, watch=replace(WATCH, jitter_s=0.2))
+        servo = Servo(make_tables(), config)
+        servo.set_reference(*np.full((2, 1), [[0.6], [0.0]]), np.full(1, -0.02), np.zeros(1))
+        servo.engage(mode)
+
+        def seen(tick: int, opening: float) -> float:
+            if tick <= stuck_from:
+                last[0] = 4e-5 * math.floor((opening + noise[tick]) / 4e-5)
+            return last[0]
+
+        last = [0.0]
+        joint = Joint(seen=seen, push=lambda tick, rate: 0.015 * math.sin(3e-3 * tick))
+        return joint.run(servo, ticks), len(joint.commands)
+
+    assert run(60_000, 20_000) == (StopReason.NONE, 20_000)
+    reason, ticks = run(3_000, 4_000)
+    assert reason is StopReason.OPENING_STANDS
+    assert 3_190 <= ticks < 3_320
 
 
 @pytest.mark.parametrize(("zero", "reason"), [(3.0, "NONE"), (0.0, "OPENING_STANDS")])

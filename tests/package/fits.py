@@ -26,9 +26,11 @@ FRICTION = {
 
 
 def recipe(name: str = "paper-80gsm", **scene: Any) -> Recipe:
-    """A recipe that comes with scissorcal, its scene changed where asked."""
+    """A recipe that comes with scissorcal, its scene changed where asked; nothing is simplified."""
     chosen = builtin_recipe(name)
-    return chosen.model_copy(update={"scene": chosen.scene.model_copy(update=scene)})
+    return chosen.model_copy(
+        update={"scene": chosen.scene.model_copy(update={"simplify": False} | scene)}
+    )
 
 
 def cut_fit(

@@ -78,14 +78,14 @@ def test_the_stated_bound_holds_on_fresh_random_places(case: str, tmp_path: Path
 @pytest.mark.parametrize("closure", ["work", "eq4"])
 @pytest.mark.parametrize("moving", ["both", "upper"])
 def test_every_closure_and_blade_count(closure: str, moving: str, tmp_path: Path) -> None:
-    chosen = recipe(closure=closure)
+    chosen = recipe(closure=closure, simplify=False)
     chosen = chosen.model_copy(update={"rig": chosen.rig.model_copy(update={"moving": moving})})
     bound = build(chosen, tmp_path / "p.zip", kappa=0.8).manifest.bound
     assert bound.share < 1e-3
 
 
 def test_a_curved_edge_keeps_the_bound(tmp_path: Path) -> None:
-    chosen = recipe()
+    chosen = recipe(simplify=False)
     edge = chosen.rig.edge.model_copy(update={"family": "arc", "curvature_per_m": 1.5})
     chosen = chosen.model_copy(update={"rig": chosen.rig.model_copy(update={"edge": edge})})
     summary = build(chosen, tmp_path / "p.zip")
@@ -95,7 +95,7 @@ def test_a_curved_edge_keeps_the_bound(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings(OUTSIDE)
 def test_smooth_cut_by_a_straight_edge_has_the_closed_form(tmp_path: Path) -> None:
     """An edge through the pivot, both blades moving: tau = J_c h x_c / sin(theta)."""
-    chosen = recipe(render_friction=False, contact_mm=(0.5, 60.0))
+    chosen = recipe(render_friction=False, contact_mm=(0.5, 60.0), simplify=False)
     edge = chosen.rig.edge.model_copy(update={"offset_mm": 0.0, "taper_deg": 0.0})
     chosen = chosen.model_copy(
         update={

@@ -9,7 +9,7 @@ import pytest
 
 from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
-from scissorcal.package import build_package, check_package, open_package
+from scissorcal.package import PackageSummary, build_package, check_package, open_package
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import failed
 from tests.package.fits import cut_fit, recipe, with_edge
@@ -41,10 +41,21 @@ def fit_with(family: str, sd: float, **cut: Any) -> FitResult:
     return with_edge(cut_fit(photographed(), **cut), edge, sds)
 
 
-@pytest.mark.parametrize("family", list(EDGES))
-def test_a_photographed_edge_of_any_family_is_carried(family: str, tmp_path: Path) -> None:
-    fit = fit_with(family, 1.0)
-    summary = build_package(photographed(), None, fit, tmp_path / "p.zip", np.random.default_rng(1))
+@pytest.fixture(scope="module", params=list(EDGES))
+def built(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, FitResult, PackageSummary]:
+    """An edge's family, a cut with such an edge, and its package."""
+    path = tmp_path_factory.mktemp("edges") / f"{request.param}.zip"
+    fit = fit_with(request.param, 1.0)
+    summary = build_package(photographed(), None, fit, path, np.random.default_rng(1))
+    return request.param, fit, summary
+
+
+def test_a_photographed_edge_of_any_family_is_carried(
+    built: tuple[str, FitResult, PackageSummary],
+) -> None:
+    family, fit, summary = built
     package = open_package(summary.path)
     assert not [v for v in failed(check_package(summary.path)) if v.check != "review"]
     assert package.manifest.provenance.cut.structure.edge.family == family
@@ -56,13 +67,13 @@ def test_a_photographed_edge_of_any_family_is_carried(family: str, tmp_path: Pat
     assert table[1] == pytest.approx(package.exact.cutting.edge.offset_at(table[0]), abs=1e-8)
 
 
-@pytest.mark.parametrize("family", ["line", "spline"])
+@pytest.mark.parametrize("family", ["line", pytest.param("spline", marks=pytest.mark.slow)])
 def test_the_uncertainty_of_an_edge_widens_the_band(family: str, tmp_path: Path) -> None:
     """Draws of the law are the same in both packages; only those of the edge differ."""
     widths = []
     for sd in (1e-3, 1.0):
         path = tmp_path / f"{sd}.zip"
-        fit = fit_with(family, sd, spread=0.001)
+        fit = fit_with(family, sd, spread=0.001, draws=60)
         build_package(photographed(), None, fit, path, np.random.default_rng(1))
         low, high = open_package(path).band(np.radians(25.0), -0.2, PLACES)
         widths.append(high - low)
@@ -77,10 +88,10 @@ def test_an_edge_of_a_recipe_is_still_held_to_it(tmp_path: Path) -> None:
         )
 
 
-@pytest.mark.parametrize("family", list(EDGES))
-def test_along_smooth_edges_the_release_falls(family: str, tmp_path: Path) -> None:
-    fit = fit_with(family, 1.0)
-    summary = build_package(photographed(), None, fit, tmp_path / "p.zip", np.random.default_rng(1))
+def test_along_smooth_edges_the_release_falls(
+    built: tuple[str, FitResult, PackageSummary],
+) -> None:
+    _, _, summary = built
     assert open_package(summary.path).tables.release_falls
     assert not [said for said in summary.warnings if "knots of the edge" in said]
 
@@ -99,3 +110,11 @@ def test_a_nick_in_the_edge_is_stated(tmp_path: Path) -> None:
     assert not nicked.tables.release_falls
     (said,) = set(nicked.warnings) - set(package.warnings)
     assert "all 120 knots of the edge" in said
+
+
+def test_a_scene_in_which_the_edge_leans_back_is_refused(tmp_path: Path) -> None:
+    wide = recipe(render_friction=False, opening_deg=(10.0, 180.0))
+    turned = wide.model_copy(update={"rig": wide.rig.model_copy(update={"moving": "upper"})})
+    assert turned.rig.moving_blades == 1
+    with pytest.raises(InputError, match=r"degrees no single point of the edge stands over"):
+        build_package(turned, None, cut_fit(turned), tmp_path / "p.zip", np.random.default_rng(1))

@@ -20,6 +20,7 @@ from scissorcal.recording import (
     Stroke,
     content_hash,
     read_attachments,
+    read_header,
     read_recording,
     write_recording,
 )
@@ -264,3 +265,21 @@ def test_strokes_are_found_from_motion_with_their_sheets(tmp_path: Path) -> None
     assert set(found.samples["stroke"]) == {0, 1, 2, 3}
     with pytest.raises(ValueError, match="not both"):
         RecordingWriter(tmp_path / "b.mcap", "cut", strokes=(Stroke(0, "closing"),), min_travel=1)
+
+
+def test_strokes_that_are_stated_while_it_runs_survive_a_killed_capture(tmp_path: Path) -> None:
+    strokes = (Stroke(0, "closing", 0.5, 0), Stroke(1, "opening", 1.0, 0))
+    path = tmp_path / "cut.mcap"
+    writer = RecordingWriter(path, "cut", recipe_toml="a = 1\n")
+    writer.append(made_samples(50))
+    writer.state_strokes(strokes[:1])
+    writer.append(made_samples(50))
+    writer.state_strokes(strokes)
+    part = tmp_path / "killed.mcap"
+    part.write_bytes(writer.part.read_bytes())
+    killed = read_recording(part)
+    assert killed.strokes == strokes
+    assert killed.recipe_toml == "a = 1\n"
+    writer.append(made_samples(50))
+    writer.close()
+    assert read_recording(path).strokes == read_header(path).strokes == strokes

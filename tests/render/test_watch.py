@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.device.motion import Samples
-from scissorcal.kernel import SAMPLE_DTYPE, SampleFlag
+from scissorcal.kernel import SAMPLE_DTYPE, SampleFlag, StateFlag
 from scissorcal.recording import label_strokes
 from scissorcal.render import latency_of
 from scissorcal.render.watch import Watch
@@ -53,6 +53,19 @@ def test_it_ends_once_the_last_stroke_is_made_and_the_blades_rest_open() -> None
     watch.wanted = 6
     ended = [watch.take(samples[start : start + 50]) for start in range(0, len(samples), 50)]
     assert 12.5 <= ended.index(True) * 0.05 <= 13.0
+
+
+def test_an_opening_that_stands_at_the_end_is_told_unless_at_a_stop() -> None:
+    samples = motion(10.0)
+    samples["opening"][7000:] = 0.5
+    watch = Watch(0.1, None, lambda done, sentence: None, 10.0)
+    for start in range(0, len(samples), 130):
+        watch.take(samples[start : start + 130])
+    assert watch.still_s == pytest.approx(2.999, abs=2e-3)
+    samples["flags"][7000:] |= int(StateFlag.OPENING_AT_STOP)
+    watch = Watch(0.1, None, lambda done, sentence: None, 10.0)
+    watch.take(samples)
+    assert watch.still_s == 0.0
 
 
 def test_unusable_places_make_no_stroke() -> None:

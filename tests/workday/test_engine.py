@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from scissorcal.workday.recordings import exclude_recording, include_recording, 
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.report import write_workspace_report
+from scissorcal.workday.scene_choice import known_scene_choice
 from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace
@@ -190,6 +191,32 @@ def test_a_package_of_a_failed_fit_is_refused_unless_allowed(copied: Workspace) 
     assert not Engine.of(copied).file("package build").exists()
     built = build_workspace_package(Engine.of(copied), allow_failed=True)
     assert built.path.is_file()
+
+
+def test_package_and_scene_choice_come_of_one_walk(
+    copied: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also with a seed of its own: what is kept and printed is of what ships."""
+    from scissorcal.package.simplest import model
+
+    walks = []
+
+    def counted(*args: Any, **options: Any) -> Any:
+        walks.append(args)
+        return walk(*args, **options)
+
+    walk = model.walk
+    monkeypatch.setattr(model, "walk", counted)
+    built = build_workspace_package(Engine.of(copied), seed=5)
+    assert len(walks) == 1
+    assert built.choice == known_scene_choice(Engine.of(copied))
+    assert built.choice is not None
+    assert built.choice.simplification == built.manifest.simplification
+    members = built.manifest.members
+    headers = 128 * len(members)
+    assert built.choice.simplification.bytes_after == (
+        sum(member.bytes for member in members) - headers
+    )
 
 
 def test_a_fit_that_ran_out_of_time_is_incomplete(copied: Workspace) -> None:

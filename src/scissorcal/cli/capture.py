@@ -1,6 +1,6 @@
 """``scissorcal capture``"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,13 +8,15 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
     from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.workday.runs.capture import Captured
+    from scissorcal.recording.until import UntilMark
+    from scissorcal.workday.runs.capture import Captured, Until
     from scissorcal.workday.workspace import Workspace
 
 _PHOTOGRAPHS = "scissorcal.cli.capture_photographs"
@@ -47,9 +49,54 @@ def capture() -> None:
     """
 
 
+Designed = Annotated[
+    bool | None,
+    typer.Option(
+        "--designed/--as-in-recipe",
+        help="Capture the strokes that narrow the torque's band the most for their time, or those "
+        "that the recipe lists; by default as its capture.plan says.",
+    ),
+]
+
+
+UntilTolerance = Annotated[
+    bool,
+    typer.Option(
+        "--until-tolerance",
+        help="Fit after each stroke, choose the next one by what it is worth, and end when the "
+        "torque's band over the scene is within its tolerance.",
+    ),
+]
+
+AtLeast = Annotated[
+    int,
+    typer.Option(
+        "--at-least",
+        metavar="N",
+        min=0,
+        help="With --until-tolerance: go on until there are N strokes (pairs of sweeps).",
+    ),
+]
+
+MaxMinutes = Annotated[
+    float | None,
+    typer.Option(
+        "--max-minutes",
+        metavar="MIN",
+        callback=positive,
+        help="With --until-tolerance: end after so many minutes at the rig, with the time that the "
+        "recipe gives a person; by default those that the recipe's list takes.",
+    ),
+]
+
+
 @command
 def friction(
     device: Device,
+    designed: Designed = None,
+    until_tolerance: UntilTolerance = False,
+    at_least: AtLeast = 0,
+    max_minutes: MaxMinutes = None,
     realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
@@ -58,7 +105,9 @@ def friction(
 ) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
-    Keep the space between the blades empty: the motors move them.
+    Keep the space between the blades empty: the motors move them. With --until-tolerance, friction
+    ends where it takes half of the scene's tolerance, or, where the material is fitted already,
+    where both together are within it.
 
     \b
     Example:
@@ -68,7 +117,8 @@ def friction(
       ...
     """
     rig = _Rig(device, seed, realtime, baud)
-    return _capture("friction", rig, hand=False, yes=yes, folder=folder)
+    how = _How(False, designed, _until(until_tolerance, at_least, max_minutes, designed))
+    return _capture("friction", rig, how, yes=yes, folder=folder)
 
 
 @command
@@ -77,6 +127,10 @@ def cut(
     hand: Annotated[
         bool, typer.Option("--hand", help="Motor off: a person (or the virtual hand) cuts.")
     ] = False,
+    designed: Designed = None,
+    until_tolerance: UntilTolerance = False,
+    at_least: AtLeast = 0,
+    max_minutes: MaxMinutes = None,
     realtime: Realtime = False,
     yes: Yes = False,
     seed: Seed = 0,
@@ -85,7 +139,9 @@ def cut(
 ) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
 
-    Asks for a fresh sheet before each stroke; a virtual rig loads its own.
+    Asks for a fresh sheet where one is needed; a virtual rig loads its own. --until-tolerance needs
+    the fit of friction; Ctrl-C ends it, and what was recorded stays. Exit code 3: the tolerance was
+    not reached, and the last line says why.
 
     \b
     Example:
@@ -93,9 +149,14 @@ def cut(
       captures/cut-20261121T132227Z.mcap: 72842 samples from scissorcal-sim office-paper
       24 of 24 cells filled
       ...
+      $ scissorcal capture cut --device sim --until-tolerance
+      ...
+      7 strokes, 1.7 min: band within 7 % at 96 % of felt places (median 1.5 %); tolerance
+      reached at 95 % confidence
     """
     rig = _Rig(device, seed, realtime, baud)
-    return _capture("cut", rig, hand=hand, yes=yes, folder=folder)
+    how = _How(hand, designed, _until(until_tolerance, at_least, max_minutes, designed))
+    return _capture("cut", rig, how, yes=yes, folder=folder)
 
 
 @dataclass(frozen=True)
@@ -106,8 +167,41 @@ class _Rig:
     baud: int | None
 
 
+@dataclass(frozen=True)
+class _How:
+    hand: bool
+    designed: bool | None
+    until: "Until | None"
+
+
+def _until(
+    wanted: bool, at_least: int, max_minutes: float | None, designed: bool | None
+) -> "Until | None":
+    """What --until-tolerance and its options ask for; None without it. InputError where at odds."""
+    from scissorcal.workday.runs.capture import Until
+
+    if not wanted:
+        if at_least or max_minutes is not None:
+            raise InputError(
+                "--at-least and --max-minutes bound a capture until the tolerance: add "
+                "--until-tolerance, or leave them out."
+            )
+        return None
+    if designed is not None:
+        raise InputError(
+            "--until-tolerance chooses each stroke while it captures: leave out --designed and "
+            "--as-in-recipe."
+        )
+    return Until(at_least, max_minutes)
+
+
 def _capture(
-    kind: "CaptureKind", rig: _Rig, *, hand: bool, yes: bool, folder: Path | None
+    kind: "CaptureKind",
+    rig: _Rig,
+    how: _How,
+    *,
+    yes: bool,
+    folder: Path | None,
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
     from scissorcal.workday.runs.capture import capture_into
@@ -115,12 +209,14 @@ def _capture(
     workspace = open_workspace(folder)
     before = set(workspace.recordings(kind))
     try:
-        with LiveView(ask=not yes) as view:
+        with LiveView(ask=not yes, listed=how.until is None) as view:
             captured = capture_into(
                 workspace,
                 kind,
                 rig.device,
-                hand=hand,
+                hand=how.hand,
+                designed=how.designed,
+                until=replace(how.until, tell=view.approach) if how.until else None,
                 seed=rig.seed,
                 baud=rig.baud,
                 realtime=rig.realtime,
@@ -135,7 +231,24 @@ def _capture(
         if isinstance(error, ScissorcalError):
             error.kept = tuple(kept)
         raise
-    return Answer(_facts(captured), _text(workspace, captured), files=[captured.path])
+    return Answer(
+        _facts(captured),
+        _text(workspace, captured),
+        verdicts=[_verdict(kind, captured.until)] if captured.until else (),
+        files=[captured.path],
+    )
+
+
+def _verdict(kind: str, mark: "UntilMark") -> Verdict:
+    """Whether the tolerance was reached; exit code 3 where it was not."""
+    return Verdict(
+        f"capture.{kind}",
+        "until tolerance",
+        "pass" if mark.reached else "fail",
+        mark.within,
+        mark.needed,
+        mark.sentence,
+    )
 
 
 def _text(workspace: "Workspace", captured: "Captured") -> str:
@@ -144,7 +257,7 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
     report = captured.report
     lines = [
         f"{workspace.relative(captured.path)}: {report.sample_count} samples from {captured.rig}",
-        report.coverage.sentence(),
+        captured.until.sentence if captured.until else report.coverage.sentence(),
     ]
     tally = report.tally
     if tally.lost or tally.garbled or tally.faults:
@@ -186,4 +299,5 @@ def _facts(captured: "Captured") -> dict[str, Any]:
         "tally": report.tally,
         "motion": report.motion,
         "unloaded_strokes": [stroke.index for stroke in report.empty],
+        "until": captured.until,
     }

@@ -4,6 +4,7 @@ import math
 import sys
 import time
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 import typer
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
     from rich.live import Live
 
     from scissorcal.device.recorder import Recorder
+    from scissorcal.recording.until import UntilMark
 
 _LINE_EVERY_S = 5.0
 _DRAW_EVERY_S = 0.1
 _TRACE_POINTS = 300
+_BARS, _BARS_SHOWN = "▁▂▃▄▅▆▇█", 40
 _TRACE_SIZE = (60, 8)
 """Columns and rows of the plot of torque over opening."""
 
@@ -27,10 +30,12 @@ _TRACE_SIZE = (60, 8)
 class LiveView:
     """Shows progress, torque, opening and coverage on stderr: live on a terminal, else as lines.
 
-    ``ask`` says whether a person is asked to load material and to press Enter.
+    ``ask`` says whether a person is asked to load material and to press Enter. ``listed``: the
+    strokes are known beforehand, so that their coverage is shown.
     """
 
-    def __init__(self, ask: bool = True) -> None:
+    def __init__(self, ask: bool = True, *, listed: bool = True) -> None:
+        self._listed = listed
         self._ask = ask
         self._live: Live | None = None
         self._began_s = time.monotonic()
@@ -38,6 +43,7 @@ class LiveView:
         self._finished = False
         self._unloaded = 0
         self._trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_POINTS)
+        self._approach: list[UntilMark] = []
 
     def __enter__(self) -> Self:
         self._start()
@@ -65,10 +71,16 @@ class LiveView:
             opening_deg, torque_mNm = self._trace[-1]
             head += f"; opening {opening_deg:.1f} deg, motor torque {torque_mNm:.1f} mN m"
         if self._live is None:
-            coverage = f"; {recorder.coverage.sentence()}" if recorder else ""
+            coverage = f"; {recorder.coverage.sentence()}" if recorder and self._listed else ""
             typer.echo(head + coverage, err=True)
         else:
             self._live.update(self._drawing(share, head, recorder), refresh=True)
+
+    def approach(self, mark: "UntilMark") -> None:
+        """Show how far a capture is from the scene's tolerance, after each update of the fit."""
+        self._approach.append(mark)
+        if self._live is None:
+            typer.echo(band_line(self._approach), err=True)
 
     def confirm(self, request: str) -> None:
         """Ask a person for what must be done, and wait until it is.
@@ -120,9 +132,25 @@ class LiveView:
         drawn: list[Any] = [Text(head), ProgressBar(total=1.0, completed=share, width=40)]
         if self._trace:
             drawn.append(Text(torque_plot(self._trace)))
-        if recorder:
+        if self._approach:
+            drawn.append(Text(band_line(self._approach)))
+        elif recorder and self._listed:
             drawn.append(recorder.coverage)
         return Group(*drawn)
+
+
+def band_line(marks: "Sequence[UntilMark]") -> str:
+    """The last mark's sentence, and a bar for each: the share of places within the tolerance.
+
+    >>> from scissorcal.recording.until import UntilMark
+    >>> first = UntilMark("", 1, 1, 0.5, 1.0, 0.0, 0.2, 0.07, 0.95)
+    >>> second = UntilMark("", 2, 1, 0.6, 0.9, 1.0, 0.05, 0.07, 0.95)
+    >>> band_line([first, second])[:2]
+    '▁█'
+    """
+    shares = [mark.within for mark in marks if mark.within is not None][-_BARS_SHOWN:]
+    bars = "".join(_BARS[round(share * (len(_BARS) - 1))] for share in shares)
+    return f"{bars} {marks[-1].sentence}".strip()
 
 
 def torque_plot(points: "deque[tuple[float, float]]") -> str:

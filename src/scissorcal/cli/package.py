@@ -26,7 +26,7 @@ def package() -> None:
     \b
     Example:
       $ scissorcal package build
-      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      package/paper-photographed.zip: 6 tables, 200 draws, error bound 0.00055 N m (proved: 0.00039)
       ...
     """
 
@@ -53,7 +53,7 @@ def build(
     \b
     Example:
       $ scissorcal package build
-      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      package/paper-photographed.zip: 6 tables, 200 draws, error bound 0.00055 N m (proved: 0.00039)
       ...
     """
     from scissorcal.workday.engine import Engine
@@ -66,8 +66,14 @@ def build(
     head = f"{workspace.relative(built.path)}: {_contents(built.manifest)}"
     if built.cached:
         head += "\nnothing changed since it was built, so it is as it was"
-    text = "\n".join([head, *(f"note: {warning}" for warning in built.warnings)])
-    result = {**_facts(built.manifest), "cached": built.cached, "warnings": built.warnings}
+    said = built.choice.sentences if built.choice else ()
+    text = "\n".join([head, *said, *(f"note: {warning}" for warning in built.warnings)])
+    result = {
+        **_facts(built.manifest),
+        "cached": built.cached,
+        "warnings": built.warnings,
+        "scene_choice": built.choice.model_dump() if built.choice else None,
+    }
     files = [] if built.cached else [built.path]
     return Answer(result, text, built.verdicts, files)
 
@@ -83,8 +89,8 @@ def check(
 
     \b
     Example:
-      $ scissorcal package check package/paper-80gsm.zip
-      package/paper-80gsm.zip: 6 tables, 200 draws, error bound 6.6e-06 N m
+      $ scissorcal package check package/paper-photographed.zip
+      package/paper-photographed.zip: 6 tables, 200 draws, error bound 0.00055 N m (proved: 0.00039)
       ...
     """
     from scissorcal.package import check_package, open_package
@@ -103,8 +109,9 @@ def _contents(manifest: "Manifest") -> str:
         (member.shape[0] for member in manifest.members if member.file.startswith("draws/")),
         default=0,
     )
-    bound = manifest.bound.stated_Nm
-    return f"{len(tables)} tables, {draws} draws, error bound {bound:.2g} N m"
+    bound, proved = manifest.bound.stated_Nm, manifest.bound.proved_Nm
+    said = f"{len(tables)} tables, {draws} draws, error bound {bound:.2g} N m"
+    return said if proved is None else f"{said} (proved: {proved:.2g})"
 
 
 def _facts(manifest: "Manifest") -> dict[str, object]:

@@ -31,6 +31,7 @@ _COMMANDS = {
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),
     "device": ("scissorcal.cli.device:device", "Find, check or simulate a rig."),
+    "bench": ("scissorcal.cli.bench:bench", "What accuracy costs, measured on your own data."),
     "demo": ("scissorcal.cli.demo:demo", "The whole day on a virtual rig; estimates and truth."),
 }
 
@@ -114,7 +115,7 @@ def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) 
     Where an option or argument is missing, its help says what to give.
     """
     if isinstance(error, typer.BadParameter):
-        error.message = error.message.removeprefix("Value error, ")
+        error.message = _whole_sentence(error.message)
         error.message = error.message or getattr(error.param, "help", None) or ""
     if isinstance(error, typer.TyperException):
         error.show()  # type: ignore[attr-defined]  # every error of the parser has it
@@ -130,3 +131,9 @@ def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) 
         answer = Answer({"error": sentence, "exit_code": error.exit_code})
         print_envelope(name, answer, error.exit_code, 0.0)
     return error.exit_code
+
+
+def _whole_sentence(message: str) -> str:
+    """Say in a sentence what the parser found wrong with a value; empty stays empty."""
+    words = message.removeprefix("Value error, ").replace("Input should be", "It must be", 1)
+    return words if not words or words.endswith((".", "?", "!")) else f"{words}."

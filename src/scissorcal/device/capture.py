@@ -1,11 +1,9 @@
 """Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
@@ -16,30 +14,24 @@ from scissorcal.device.capture_gains import (
 )
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.drive import CaptureProgress, Drive, silent
 from scissorcal.device.hand import hand_strokes, hand_travel
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, Loader
-from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport, Samples
+from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.recorder import Recorder, Tally, unloaded_sentence
-from scissorcal.device.trajectory import Plan, Segment, friction_plan
-from scissorcal.device.unloaded import LoadWatch
+from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
-from scissorcal.recording.probe import PROBE_KEY, ProbeResult
-
-CaptureProgress = Callable[[float, str, Recorder], None]
-"""Called with the share done (0 to 1), a sentence, and what was recorded so far."""
+from scissorcal.recording.probe import PROBE_KEY, UNKNOWN_REST, ProbeResult, RestFacts
 
 SUPERVISOR_S = 0.3
 """Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
-IDLE_S = 1.5
-"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
-
 CLEAR_REQUEST = (
     "Take everything out from between the blades and keep clear: they open, and the sledge "
     "moves to its start."
@@ -68,16 +60,18 @@ def open_writer(
     recipe_toml: str,
     *,
     hand: bool = False,
+    by_parts: bool = False,
     probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a capture and write all that is known before it starts.
 
-    ``recipe_toml`` is the recipe's text, unchanged; ``probe`` what a probe of this
-    rig found. Raises as RecordingWriter does, and as the plan of the capture does.
+    ``by_parts``: strokes are chosen later. ``recipe_toml`` is the recipe's text, unchanged;
+    ``probe`` what a probe of this rig found. Raises as RecordingWriter does, and as the plan of the
+    capture does.
     """
     identity = link.identity
     strokes: tuple[Stroke, ...] = ()
-    if not hand:
+    if not hand and not by_parts:
         plan = friction_plan if kind == "friction" else cut_plan
         strokes = plan(recipe, identity).strokes
     return RecordingWriter(
@@ -100,10 +94,12 @@ def capture_friction(
     *,
     confirm: Confirm | None = None,
     probe: ProbeResult | None = None,
+    cleared: bool = False,
 ) -> CaptureReport:
     """Drive sweeps with empty blades and an excitation, and record them.
 
-    ``confirm`` asks a person to clear the blades; a simulator clears them itself. The gains follow
+    ``confirm`` asks a person to clear the blades, unless they are ``cleared``; a simulator clears
+    them itself. The gains follow
     from ``probe`` where there is one; DeviceError where none could follow the plan. What was
     recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
     faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
@@ -111,15 +107,17 @@ def capture_friction(
     coverage = friction_coverage(recipe, link.identity)
     recorder = Recorder(writer, coverage)
     plan = friction_plan(recipe, link.identity)
-    gains = _gains(link, recipe, "friction", probe, writer)
-    with _motion_for(link, recipe, plan, gains, probe) as motion:
-        Loader(motion, recorder, confirm).clear(plan.segments[0].request)
+    gains = gains_for(link, recipe, "friction", probe, writer)
+    with motion_for(link, recipe, plan, gains, probe) as motion:
+        loader = Loader(motion, recorder, confirm)
+        if not cleared:
+            loader.clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
-        drive = _Drive(motion, recorder, plan, progress)
+        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
         drive.idle()
         drive.follow(plan.segments[0])
         drive.idle()
-        return _finish(recorder, motion)
+        return finish(recorder, motion)
 
 
 def capture_cut(
@@ -130,31 +128,34 @@ def capture_cut(
     progress: CaptureProgress | None = None,
     confirm: Confirm | None = None,
     probe: ProbeResult | None = None,
+    cleared: bool = False,
 ) -> CaptureReport:
     """Drive strokes through sheets (or presses), or record those of a hand.
 
     With ``hand`` the motors are off while the hand moves; strokes are found from the motion. On
     a simulator the virtual hand does it, and motors bring the rig back before each sheet.
-    ``confirm`` asks a person to load each sheet; a simulator loads by itself. Otherwise as
+    ``confirm`` asks a person to load each sheet; a simulator loads by itself. With ``hand`` a
+    person is asked to clear the blades in any case. Otherwise as
     capture_friction.
     """
     identity = link.identity
     coverage = cut_coverage(recipe, identity, hand=hand)
     recorder = Recorder(writer, coverage)
-    gains = _gains(link, recipe, "cut", probe, writer)
+    gains = gains_for(link, recipe, "cut", probe, writer)
     if hand:
-        with _motion_for(link, recipe, None, gains, probe) as motion:
+        with motion_for(link, recipe, None, gains, probe) as motion:
             loader = Loader(motion, recorder, confirm)
-            tell = progress or _silent
+            tell = progress or silent
             hand_strokes(
                 motion, recipe, recorder, loader, lambda done, what: tell(done, what, recorder)
             )
-            return _finish(recorder, motion)
+            return finish(recorder, motion)
     plan = cut_plan(recipe, identity)
-    with _motion_for(link, recipe, plan, gains, probe) as motion:
+    with motion_for(link, recipe, plan, gains, probe) as motion:
         loader = Loader(motion, recorder, confirm)
-        loader.clear(CLEAR_REQUEST)
-        drive = _Drive(motion, recorder, plan, progress)
+        if not cleared:
+            loader.clear(CLEAR_REQUEST)
+        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
         drive.idle()
         for segment in plan.segments:
             loader.retract()
@@ -162,7 +163,7 @@ def capture_cut(
             loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
-        return _finish(recorder, motion)
+        return finish(recorder, motion)
 
 
 def servo_config(
@@ -170,12 +171,12 @@ def servo_config(
     identity: Identity,
     duration_s: float = 0.0,
     gains: CaptureGains | None = None,
-    handle_zero_N: float = 0.0,
+    rest: RestFacts = UNKNOWN_REST,
 ) -> ServoConfig:
     """Limits and gains of a motor-driven capture: the tighter of recipe's and device's limits.
 
     ``gains`` are those of `capture_gains`, by default those of a rig that nobody probed;
-    ``handle_zero_N`` is what the force sensor shows without a hand.
+    ``rest`` is what a probe found of blades at rest.
 
     A delay of 10 ms in the computer makes the device brake and latch a fault. That spoils a few
     samples only, so the fault is cleared, unless there are more than one per second.
@@ -205,7 +206,7 @@ def servo_config(
         tick_us=identity.tick_us,
         motor_sign=recipe.rig.motor_sign,
         watch=replace(
-            watches_of(identity, torque_limit, limits.held_at_limit_s, handle_zero_N),
+            watches_of(identity, torque_limit, limits.held_at_limit_s, rest),
             still_rad=control.still_rad,
         ),
     )
@@ -238,67 +239,7 @@ def identity_of(facts: Mapping[str, Any]) -> Identity:
     return Identity(**{**known, "nonce_echo": 0})
 
 
-class _Drive:
-    """Runs segments of a plan and reports progress."""
-
-    def __init__(
-        self, motion: Motion, recorder: Recorder, plan: Plan, progress: CaptureProgress | None
-    ) -> None:
-        self._motion = motion
-        self._recorder = recorder
-        self._plan = plan
-        self._tell = progress or _silent
-        self._total = sum(len(segment.reference) for segment in plan.segments)
-        self._done = 0
-        identity, cuts = motion.identity, any(stroke.sheet >= 0 for stroke in plan.strokes)
-        self._load = LoadWatch(plan.strokes, identity.handle_radius) if cuts else None
-        self._warned = 0
-
-    def warning(self) -> str:
-        """What to tell the person who loads the next piece about the last; empty if it was cut."""
-        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
-        return f"{unloaded_sentence(empty[-1])} " if empty else ""
-
-    def go_to_start(self, segment: Segment) -> None:
-        """Bring the rig to where a segment starts, so that material can be loaded there."""
-        for samples in self._motion.track(segment.reference.head()):
-            self._take(samples, "moving to where the next piece is loaded")
-
-    def follow(self, segment: Segment) -> None:
-        """Run a segment and record it."""
-        begun = self._done
-        for samples in self._motion.track(segment.reference):
-            passed = self._motion.track_index - self._motion.approach_ticks
-            self._done = max(self._done, begun + min(passed, len(segment.reference)))
-            self._take(samples, self._doing(samples))
-        self._done = begun + len(segment.reference)
-
-    def idle(self) -> None:
-        """Record with the motors off, which shows the sensor zeros."""
-        for samples in self._motion.idle(IDLE_S):
-            if self._load and self._done == 0:
-                self._load.rest(samples)
-            self._take(samples, "motors off, measuring sensor zeros")
-
-    def _take(self, samples: Samples, sentence: str) -> None:
-        self._recorder.take(samples, self._motion.garbled)
-        for stroke in self._load.take(samples) if self._load and len(samples) else ():
-            self._recorder.unloaded(stroke)
-            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
-        self._tell(self._done / self._total, sentence, self._recorder)
-
-    def _doing(self, samples: Samples) -> str:
-        labels = samples["stroke"]
-        if len(labels) == 0 or labels[-1] < 0:
-            return "between strokes"
-        stroke = self._plan.strokes[int(labels[-1])]
-        speed = f" at {stroke.speed:g} rad/s" if np.isfinite(stroke.speed) else ""
-        sheet = f", piece {stroke.sheet + 1}" if stroke.sheet >= 0 else ""
-        of = f"stroke {stroke.index + 1} of {len(self._plan.strokes)}{sheet}"
-        return f"{stroke.kind}{speed} ({of})"
-
-
-def _gains(
+def gains_for(
     link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
 ) -> CaptureGains:
     """Gains by what the probe found; what is said of them is noted."""
@@ -308,16 +249,26 @@ def _gains(
     return gains
 
 
-def _motion_for(
-    link: Link, recipe: Recipe, plan: Plan | None, gains: CaptureGains, probe: ProbeResult | None
+def motion_for(
+    link: Link,
+    recipe: Recipe,
+    plan: Plan | None,
+    gains: CaptureGains,
+    probe: ProbeResult | None,
+    *,
+    duration_s: float = 0.0,
 ) -> Motion:
-    zero_N = probe.handle_zero_N if probe else 0.0
-    config = servo_config(recipe, link.identity, plan.duration_s if plan else 0.0, gains, zero_N)
+    """Start the servo for a plan, or for references of ``duration_s`` if that is longer."""
+    rest = probe.rest if probe else UNKNOWN_REST
+    lasts_s = max(plan.duration_s if plan else 0.0, duration_s)
+    config = servo_config(recipe, link.identity, lasts_s, gains, rest)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
+    longest = max(longest, round(duration_s * 1e6 / link.identity.tick_us))
     return open_motion(link, config, longest_reference=longest)
 
 
-def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
+def finish(recorder: Recorder, motion: Motion) -> CaptureReport:
+    """Note how the servo ran and what was lost, and report."""
     report = motion.report()
     recorder.writer.note(report.lag.sentence)
     if report.rights:
@@ -328,5 +279,5 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     )
 
 
-def _silent(done: float, sentence: str, recorder: Recorder) -> None:
-    pass
+def _ticks(plan: Plan) -> int:
+    return sum(len(segment.reference) for segment in plan.segments)

@@ -6,13 +6,14 @@ loading arrays; `device.counting` makes them.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import degrees
 from typing import Any
 
 from scissorcal.recipe.requirements import LITTLE, CaptureKind
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.until import UntilMark
 
 EXCITATION_SHARE = 0.95
 """Share of the planned excitation that must be recorded: its ramps are labelled as pauses."""
@@ -132,21 +133,63 @@ def completeness(
 
     ``used`` has, for each of ``counts``, what a fit uses of that recording, empty where that is not
     known. Recordings by hand have no planned speeds: the strokes through each sheet are counted
-    alone. Presses have no sheets, unless by hand.
+    alone. Presses have no sheets, unless by hand. A recording of a designed list is judged by that.
+    A capture until the tolerance builds on the recordings before it: the last one says for all such
+    whether it was reached.
     """
     taken = [None] * len(counts) if used is None else list(used)
     pairs = [(count, use or None) for count, use in zip(counts, taken, strict=True) if count]
+    last = [count["until"] for count, _ in pairs if count.get("until")][-1:]
+    pairs = [({**c, "until": last[0]} if c.get("until") else c, use) for c, use in pairs]
+    own = [bool(pair[0].get("designed") or pair[0].get("until")) for pair in pairs]
+    listed = [pair for pair, alone in zip(pairs, own, strict=True) if not alone]
+    each = [[pair] for pair, alone in zip(pairs, own, strict=True) if alone]
+    return _joined([_of_one_plan(part, recipe, kind) for part in (listed, *each) if part])
+
+
+def _joined(parts: Sequence[Completeness]) -> Completeness:
+    """What several plans asked for, one after the other; each designed list is one."""
+    if len(parts) < 2:
+        return parts[0] if parts else Completeness()
+    excited = [part.excitation for part in parts if part.excitation is not None]
+    return Completeness(
+        cells=tuple(cell for part in parts for cell in part.cells),
+        strokes=tuple(row for part in parts for row in part.strokes),
+        sheets=_numbered([row for part in parts for row in part.sheets]),
+        missing=tuple(dict.fromkeys(sentence for part in parts for sentence in part.missing)),
+        little_used=tuple(dict.fromkeys(text for part in parts for text in part.little_used)),
+        excitation=ExcitationCount(
+            sum(one.planned_s for one in excited),
+            sum(one.recorded_s for one in excited),
+            _sum(one.used_s for one in excited),
+        )
+        if excited
+        else None,
+    )
+
+
+def _numbered(sheets: Sequence[SheetCount]) -> tuple[SheetCount, ...]:
+    return tuple(replace(row, sheet=place + 1) for place, row in enumerate(sheets))
+
+
+def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Completeness:
+    """Judge recordings of one plan together."""
     driven = [(count, use) for count, use in pairs if not count["by_hand"]]
-    if not pairs:
-        return Completeness()
     cells = _cells(driven)
     strokes = _strokes(pairs, driven, recipe)
     sheets = _sheets(pairs, (driven or pairs)[0][0]["planned_sheets"])
     missing = [*_missing_cells(cells), *_missing_strokes(strokes), *_missing_sheets(sheets)]
+    until = pairs[0][0].get("until")
+    if until:
+        mark = UntilMark.of(until)
+        missing = [] if mark.reached else [f"the scene's tolerance: {mark.sentence}"]
     excitation = None
-    if kind == "friction" and recipe.capture.friction.excitation_s > 0:
+    planned_s = recipe.capture.friction.excitation_s
+    if pairs[0][0].get("designed"):
+        planned_s = pairs[0][0]["planned_excitation_s"]
+    if kind == "friction" and planned_s > 0 and not until:
         excitation = ExcitationCount(
-            recipe.capture.friction.excitation_s,
+            planned_s,
             sum(count["excitation_s"] for count, _ in pairs),
             _sum(use and use["excitation_s"] for _, use in pairs),
         )

@@ -173,7 +173,7 @@ def _loop(axis: Axis, gains: Gains) -> tuple[Array, Array]:
     total[place] -= axis.tick_s
     effort = gains.ki * total - gains.kd * estimate
     effort[place] -= gains.kp
-    efforts = [effort, *(np.eye(size)[late + index] for index in range(ticks + 1))]
+    efforts = [effort, *np.eye(size)[late : late + ticks + 1]]
     matrix = np.zeros((size, size))
     matrix[place, place], matrix[place, rate], matrix[rate, rate] = 1.0, turn, keep
     matrix[[place, rate]] += np.outer(fresh, efforts[ticks]) + np.outer(stale, efforts[ticks + 1])

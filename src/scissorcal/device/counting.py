@@ -9,27 +9,35 @@ from scissorcal.device.capture import identity_of
 from scissorcal.device.coverage import NEEDED_S, CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import friction_plan
+from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
+from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.requirements import LITTLE, CaptureKind
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe.schema import Capture, Recipe
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.until import UntilMark
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int64]
 
 
 def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> dict[str, Any]:
-    """Count what one recording holds of the recipe's plan, as plain values.
+    """Count what one recording holds of its plan, as plain values.
 
-    Gives nothing for a recording without a device's identity, such as an import: no plan of this
-    project made it.
+    The plan is the recipe's, or the list that was designed for this recording. Gives nothing for a
+    recording without a device's identity, such as an import: no plan of this project made it.
     """
     if not recording.device:
         return {}
+    recipe = _as_planned(recording, recipe)
     by_hand, grid = _grid(recording, recipe, kind)
     label = _labels(recording)
     grid.add(recording.samples[label >= 0])
-    strokes, sheets = _plan(recipe, identity_of(recording.device), kind, by_hand)
+    until = UntilMark.last_of(recording.marks)
+    if until is None:
+        strokes, sheets = _plan(recipe, identity_of(recording.device), kind, by_hand)
+    else:
+        strokes, sheets = _chosen(recording)
     whole = _whole(recording, label)
     return {
         "by_hand": by_hand,
@@ -44,7 +52,21 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
         "recorded": _named(recording, whole),
         "sheets": _sheets(recording, whole),
         "excitation_s": _excitation(recording, label),
+        "planned_excitation_s": recipe.capture.friction.excitation_s,
+        "designed": designed_capture(recording) is not None,
+        "until": until.as_dict() if until else None,
     }
+
+
+def designed_capture(recording: Recording) -> Capture | None:
+    """The list that a recording was designed with; None for one that the recipe lists."""
+    if not recording.recipe_toml:
+        return None
+    try:
+        capture = parse_recipe(recording.recipe_toml).capture
+    except InputError:  # of another version, whose list is not known here
+        return None
+    return capture if capture.plan == "designed" else None
 
 
 def count_used(
@@ -60,7 +82,7 @@ def count_used(
     """
     if not recording.device:
         return {}
-    _, grid = _grid(recording, recipe, kind)
+    _, grid = _grid(recording, _as_planned(recording, recipe), kind)
     label = _labels(recording)
     used = _mask(spans, len(label))
     grid.add(recording.samples[label >= 0], used[label >= 0])
@@ -71,6 +93,33 @@ def count_used(
         "sheets": _sheets(recording, enough),
         "excitation_s": _excitation(recording, np.where(used, label, -1)),
     }
+
+
+def _as_planned(recording: Recording, recipe: Recipe) -> Recipe:
+    """The recipe with the captures that this recording was planned with."""
+    if UntilMark.last_of(recording.marks) is not None:
+        return _with_chosen(recording, recipe)
+    designed = designed_capture(recording)
+    return recipe if designed is None else recipe.model_copy(update={"capture": designed})
+
+
+def _with_chosen(recording: Recording, recipe: Recipe) -> Recipe:
+    """The recipe with the speeds of strokes that were chosen while they were captured."""
+    closing = [s.speed for s in recording.strokes if s.kind in ("closing", "press")]
+    speeds = tuple(sorted(set(closing)))
+    if not speeds:
+        return recipe
+    kind = "friction" if recording.kind == "friction" else "cut"
+    part = getattr(recipe.capture, kind).model_copy(update={"speeds_rad_per_s": speeds})
+    capture = recipe.capture.model_copy(update={kind: part})
+    return recipe.model_copy(update={"capture": capture})
+
+
+def _chosen(recording: Recording) -> tuple[list[list[Any]], list[int]]:
+    """As :func:`_plan`, of strokes that were chosen while they were captured: what was stated."""
+    every = {stroke.index for stroke in recording.strokes}
+    sheets = _sheets(recording, every)
+    return _named(recording, every), sheets if recording.kind == "cut" else []
 
 
 def _grid(recording: Recording, recipe: Recipe, kind: CaptureKind) -> tuple[bool, CoverageGrid]:

@@ -1,6 +1,9 @@
 """Thresholds of what the servo watches on a rig, from its identity and the recipe's limits."""
 
+import math
+
 from scissorcal.kernel import Capability, Identity, WatchConfig
+from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
 
 SWING_RAD_PER_S = 0.5
 """Chosen: five times a hand's tremor (8 to 12 Hz, below 0.1 rad/s at the blades)."""
@@ -21,6 +24,12 @@ STILL_M = 0.005
 """A quarter of the error at which tracking is lost."""
 STILL_TORQUE_SHARE = 0.15
 """Of the device's limit: ten times the breakaway of scissors with a motor of 1 N m."""
+REST_BREAKAWAYS = 2.0
+"""Friction of scissors varies by up to a half along the blades, and the probe meets one place."""
+REST_NOISE_SDS = 5.0
+"""White noise of 0.2 of this is left of means over 30 ms; slow noise is left whole."""
+JITTER_S = 0.2
+"""At 500 Hz 100 readings; noise of more than a step gives two equal ones with at most 0.5."""
 
 LEAST_RATIO = 0.7
 MOST_RATIO = 1.4
@@ -38,13 +47,15 @@ HOST_CLOCK_SHARE = 0.05
 
 
 def watches_of(
-    identity: Identity, torque_limit: float, held_at_limit_s: float, handle_zero_N: float = 0.0
+    identity: Identity,
+    torque_limit: float,
+    held_at_limit_s: float,
+    rest: RestFacts = UNKNOWN_REST,
 ) -> WatchConfig:
     """The watches over one rig, of which commands stay within ``torque_limit`` (N m).
 
-    ``handle_zero_N`` is what a probe found that the force sensor shows without a hand. A
-    served virtual rig stands still while its computer is busy, so its clock is not compared with
-    the computer's.
+    ``rest`` is what a probe found of blades at rest. A served virtual rig stands still while
+    its computer is busy, so its clock is not compared with the computer's.
     """
     sensor = bool(identity.capabilities & Capability.HANDLE_FORCE_SENSOR)
     virtual = bool(identity.capabilities & Capability.SIMULATOR)
@@ -58,6 +69,9 @@ def watches_of(
         still_rad=STILL_RAD,
         still_m=STILL_M,
         still_torque=STILL_TORQUE_SHARE * identity.torque_limit,
+        rest_torque=_rest_torque(identity, rest),
+        rest_share=MOST_RATIO - 1.0,
+        jitter_s=JITTER_S if rest.jitters else 0.0,
         least_ratio=LEAST_RATIO,
         most_ratio=MOST_RATIO,
         ratio_torque=RATIO_TORQUE_SHARE * identity.torque_limit,
@@ -67,5 +81,13 @@ def watches_of(
         stop_high=identity.opening_max,
         stop_margin=STOP_MARGIN_RAD,
         handle_radius=identity.handle_radius if sensor else 0.0,
-        handle_zero=handle_zero_N if sensor else 0.0,
+        handle_zero=rest.handle_zero_N if sensor else 0.0,
     )
+
+
+def _rest_torque(identity: Identity, rest: RestFacts) -> float:
+    """The imbalance of motor and hand (N m) that friction does not hold, with its noise."""
+    if rest.breakaway_Nm is None:
+        return STILL_TORQUE_SHARE * identity.torque_limit
+    noise = math.hypot(rest.torque_noise_Nm, identity.handle_radius * rest.force_noise_N)
+    return REST_BREAKAWAYS * rest.breakaway_Nm + REST_NOISE_SDS * noise

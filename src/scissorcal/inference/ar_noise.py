@@ -1,6 +1,6 @@
 """Autoregressive noise: fitted to residuals, drawn again for simulated data."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +10,10 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 MOST_ORDER = 12
+LEAST_LEFT = 1e-9
+"""Share of the power that innovations must keep. Below it the residuals follow from those before
+them (a constant, a sine), and the autoregression is so near a unit root that its variance is lost
+in rounding: the covariance's condition is about the square of the inverse."""
 
 
 @dataclass(frozen=True)
@@ -86,14 +90,26 @@ def fit_ar(residuals: Array, series: Labels, most: int = MOST_ORDER) -> ArNoise:
     Burg's recursion on forward and backward errors, whose reflection coefficients lie within
     one in magnitude, so that the result is always stationary (Burg 1967; Brockwell and Davis 1991,
     doi:10.1007/978-1-4419-0320-4, section 8.2); order by Schwarz 1978, doi:10.1214/aos/1176344136.
-    ``most`` is the highest order tried. The residuals' mean is not taken out.
+    ``most`` is the highest order tried. The residuals' mean is not taken out. Orders that would
+    leave less than ``LEAST_LEFT`` of the power are not tried. ``sd`` is NaN where a residual is
+    not finite.
     """
+    if not np.all(np.isfinite(residuals)):
+        return ArNoise(0, (), float("nan"))
+    largest = float(np.max(np.abs(residuals), initial=0.0))
+    if largest == 0.0:
+        return ArNoise(0, (), 0.0)
+    found = _by_burg(residuals / largest, series, most)
+    return replace(found, sd=found.sd * largest)
+
+
+def _by_burg(residuals: Array, series: Labels, most: int) -> ArNoise:
+    """The autoregression of residuals (n,) whose largest is one."""
     n = len(residuals)
     lengths = [high - low for low, high in runs(series)]
     pieces = [residuals[low:high] for low, high in runs(series)]
-    power = float(residuals @ residuals) / n if n else 0.0
-    if power <= 0.0:
-        return ArNoise(0, (), 0.0)
+    power = float(residuals @ residuals) / n
+    least = LEAST_LEFT * power
     forward, backward = pieces, pieces
     coefficients = np.zeros(0)
     best = ArNoise(0, (), float(np.sqrt(power)))
@@ -108,7 +124,7 @@ def fit_ar(residuals: Array, series: Labels, most: int = MOST_ORDER) -> ArNoise:
         backward = [b - reflection * f for f, b in pairs]
         coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
         power *= 1.0 - reflection**2
-        if power <= 0.0:
+        if power <= least:
             break
         criterion = n * np.log(power) + order * np.log(n)
         if criterion < lowest:

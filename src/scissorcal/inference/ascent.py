@@ -42,7 +42,7 @@ def ascend(
             break
         before = value
         surface = _Surface(problem, point, rounding(problem, point))
-        z, value, slope, inverse = _bfgs(surface, value)
+        z, value, slope, inverse = _bfgs(surface, value, stop)
         point, promised = surface.at(z), 0.5 * float(slope @ inverse @ slope)
         root = surface.root @ _root_of(inverse)
         if value - before < ARRIVED or promised < ARRIVED:
@@ -73,7 +73,7 @@ class _Surface:
             return np.where(known, (ahead - behind) / (2 * STEP), 0.0)
 
 
-def _bfgs(surface: _Surface, value: float) -> tuple[Array, float, Array, Array]:
+def _bfgs(surface: _Surface, value: float, stop: Stop | None) -> tuple[Array, float, Array, Array]:
     """Ascend with one gradient a step: place, height, slope, and the inverse curvature learnt."""
     size = len(surface.centre)
     z, inverse = np.zeros(size), np.eye(size)
@@ -81,7 +81,7 @@ def _bfgs(surface: _Surface, value: float) -> tuple[Array, float, Array, Array]:
     for _ in range(STEPS):
         move = inverse @ slope
         promised = float(slope @ move)
-        if promised < 2 * ARRIVED:
+        if promised < 2 * ARRIVED or (stop is not None and stop()):
             break
         reach = min(1.0, LONGEST / float(np.linalg.norm(move)))
         for _ in range(HALVINGS):

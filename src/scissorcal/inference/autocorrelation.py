@@ -9,6 +9,10 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 
+FEWEST = 3
+"""Residuals from which there is an autocorrelation: with two, that at lag one is always -1/2."""
+
+
 @dataclass(frozen=True)
 class Whiteness:
     """Ljung-Box test of residuals: ``p_value`` small means they are not white.
@@ -26,15 +30,25 @@ class Whiteness:
 def ljung_box(residuals: Array, series: Labels, lags: int = 20) -> Whiteness:
     """Test residuals (n,) for autocorrelation within their ``series`` (n,).
 
-    Ljung and Box 1978, doi:10.1093/biomet/65.2.297.
+    Ljung and Box 1978, doi:10.1093/biomet/65.2.297. Fewer residuals than lags are tested at as
+    many lags as they have; those that are equal but for rounding, or fewer than three, speak
+    against nothing (p = 1). All is NaN where a residual is not finite.
+
+    >>> ljung_box(np.full(100, 0.1), np.zeros(100, dtype=np.int64)).p_value
+    1.0
     """
     from scipy.special import chdtrc
 
-    r = residuals - residuals.mean()
+    n = len(residuals)
+    if not np.all(np.isfinite(residuals)):
+        return Whiteness(np.nan, np.nan, np.nan)
+    largest = float(np.max(np.abs(residuals), initial=0.0))
+    unit = residuals / largest if largest > 0.0 else residuals
+    r = unit - unit.mean() if n else unit
     total = float(r @ r)
-    if total == 0.0:
+    if n < FEWEST or total <= n * (n * np.finfo(float).eps) ** 2:
         return Whiteness(1.0, 1.0, 0.0)
-    n = len(r)
+    lags = min(lags, n - 1)
     longest = max(lags, min(n // 4, 2000))
     correlations = np.array([_lagged(r, r, series, lag) for lag in range(1, lags + 1)]) / total
     statistic = n * (n + 2) * np.sum(correlations**2 / (n - np.arange(1, lags + 1)))
@@ -55,16 +69,23 @@ def robust_covariance_of_scores(scores: Array, series: Labels) -> Array:
     Prewhitened kernel estimator: a first-order vector autoregression takes out most of the
     dependence, Bartlett weights with Andrews' automatic bandwidth take care of the rest, and the
     result is recoloured (Andrews and Monahan 1992, doi:10.2307/2951574; Newey and West 1987,
-    doi:10.2307/1913610). Products are never taken across two series.
+    doi:10.2307/1913610). Products are never taken across two series; where no score follows
+    another in its series, scores count as independent. ValueError where a score is not finite.
     """
+    if not np.all(np.isfinite(scores)):
+        raise ValueError("scores that are not finite numbers have no covariance")
     n, p = scores.shape
-    size = np.sqrt(np.mean(scores**2, axis=0))
+    size = np.max(np.abs(scores), axis=0, initial=0.0)
     usable = size > 0
     result = np.zeros((p, p))
     if not np.any(usable):
         return result
     s = (scores - scores.mean(axis=0))[:, usable] / size[usable]
     follows = np.flatnonzero(series[1:] == series[:-1]) + 1
+    if len(follows) == 0:
+        own = scores[:, usable] / size[usable]
+        result[np.ix_(usable, usable)] = own.T @ own * np.outer(size[usable], size[usable])
+        return result
     transition = _stable_autoregression(s[follows - 1], s[follows])
     white = s[follows] - s[follows - 1] @ transition.T
     labels = series[follows]

@@ -10,7 +10,11 @@ Array = NDArray[np.float64]
 CHAINS, BURN, SWEEPS = 40, 30, 40
 """Chains run side by side, sweeps that are thrown away, and sweeps that are kept."""
 GRID = np.geomspace(3e-3, 50.0, 40)
-"""Standard deviations between groups that are weighed, in units of their scale."""
+"""Standard deviations between groups that are weighed, in units of their scale; further ones of
+the same ratio where groups are farther apart."""
+BEYOND = 4.0
+"""How far beyond the largest difference of two groups the grid reaches: with two groups, a standard
+deviation of four times their difference is a tenth as likely as one like it."""
 COMMON_GRID = np.geomspace(1e-2, 10.0, 25)
 SLAB = 10.0
 """Size of a difference that nobody would call small, in units of the scale."""
@@ -49,7 +53,14 @@ def between_groups(
     (Gelman 2006, doi:10.1214/06-BA117A); with two groups nothing but the slab bounds tau from
     above. ``prior`` (p, p) is the precision of the parameters' own prior, which holds what a
     group's data leave open. Gibbs sampling over grids of tau, with theta_r integrated out.
+
+    ValueError where an estimate is not finite, or a scale not above zero.
     """
+    if not (np.all(np.isfinite(means)) and np.all(np.isfinite(precisions))):
+        raise ValueError("groups are compared by estimates that are finite numbers")
+    if not np.all(scale > 0.0):
+        raise ValueError("groups are compared on scales above zero")
+    grids = [_grid(float(apart)) for apart in np.ptp(means, axis=0) / scale]
     held = precisions + BROAD * prior
     covariances = np.linalg.inv(held)
     p = means.shape[1]
@@ -64,7 +75,7 @@ def between_groups(
         inverse = np.asarray(np.linalg.inv(covariances + spread), dtype=np.float64)
         _move_population(state, means, inverse, rng)
         for j in range(p):
-            _move_sd(state, j, float(scale[j]), means, inverse, rng)
+            _move_sd(state, j, float(scale[j]) * grids[j], grids[j], means, inverse, rng)
         _move_common(state, scale, rng)
         if sweep >= BURN:
             kept.append((state.tau.copy(), state.theta.copy()))
@@ -89,18 +100,33 @@ def _move_population(state: _State, means: Array, inverse: Array, rng: np.random
     state.theta = centre + np.einsum("cij,cj->ci", vectors, noise)
 
 
+def _grid(apart: float) -> Array:
+    """The grid for groups whose estimates lie ``apart``, in units of the scale."""
+    ratio = float(GRID[1] / GRID[0])
+    more = max(0, int(np.ceil(np.log(max(BEYOND * apart, 1e-300) / GRID[-1]) / np.log(ratio))))
+    return np.concatenate([GRID, GRID[-1] * ratio ** np.arange(1, more + 1)])
+
+
 def _move_sd(
-    state: _State, j: int, scale: float, means: Array, inverse: Array, rng: np.random.Generator
+    state: _State,
+    j: int,
+    grid: Array,
+    sizes: Array,
+    means: Array,
+    inverse: Array,
+    rng: np.random.Generator,
 ) -> None:
-    """Draw tau_j given all else, and bring ``inverse`` up to date (Sherman and Morrison)."""
+    """Draw tau_j from ``grid`` given all else, and bring ``inverse`` up to date.
+
+    ``sizes`` are those of ``grid`` in units of the scale (Sherman and Morrison).
+    """
     away = means - state.theta[:, None, :]
     pulled = np.einsum("crk,crk->cr", inverse[..., j, :], away)
     own = inverse[..., j, j]
-    grid = scale * GRID
     added = grid**2 - state.tau[:, j, None] ** 2
     growth = np.maximum(1.0 + added[:, None, :] * own[..., None], 1e-12)
     log = 0.5 * (added[:, None, :] * pulled[..., None] ** 2 / growth - np.log(growth)).sum(axis=1)
-    log += _log_prior(GRID, state.common[:, None])
+    log += _log_prior(sizes, state.common[:, None])
     chosen = _drawn(log, rng)
     change = np.take_along_axis(added, chosen[:, None], axis=1)
     factor = change / np.maximum(1.0 + change * own, 1e-12)

@@ -15,7 +15,7 @@ from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SamplingStatus, SearchStatus, about, picked
+from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 Array = NDArray[np.float64]
@@ -68,13 +68,15 @@ def infer(
     where there are no better ones. The curvature is measured whatever the time.
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
-    beside the optimum.
+    beside the optimum, or so large that rounding hides its shape.
     """
     tell = progress or (lambda done, sentence: None)
     counter = Counter()
     counted = counter.over(problem)
     tell(0.0, "searching the optimum")
     best = optimum or find_optimum(problem, stop=stop)
+    if best.status is SearchStatus.ROUNDED:
+        raise NotFiniteError(best.sentence)
     tell(0.3, "measuring the curvature")
     best, shape = polish(counted, best)
     best = _held(problem, best, shape)
@@ -87,7 +89,12 @@ def infer(
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
     run = _Run(problem.names, local, proposal, counter, rng, count, tell)
-    found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
+    try:
+        found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
+    except NotFiniteError as error:
+        if best.success:
+            raise
+        raise NotFiniteError(f"{best.sentence} So nothing could be sampled: {error}") from None
     tell(1.0, found.sentence)
     return Posterior(
         names=problem.names,

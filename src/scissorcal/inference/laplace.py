@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ RIDGE = 1e-3
 
 LEAST_INFORMATION = 0.1
 """Information along any direction, in units of the prior's, that a covariance is built from."""
+
+REACH = 3.0
+"""Standard deviations that a Newton step from the optimum may lead without being tried."""
 
 POLISHED = 1e-8
 """Log-posterior that a further Newton step would have to promise for it to be taken."""
@@ -58,17 +62,30 @@ class Laplace:
     else stretched about ``pivot`` by the map ``stretch`` (p, p). ``inflation`` (p,) is the factor
     by which autocorrelation widens each standard deviation; ``null`` names, for each direction the
     data leave to the prior, its parameters with their weights. ``log_posteriors`` is the same
-    posterior over points (k, p), shape (k,).
+    posterior over points (k, p), shape (k,). ``step`` (p,) is Newton's from the optimum.
     """
 
     pivot: Array
     stretch: Array
-    centre: Array
+    step: Array
     covariance: Array
     inflation: Array
     null: tuple[str, ...]
     log_posterior: Callable[[Array], float]
     log_posteriors: Callable[[Array], Array]
+
+    @cached_property
+    def centre(self) -> Array:
+        """Where a Newton step of at most `REACH` sds leads, or the whole step if that is higher.
+
+        A prior far from the data pulls a stretched posterior that far: there the step is exact
+        where both are normal, and a proposal that stayed behind would never see its mass.
+        """
+        reach = REACH * np.sqrt(np.diag(self.covariance))
+        near, far = self.pivot + np.clip(self.step, -reach, reach), self.pivot + self.step
+        if np.array_equal(near, far):
+            return near
+        return far if self.log_posterior(far) > self.log_posterior(near) else near
 
     def stretched(self, point: Array) -> Array:
         """Where the posterior that is sampled has what the written one has at ``point``."""
@@ -166,7 +183,6 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
         else _stretch(shape.information, spread, scale)
     )
     covariance = _inverse(robust + shape.curvature_prior, scale)
-    reach = 3 * np.sqrt(np.diag(covariance))
     slope = shape.slope_prior + stretch.T @ shape.scores.sum(axis=0)
     naive = _inverse(shape.information + shape.curvature_prior, scale)
 
@@ -191,7 +207,7 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
     return Laplace(
         pivot=point,
         stretch=stretch,
-        centre=point + np.clip(covariance @ slope, -reach, reach),
+        step=covariance @ slope,
         covariance=covariance,
         inflation=np.sqrt(np.diag(covariance) / np.diag(naive)),
         null=_null_directions(robust, scale, problem.names),

@@ -22,19 +22,26 @@ def least_squares(
     Levenberg and Marquardt's as MINPACK has it (More 1978, doi:10.1007/BFb0067700), each parameter
     scaled by its slopes; its overhead is a fifth of that of scipy's trust-region method. It has
     converged where a step changes the sum or the point by less than ``precision`` of it. There must
-    be as many residuals as parameters at least. Residuals of different points are compared by their
-    sum of squares alone, so that they may be rotated from point to point.
+    be as many residuals as parameters at least, else ValueError. It has not converged where
+    residuals or slopes are not finite at the end, or beyond ``WORST``. Residuals of different
+    points are compared by their sum of squares alone, so that they may be rotated from point to
+    point.
     """
     from scipy.optimize import least_squares as search
 
-    last: list[tuple[bytes, Array, Array]] = []
+    last: list[tuple[bytes, Array, Array, bool]] = []
 
-    def at(x: Array) -> tuple[Array, Array]:
+    def at(x: Array) -> tuple[Array, Array, bool]:
         if not last or last[0][0] != x.tobytes():
             with np.errstate(all="ignore"):
-                rows, slopes = (np.clip(np.nan_to_num(a), -WORST, WORST) for a in evaluate(x))
-            last[:] = [(x.tobytes(), rows, slopes)]
-        return last[0][1], last[0][2]
+                both = evaluate(x)
+                known = all(bool(np.all(np.abs(a) < WORST)) for a in both)
+                rows, slopes = (np.clip(np.nan_to_num(a), -WORST, WORST) for a in both)
+            last[:] = [(x.tobytes(), rows, slopes, known)]
+        return last[0][1:]
+
+    if len(at(np.asarray(start))[0]) < len(start):
+        raise ValueError("least squares need at least as many residuals as parameters")
 
     def residuals(x: Array) -> Array:
         return at(x)[0]
@@ -53,4 +60,4 @@ def least_squares(
         gtol=1e-15,
         max_nfev=MOST_EVALUATIONS,
     )
-    return np.asarray(found.x), bool(found.success)
+    return np.asarray(found.x), bool(found.success) and at(found.x)[2]

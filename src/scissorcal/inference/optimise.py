@@ -123,7 +123,7 @@ def find_optimum(
     first = max(range(len(ended)), key=lambda index: ended[index].value)
     ended[first], around = _confirmed(problem, ended[first], stop)
     best = ended[first]
-    agreeing = sum(climb.value > best.value - SAME_HEIGHT for climb in ended)
+    agreeing = sum(climb.value >= best.value - SAME_HEIGHT for climb in ended)
     optima = _clusters(problem, ended)
     status, concerns = _status(problem, best, around, stop)
     sentence = about(status, concerns)
@@ -310,6 +310,7 @@ def _rounding(problem: Problem, point: Array) -> Array:
     scaled = np.where(np.abs(scaled) < HUGE, scaled, 0.0)
     information = scaled.T @ scaled + np.eye(len(point))
     values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 1.0)  # exact ones are; rounding of large ones leaves some below 0
     return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))
 
 
@@ -348,6 +349,8 @@ def _status(
     ``lost`` (axes, 2) is what the log-posterior loses beside the end.
     """
     scale = problem.prior_sd
+    if is_rounded(best.value):
+        return SearchStatus.ROUNDED, ()
     at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
     if np.any(at_bound):
         return SearchStatus.AT_BOUNDS, picked(problem.names, at_bound)
@@ -370,6 +373,15 @@ def _status(
         concerned = np.any(share > 0.1 * share.sum(axis=0), axis=1)
         return SearchStatus.PLATEAU, picked(problem.names, np.asarray(concerned))
     return SearchStatus.SETTLED, ()
+
+
+def is_rounded(value: float) -> bool:
+    """Whether rounding of a log-posterior hides differences by which a search settles.
+
+    >>> is_rounded(-1e9), is_rounded(-1e17)
+    (False, True)
+    """
+    return bool(np.spacing(abs(value)) > SETTLED)
 
 
 def _beside(

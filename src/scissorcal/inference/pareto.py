@@ -21,7 +21,8 @@ def smooth_weights(log_ratios: Array) -> tuple[Array, Array]:
 
     The largest 3 sqrt(n) ratios, a fifth of them at most, are replaced by quantiles of a
     generalised Pareto distribution that is fitted to them; its shape is k-hat, infinite where the
-    tail is too short to be fitted (Vehtari et al. 2024, JMLR 25:72). Ratios must be finite.
+    tail is too short to be fitted (Vehtari et al. 2024, JMLR 25:72). Ratios must be finite;
+    ValueError where they are not, or where there are none.
 
     >>> draws = np.random.default_rng(0).standard_normal(1000)
     >>> weights, k_hat = smooth_weights(0.1 * draws)
@@ -29,6 +30,8 @@ def smooth_weights(log_ratios: Array) -> tuple[Array, Array]:
     (1.0, True)
     """
     rows = np.atleast_2d(log_ratios)
+    if rows.size == 0 or not np.all(np.isfinite(rows)):
+        raise ValueError("importance ratios are smoothed where there are some, and all are finite")
     smoothed = [_smoothed(row) for row in rows]
     weights = np.stack([row for row, _ in smoothed]).reshape(np.shape(log_ratios))
     return weights, np.array([k_hat for _, k_hat in smoothed]).reshape(np.shape(log_ratios)[:-1])
@@ -78,4 +81,5 @@ def _fit_pareto(sample: Array) -> tuple[float, float]:
 def _pareto_quantiles(places: Array, shape: float, scale: float) -> Array:
     if abs(shape) < np.finfo(float).eps:
         return np.asarray(-scale * np.log1p(-places))
-    return np.asarray(scale * np.expm1(-shape * np.log1p(-places)) / shape)
+    with np.errstate(over="ignore"):  # an infinite quantile is cut to the largest ratio
+        return np.asarray(scale * np.expm1(-shape * np.log1p(-places)) / shape)

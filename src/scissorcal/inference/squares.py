@@ -212,6 +212,8 @@ class _Search:
     def fit_scale(self) -> None:
         """Multiply all standard deviations by what residuals call for, where parameters can."""
         z, _, by_mean, by_size = self.slopes()
+        if len(z) == 0:
+            return
         free = np.flatnonzero(~_moves(by_mean, z) & np.any(by_size != 0.0, axis=0))
         spread = float(np.sqrt(np.mean(z**2)))
         if len(free) == 0 or not 0.0 < spread < np.inf:

@@ -37,6 +37,10 @@ class SearchStatus(Enum):
         "The time allowed was used up before the search settled, so the optimum is not known: "
         "allow more time, or choose a simpler candidate model."
     )
+    ROUNDED = (
+        "The log-posterior is so large a number that rounding hides the differences that an "
+        "estimate rests on: check the data for extreme values, and the units and size of the noise."
+    )
     NOT_FINITE = (
         "The log-posterior is not a finite number right beside the optimum, so the optimum may lie "
         "on the edge of what the model can evaluate: check the data for gaps and extreme values."

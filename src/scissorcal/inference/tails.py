@@ -16,7 +16,8 @@ def tails_of(residuals: Array, share: float) -> float:
 
     Fitted by maximum likelihood over scale and degrees of freedom (Lange, Little and Taylor 1989,
     doi:10.1080/01621459.1989.10478852). ``share`` is the share of residuals that are independent;
-    tails count as heavy where they gain at least 5 in log-likelihood on that many.
+    tails count as heavy where they gain at least 5 in log-likelihood on that many. ValueError where
+    a residual is not finite.
 
     >>> rng = np.random.default_rng(0)
     >>> float(tails_of(rng.standard_normal(4000), 1.0))
@@ -26,10 +27,13 @@ def tails_of(residuals: Array, share: float) -> float:
     """
     from scipy.optimize import minimize
 
-    size = float(np.sqrt(np.mean(residuals**2)))
-    if size == 0.0:
+    if not np.all(np.isfinite(residuals)):
+        raise ValueError("residuals that are not finite numbers have no tails")
+    largest = float(np.max(np.abs(residuals), initial=0.0))
+    if largest == 0.0:
         return float(np.inf)
-    z = residuals / size
+    z = residuals / largest
+    z = z / np.sqrt(np.mean(z**2))
 
     def lost(point: Array) -> float:
         nu = float(np.exp(point[1]))

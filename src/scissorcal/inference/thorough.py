@@ -191,9 +191,11 @@ def rank_r_hat(draws: Array) -> float:
     """Rank-normalised split R-hat of one parameter, from draws of shape (ensembles, draws).
 
     The larger of the value for location and for scale (doi:10.1214/20-BA1221); 1 where all
-    ensembles agree.
+    ensembles agree. NaN where nothing tells: fewer than four draws each, or one value throughout.
     """
     half = draws.shape[1] // 2
+    if half < 2 or np.all(draws == draws.flat[0]):
+        return float("nan")
     split = np.concatenate([draws[:, :half], draws[:, -half:]])
     return max(_split_r_hat(split), _split_r_hat(np.abs(split - np.median(split))))
 
@@ -207,6 +209,8 @@ def _split_r_hat(draws: Array) -> float:
     count = draws.shape[1]
     within = scores.var(axis=1, ddof=1).mean()
     between = count * scores.mean(axis=1).var(ddof=1)
+    if within <= np.finfo(float).eps * between:
+        return float("inf") if between > 0.0 else 1.0
     return float(np.sqrt((between / within + count - 1) / count))
 
 
@@ -271,13 +275,21 @@ def _advance(
         walkers, size, many or log_posterior, moves=moves, vectorize=many is not None
     )
     state = emcee.State(walk.coords, log_prob=walk.heights, random_state=walk.random_state)
-    for last in sampler.sample(
-        state,
-        iterations=BLOCK // walk.thin,
-        thin_by=walk.thin,
-        skip_initial_state_check=True,
-    ):
-        state = last
+    try:
+        for last in sampler.sample(
+            state,
+            iterations=BLOCK // walk.thin,
+            thin_by=walk.thin,
+            skip_initial_state_check=True,
+        ):
+            state = last
+    except ValueError as error:
+        if np.all(np.isfinite(state.coords)) and "infinite" not in str(error):
+            raise
+        raise NotFiniteError(
+            "The walkers ran off to infinity, because neither data nor prior hold a parameter: "
+            "give it a prior, or record what excites it."
+        ) from None
     chain, thin = np.concatenate([walk.chain, sampler.get_chain()]), walk.thin
     if len(chain) >= MOST_STORED and thin < BLOCK:
         chain, thin = chain[1::2], 2 * thin

@@ -34,6 +34,7 @@ from scissorcal.kernel.messages import (
 )
 from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
 from scissorcal.kernel.presliding import presliding_path
+from scissorcal.kernel.rates import estimated_rates
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
     Mode,
@@ -45,6 +46,7 @@ from scissorcal.kernel.servo import (
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.stop_reason import StopReason
+from scissorcal.kernel.table16 import Row16, Table16
 from scissorcal.kernel.tables import ModelTables, Table
 from scissorcal.kernel.watching import WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
@@ -79,6 +81,7 @@ __all__ = [
     "Mode",
     "ModelTables",
     "PassivityConfig",
+    "Row16",
     "SampleFlag",
     "Servo",
     "ServoConfig",
@@ -89,6 +92,7 @@ __all__ = [
     "StepOutput",
     "StopReason",
     "Table",
+    "Table16",
     "WatchConfig",
     "ask_for_slice",
     "c_sources",
@@ -98,6 +102,7 @@ __all__ = [
     "decode",
     "encode",
     "encode_frame",
+    "estimated_rates",
     "lock_memory",
     "presliding_path",
     "run_loop",

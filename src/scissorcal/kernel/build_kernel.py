@@ -13,6 +13,7 @@ HEADERS = (
     "sc_messages.h",
     "sc_wire.h",
     "sc_table.h",
+    "sc_table16.h",
     "sc_edge.h",
     "sc_model.h",
     "sc_motion.h",

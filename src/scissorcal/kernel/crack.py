@@ -57,6 +57,23 @@ class CrackLaw:
     tough_first: float
     tough_step: float
 
+    def __post_init__(self) -> None:
+        """Refuse with ValueError what no blade and no sheet are."""
+        tough = np.asarray(self.tough)
+        positive = (self.tick_s, self.tough_step)
+        rules = (
+            (self.moving_blades in (1, 2), "moving_blades is 1 or 2"),
+            (0.0 <= self.kappa <= 1.0, "kappa lies between 0 and 1"),
+            (all(0.0 < one < np.inf for one in positive), "tick_s and tough_step are positive"),
+            (0.0 <= self.damping_s_per_m < np.inf, "damping_s_per_m is not negative"),
+            (bool(np.isfinite([self.upper_face_m, self.tough_first]).all()), "places are finite"),
+            (tough.size > 0 and bool(np.all((tough >= 0.0) & (tough < np.inf))),
+             "tough has an energy or more, none of them negative"),
+        )  # fmt: skip
+        for holds, rule in rules:
+            if not holds:
+                raise ValueError(f"This is no law of a crack: {rule}, and all numbers are finite.")
+
 
 @dataclass(frozen=True)
 class CrackPath:
@@ -81,12 +98,14 @@ def walk_crack(law: CrackLaw, opening: Array, advance: Array, place: float = 0.0
 
     ``place`` (m, sheet's frame) is where the crack stands before. Between samples the motion is
     linear, and starts of the crack lie at their exact time. ValueError where the arrays differ in
-    length or are empty.
+    length, are empty, or hold a number that is not finite.
     """
     theta = np.ascontiguousarray(opening, dtype=np.float64)
     moved = np.ascontiguousarray(advance, dtype=np.float64)
     if theta.shape != moved.shape or theta.ndim != 1 or len(theta) == 0:
         raise ValueError("opening and advance must be arrays of one length, not empty")
+    if not (np.isfinite(place) and np.isfinite(theta).all() and np.isfinite(moved).all()):
+        raise ValueError("opening, advance and place must be finite numbers")
     struct, keep = _struct(law)
     books = ffi.new("sc_crack_books *")
     books.place = place

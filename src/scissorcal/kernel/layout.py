@@ -1,10 +1,14 @@
 """NumPy's view of the C core's structs, read off the compiled declarations."""
 
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scissorcal.kernel._kernel import ffi
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _NUMBERS = {
     "float": "<f4",
@@ -30,3 +34,13 @@ def dtype_of(struct: str) -> np.dtype[Any]:
             "itemsize": ffi.sizeof(kind),
         }
     )
+
+
+def fill_struct(struct: Any, values: "DataclassInstance") -> None:
+    """Copy a dataclass into the C struct of the same field names, structs within it as well."""
+    for field in fields(values):
+        value = getattr(values, field.name)
+        if is_dataclass(value) and not isinstance(value, type):
+            fill_struct(getattr(struct, field.name), value)
+        else:
+            setattr(struct, field.name, value)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.layout import fill_struct
 from scissorcal.kernel.messages import ConfigEcho
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
@@ -30,6 +31,8 @@ from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
 
 RING_SAMPLES = int(lib.SC_RING_SAMPLES)
+STALL_TICKS = int(lib.SC_TICKS_OF_A_STALL)
+"""A longer pause between two states, by the host's clock, is a stall."""
 _BINS = int(lib.SC_HISTOGRAM_BINS)
 _PER_OCTAVE = int(lib.SC_BINS_PER_OCTAVE)
 
@@ -143,7 +146,7 @@ class LoopBlock(ServoView):
         block = cls(fd, size)
         lib.sc_block_init(block.pointer, reference_capacity)
         block.pointer.silence_limit_ms = silence_limit_ms
-        config.fill(block.pointer.config)
+        fill_struct(block.pointer.config, config)
         if tables is not None:
             _store_tables(block.pointer, tables)
         return block
@@ -297,6 +300,8 @@ def _store_tables(block: Any, tables: ModelTables) -> None:
     model = ffi.new("sc_model *")
     if not lib.sc_block_model(block, model):
         raise ValueError("The kernel refuses these tables: their numbers do not fit float32.")
+    lib.sc_model_edge_slopes(model)
+    block.model.flattest, block.model.steepest = model.flattest, model.steepest
     block.model.release_falls = lib.sc_model_release_falls(model)
 
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +30,6 @@ class PassivityConfig:
             value = getattr(self, field.name)
             if not 0.0 <= value < math.inf:
                 raise ValueError(f"{field.name} = {value} is not usable: give a number from 0 on.")
-
-    def fill(self, struct: Any) -> None:
-        """Copy every number into the C struct of the same field names."""
-        for field in fields(self):
-            setattr(struct, field.name, getattr(self, field.name))
 
 
 UNWATCHED_ENERGY = PassivityConfig()

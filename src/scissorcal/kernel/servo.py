@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.lag import LagCounts
-from scissorcal.kernel.layout import dtype_of
+from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
 from scissorcal.kernel.stop_reason import StopReason
@@ -22,6 +22,11 @@ SAMPLE_DTYPE = dtype_of("sc_sample")
 """One frame's telemetry, as in the loop's ring buffer and in a recording: 80 bytes."""
 
 U32 = 0xFFFFFFFF
+
+STUCK_FRAMES = int(lib.SC_STUCK_UNTIL_STOP)
+"""States in a row at which the device's clock stands still, until it is taken for stuck."""
+LEAP_RATES = int(lib.SC_LEAP_RATES)
+"""Times the limit of the rate: no motion between two states is taken for one if it is faster."""
 
 WIDEST_OPENING = 3.125
 """rad; just within half a turn, and the same number in 32 bits."""
@@ -126,13 +131,6 @@ class ServoConfig:
         if not self.opening_low < self.opening_high:
             raise ValueError("opening_low must be below opening_high.")
 
-    def fill(self, struct: Any) -> None:
-        """Copy every number into the C struct of the same field names."""
-        for field in self._numbers():
-            setattr(struct, field.name, getattr(self, field.name))
-        self.watch.fill(struct.watch)
-        self.passivity.fill(struct.passivity)
-
     def _numbers(self) -> list[Field[Any]]:
         return [field for field in fields(self) if field.name not in ("watch", "passivity")]
 
@@ -225,7 +223,7 @@ class Servo(ServoView):
     def __init__(self, tables: ModelTables | None, config: ServoConfig) -> None:
         self.config = config
         self._config = ffi.new("sc_servo_config *")
-        config.fill(self._config)
+        fill_struct(self._config, config)
         self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
         self._orders = ffi.new("sc_orders *")
         self._reference = ffi.new("sc_reference *")

@@ -126,7 +126,8 @@ class Kernel:
 
         Where the blades press harder at ``contact`` than the material bears, the crack first
         runs outwards to m g tan(psi) = J_c h. Neither needs nor changes the crack's state.
-        Raises ValueError for arguments that are not finite.
+        Raises ValueError for arguments that are not finite. NaN where a step would be
+        StepFlag.INVALID: beyond half a turn, or where the edge leans back.
         """
         inputs = _float32_columns(opening, rate, contact)
         if not all(np.isfinite(column).all() for column in inputs):

@@ -192,6 +192,7 @@ def model_struct(tables: ModelTables) -> tuple[Any, tuple[Any, ...]]:
     fill_numbers(model, tables)
     if not lib.sc_model_is_sound(model):
         raise ValueError("The kernel refuses these tables: their numbers do not fit float32.")
+    lib.sc_model_edge_slopes(model)
     model.release_falls = lib.sc_model_release_falls(model)
     return model, tuple(keep)
 

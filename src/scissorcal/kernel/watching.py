@@ -23,9 +23,11 @@ class WatchConfig:
     their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
     ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far while the
     measured place stays exactly the same, the opening under a torque of at least ``still_torque``
-    (N m). Without a reference: torques of motor and hand differ by ``still_torque`` for half a
-    second, and the opening stays exactly the same; it needs ``handle_radius`` (m), 0 without a
-    force sensor, which shows ``handle_zero`` (N) without a hand.
+    (N m). Without a reference: torques of motor and hand differ by ``rest_torque`` (N m) and by
+    ``rest_share`` of the smaller of the two, and the opening stays exactly the same for half a
+    second; it needs ``handle_radius`` (m), 0 without a force sensor, which shows ``handle_zero``
+    (N) without a hand. ``jitter_s``: the opening stays the same so long, of an encoder that
+    jitters.
     ``least_ratio``, ``most_ratio``: measured over commanded torque, where torques of at least
     ``ratio_torque`` (N m) act. ``clock_share``, ``host_clock_share``: device clock against its
     ticks, and against this computer. Raises ValueError for a number that is not finite or below 0,
@@ -41,6 +43,9 @@ class WatchConfig:
     still_rad: float = 0.0
     still_m: float = 0.0
     still_torque: float = 0.0
+    rest_torque: float = 0.0
+    rest_share: float = 0.0
+    jitter_s: float = 0.0
     least_ratio: float = 0.0
     most_ratio: float = 0.0
     ratio_torque: float = 0.0
@@ -62,11 +67,6 @@ class WatchConfig:
                 )
         if self.ratio_torque > 0 and not self.least_ratio < 1 < self.most_ratio:
             raise ValueError("least_ratio must be below 1 and most_ratio above 1.")
-
-    def fill(self, struct: Any) -> None:
-        """Copy every number into the C struct of the same field names."""
-        for field in fields(self):
-            setattr(struct, field.name, getattr(self, field.name))
 
 
 NO_WATCHES = WatchConfig()

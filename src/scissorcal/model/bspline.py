@@ -37,7 +37,8 @@ def _evaluate(weights: ArrayLike, start: float, end: float, at: ArrayLike, slope
         raise ValueError("a cubic spline needs at least four weights, and its end after its start")
     width = (end - start) / pieces
     place = np.clip((s - start) / width, 0.0, float(pieces))
-    piece = np.minimum(place.astype(np.int64), pieces - 1)
+    known = np.where(np.isnan(place), 0.0, place)  # NaN stays NaN by t
+    piece = np.minimum(known.astype(np.int64), pieces - 1)
     t = place - piece
     rates = _basis_slope(t)
     used = _four(w, piece)

@@ -13,8 +13,27 @@ Array = NDArray[np.float64]
 
 SETTLING_STEPS = 200
 STEEPEST_START = 1e-9
+NEARLY_EQUAL = 0.05
+"""Share of an indentation up to which a cycle is averaged over the force, not from energies."""
+
+_GAUSS = (
+    0.5 * (1.0 + np.polynomial.legendre.leggauss(8)[0]),
+    0.5 * np.polynomial.legendre.leggauss(8)[1],
+)
 FARTHEST = 100.0
 """Blade lengths beyond which no contact is looked for: a bent edge may have none at all."""
+
+ROUNDING = 1e-16
+SETTLED = 1e-14
+CLOSE = 1e-13
+"""Newton ends at a last step of the share ``ROUNDING`` of the station, or where steps below
+``SETTLED`` (m) shrink no more; above ``CLOSE`` blade lengths it is not taken."""
+
+PLACES = 257
+HALVINGS = 60
+BETWEEN = tuple((np.arange(8) + 0.5) / 8)
+"""Places along the blade among which the first interval is looked for, and how often it is halved;
+shares of a crack's run at which its release is looked at."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +79,10 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
 
     With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`mean_share`.
     Solved along the edge by Newton steps on y(s) = y_top - delta_c(psi(s)), one step for a
-    straight edge. Where the edges are parallel or open towards the tip (tan(psi) <= 0) no force
-    along the cut arises, the crack cannot advance, and the result is -inf.
+    straight edge; along a bent one where they do not end, by halving the first interval in which
+    the release falls to that energy, from the pivot outwards. Where the edges are parallel or open
+    towards the tip (tan(psi) <= 0) no force along the cut arises, the crack cannot advance, and the
+    result is -inf.
     """
     if cutting.fracture_energy is None:
         raise ValueError("nothing is cut here: settled_contact needs a fracture energy")
@@ -69,26 +90,107 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     beta = theta / cutting.moving_blades
     sine, cosine = np.sin(beta), np.cos(beta)
     edge = cutting.edge
-    energy = np.asarray(cutting.fracture_energy)
-    shape = np.broadcast_shapes(theta.shape, energy.shape, np.shape(cutting.kappa), edge.shape)
+    shape = np.broadcast_shapes(
+        theta.shape, np.shape(cutting.fracture_energy), np.shape(cutting.kappa), edge.shape
+    )
     station = np.full(shape, 0.5 * edge.length_m)
     far = FARTHEST * edge.length_m
-    cuts = np.ones(shape, dtype=bool)
-    for _ in range(1 if edge.straight else SETTLING_STEPS):
-        taper = edge.slope_at(station)
-        slope = (sine + taper * cosine) / (cosine - taper * sine)
-        cuts = slope > STEEPEST_START
-        peak = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
-        force = peak * mean_share(cutting, peak)
-        target = cutting.upper_face_m - cutting.response.indentation_at(force)
-        height = station * sine + edge.offset_at(station) * cosine
-        rise = np.where(cuts, sine + taper * cosine, 1.0)
-        step = np.where(cuts, (target - height) / rise, 0.0)
-        station = np.clip(station + step, -far, far)
-        if np.all(np.abs(step) < 1e-14):
-            break
-    x = station * cosine - edge.offset_at(station) * sine
+    moved, still = np.full(shape, np.inf), np.zeros(shape, dtype=bool)
+    with np.errstate(all="ignore"):
+        for _ in range(1 if edge.straight else SETTLING_STEPS):
+            gap, rise = _gap(cutting, station, sine, cosine)
+            cuts = np.isfinite(gap)
+            step = np.where(cuts, gap / np.where(cuts, rise, 1.0), 0.0)
+            station = np.clip(station + step, -far, far)
+            moved, before = np.abs(step), moved
+            still |= (moved < SETTLED) & (moved > 0.5 * before)  # what is left is rounding
+            if np.all(still | (moved <= ROUNDING * np.abs(station))):
+                break
+        if not edge.straight:
+            gap, _ = _gap(cutting, station, sine, cosine)
+            settled = cuts & (np.abs(step) < CLOSE * edge.length_m) & np.isfinite(gap)
+            if not np.all(settled):
+                slow = _settled_by_halving(cutting, sine, cosine, shape)
+                station = np.where(settled, station, slow)
+                cuts = settled | np.isfinite(slow)
+    x = station * cosine - edge.offset_at(np.where(cuts, station, 0.0)) * sine
     return np.where(cuts, x, -np.inf)
+
+
+def contact_after_run(cutting: Cutting, opening: ArrayLike, contact: ArrayLike) -> Array:
+    """Contact after the crack has run outwards from ``contact`` to where it rests.
+
+    It runs if the release at ``contact`` exceeds the mean fracture energy, to the first place
+    outwards that does not. Along a straight edge, and along any whose slope falls outwards, that
+    is the larger of ``contact`` and :func:`settled_contact`. Elsewhere the release may rise again
+    along the blade: then the places between are looked at, too. NaN where no edge stands over
+    ``contact``.
+    """
+    start = np.asarray(contact, dtype=np.float64)
+    settled = settled_contact(cutting, opening)
+    edge = cutting.edge
+    if edge.straight:
+        return np.asarray(np.maximum(start, settled))
+    beta = np.asarray(opening, dtype=np.float64) / cutting.moving_blades
+    near = edge_height(edge, start, beta).station
+    falls = edge.family == "arc" and bool(np.all(np.asarray(edge.curvature_per_m) <= 0.0))
+    sine, cosine = np.sin(beta), np.cos(beta)
+    with np.errstate(all="ignore"):
+        far = edge_height(edge, np.where(np.isfinite(settled), settled, start), beta).station
+        runs = (_gap(cutting, near, sine, cosine)[0] > 0.0) & (near < edge.length_m)
+        first = runs & (far > near)
+        for share in () if falls else BETWEEN:
+            first &= _gap(cutting, near + share * (far - near), sine, cosine)[0] > 0.0
+        place = np.where(runs, settled, start)
+        if np.any(runs & ~first):
+            shape = np.broadcast_shapes(place.shape, near.shape)
+            found = _settled_by_halving(cutting, sine, cosine, shape, near)
+            x = found * cosine - edge.offset_at(found) * sine
+            place = np.where(runs & ~first, x, place)
+    return np.where(np.isnan(near), np.nan, place)
+
+
+def _gap(cutting: Cutting, station: Array, sine: Array, cosine: Array) -> tuple[Array, Array]:
+    """How much deeper (m) the edge sits than where its release pays for the crack, and its rise.
+
+    The gap is -inf where nothing is released: the edge is parallel or opens outwards, or is
+    upright. The rise is dy/ds.
+    """
+    taper = cutting.edge.slope_at(station)
+    run, rise = cosine - taper * sine, sine + taper * cosine
+    slope = rise / run
+    cuts = (run > 0.0) & (slope > STEEPEST_START)
+    energy = np.asarray(cutting.fracture_energy)
+    peak = energy / (cutting.moving_blades * np.where(cuts, slope, 1.0))
+    target = cutting.response.indentation_at(peak * mean_share(cutting, peak))
+    height = station * sine + cutting.edge.offset_at(station) * cosine
+    return np.where(cuts, cutting.upper_face_m - target - height, -np.inf), rise
+
+
+def _settled_by_halving(
+    cutting: Cutting, sine: Array, cosine: Array, shape: tuple[int, ...], start: ArrayLike = 0.0
+) -> Array:
+    """The first station outwards from ``start`` at which the gap closes; NaN if open nowhere.
+
+    Where it stays open up to the tip, the tip: material there is out of reach.
+    """
+    length = cutting.edge.length_m
+    low, high = np.full(shape, np.nan), np.full(shape, np.nan)
+    was_open = np.zeros(shape, dtype=bool)
+    inner = np.asarray(start, dtype=np.float64)
+    for share in np.linspace(0.0, 1.0, PLACES):
+        at = np.broadcast_to(inner + share * (length - inner), shape)
+        opened = _gap(cutting, at, sine, cosine)[0] > 0.0
+        closes = was_open & ~opened & np.isnan(high)
+        low = np.where(opened & np.isnan(high), at, low)
+        high = np.where(closes, at, high)
+        was_open = opened
+    high = np.where(np.isnan(high), np.where(was_open, length, np.nan), high)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        opened = _gap(cutting, middle, sine, cosine)[0] > 0.0
+        low, high = np.where(opened, middle, low), np.where(opened, high, middle)
+    return np.asarray(high)
 
 
 def torque_at(
@@ -101,7 +203,7 @@ def torque_at(
     """
     theta = np.asarray(opening, dtype=np.float64)
     x = np.asarray(contact, dtype=np.float64)
-    reached = np.isfinite(x)
+    reached = ~np.isneginf(x)
     view = edge_height(cutting.edge, np.where(reached, x, 0.0), theta / cutting.moving_blades)
     force = cutting.response.force_at(np.where(reached, cutting.upper_face_m - view.height, -1.0))
     if rate is not None:
@@ -136,12 +238,27 @@ def mean_share(cutting: Cutting, peak: ArrayLike) -> Array:
     if np.all(kappa >= 1.0):
         return np.asarray(1.0)
     response = cutting.response
-    if response.family == "power" and np.all(kappa < 1.0 - 1e-6):
-        power = np.asarray(response.exponent)
-        low = kappa ** (1.0 / power)
-        return np.asarray((1.0 - kappa * low) / ((power + 1.0) * (1.0 - low)))
-    force = np.asarray(peak, dtype=np.float64)
-    bottom, top = response.indentation_at(kappa * force), response.indentation_at(force)
-    length = np.maximum(top - bottom, 1e-30)
-    mean = (response.energy_at(top) - response.energy_at(bottom)) / length
-    return np.where(top - bottom <= 1e-12 * top, 1.0, mean / force)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if response.family == "power":
+            power = np.asarray(response.exponent)
+            fall = np.log(kappa) / power
+            share = np.expm1((power + 1.0) * fall) / ((power + 1.0) * np.expm1(fall))
+        else:
+            force = np.asarray(peak, dtype=np.float64)
+            bottom, top = response.indentation_at(kappa * force), response.indentation_at(force)
+            share = _mean_force(response, bottom, top) / force
+    return np.where(kappa >= 1.0, 1.0, share)
+
+
+def _mean_force(response: Response, bottom: Array, top: Array) -> Array:
+    """Mean force (N) between two indentations, also where they are hardly apart.
+
+    A difference of energies loses as many digits as they share; then the force itself is averaged,
+    by the eight points of Gauss and Legendre.
+    """
+    width = top - bottom
+    apart = (response.energy_at(top) - response.energy_at(bottom)) / width
+    near = np.zeros(())
+    for place, weight in zip(*_GAUSS, strict=True):
+        near = near + weight * response.force_at(bottom + place * width)
+    return np.where(width > NEARLY_EQUAL * top, apart, near)

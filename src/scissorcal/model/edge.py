@@ -2,17 +2,24 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.model.bspline import spline_slope, spline_value
+from scissorcal.model.bspline import FEWEST, spline_slope, spline_value
 
 Array = NDArray[np.float64]
 Family = Literal["line", "arc", "cubic", "spline"]
 
 NEWTON_STEPS = 30
+HALVINGS = 64
+CLOSE = 1e-9
+"""Share of the place within which Newton's last step must stay."""
+
+STEEPNESS_PLACES = 8
+"""Places in each interval of a spline at which its steepest slope is looked for."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,19 @@ class Edge:
         scalars = (self.offset_m, self.taper_rad, self.curvature_per_m, self.bend_per_m2)
         shapes = [np.shape(value) for value in scalars]
         return np.broadcast_shapes(*shapes, np.shape(self.spline_m)[:-1])
+
+    @cached_property
+    def steepest(self) -> Array:
+        """Largest slope e'(s) on the blade, from the pivot to the tip; shape of the parameters."""
+        places: list[float | Array] = [0.0, self.length_m]
+        if self.family == "spline":
+            pieces = STEEPNESS_PLACES * (np.shape(self.spline_m)[-1] - FEWEST + 1)
+            places += np.linspace(0.0, self.length_m, pieces + 1).tolist()
+        elif np.any(self.bend_per_m2):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                turn = np.nan_to_num(-np.asarray(self.curvature_per_m) / self.bend_per_m2)
+            places.append(np.clip(turn, 0.0, self.length_m))
+        return np.asarray(np.max(np.stack([self.slope_at(s) for s in places]), axis=0))
 
     def offset_at(self, station: ArrayLike) -> Array:
         """Offset e(s) in metres; ``station`` broadcasts with the parameters."""
@@ -174,21 +194,30 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
     Solves x = s cos(beta) - e(s) sin(beta) for s by Newton steps, which are exact at once for a
     straight edge; phi = s sin(beta) + e(s) cos(beta). ``contact`` (m) and ``blade_angle`` (rad)
     broadcast. Beyond the blade's ends the edge is continued smoothly; the caller decides what
-    a contact beyond the tip means. An edge bent so far that it stands upright before it reaches
-    ``contact`` has no point over it: the result is then finite and means nothing.
+    a contact beyond the tip means. All fields are NaN where no point of the edge, or not one alone,
+    stands over ``contact``: where the edge is upright or leans back anywhere on the blade, or at
+    the place itself (dx/ds <= 0).
+
+    >>> float(edge_height(Edge("line", 0.0, 0.0, 0.07), 0.02, 2.0).height)
+    nan
     """
     x, beta = np.broadcast_arrays(
         np.asarray(contact, dtype=np.float64), np.asarray(blade_angle, dtype=np.float64)
     )
     sine, cosine = np.sin(beta), np.cos(beta)
-    station = _station_over(edge, x, sine, cosine)
-    offset, taper = edge.offset_at(station), edge.slope_at(station)
-    height = station * sine + offset * cosine
-    slope = (sine + taper * cosine) / (cosine - taper * sine)
-    return EdgeView(height, slope, station, x + height * slope)
+    with np.errstate(all="ignore"):
+        station = _station_over(edge, x, sine, cosine)
+        offset, taper = edge.offset_at(station), edge.slope_at(station)
+        run = cosine - taper * sine
+        stands = (run > 0.0) & (cosine - edge.steepest * sine > 0.0)
+        station = np.where(stands, station, np.nan)
+        height = station * sine + offset * cosine
+        slope = np.where(stands, (sine + taper * cosine) / run, np.nan)
+        return EdgeView(height, slope, station, x + height * slope)
 
 
 def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
+    """The station over x; NaN where the search along a bent edge does not end."""
     if edge.straight:
         tangent = np.tan(edge.taper_rad)
         straight: Array = (x + edge.offset_m * sine) / (cosine - tangent * sine)
@@ -201,8 +230,28 @@ def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
         step = residual / (cosine - edge.slope_at(station) * sine)
         station = station - step
         if np.all(np.abs(step) <= 1e-15 + 1e-14 * np.abs(station)):
-            break
-    return station
+            return station
+    closed = np.abs(step) <= CLOSE * (np.abs(station) + edge.length_m)
+    if np.all(closed):
+        return station
+    return np.where(closed, station, _station_by_halving(edge, x, sine, cosine))
+
+
+def _station_by_halving(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:
+    """The station over x on the blade and as far beyond both ends, where x rises with it."""
+    low, high = -edge.length_m, 2.0 * edge.length_m
+
+    def away(station: Array) -> Array:
+        return np.asarray(station * cosine - edge.offset_at(station) * sine - x)
+
+    shape = np.broadcast_shapes(x.shape, edge.shape)
+    below, above = np.full(shape, low), np.full(shape, high)
+    within = (away(below) <= 0.0) & (away(above) >= 0.0)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (below + above)
+        beyond = away(middle) > 0.0
+        below, above = np.where(beyond, below, middle), np.where(beyond, middle, above)
+    return np.where(within, 0.5 * (below + above), np.nan)
 
 
 def _plain(value: Array) -> float | Array:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Bounds = tuple[Array, Array]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PLACES, _SHARES = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
@@ -45,6 +46,37 @@ class LogSpline:
         below = n + (first + last - 2.0 * n) * mix
         above = last * t * t + 2.0 * n * mix + first * (1.0 - t) ** 2
         return np.asarray(n * n * above / (below * below))
+
+    def derivative_bounds(self, low: Array, high: Array) -> tuple[Bounds, Bounds]:
+        """Bounds of dy/dv and of d2y/dv2 over [low, high], which have no knot inside.
+
+        Between knots dy/dv = n^2 u / b^2 and d2y/dv2 = n^2 (u' b - 2 u b') / (b^3 width), where u
+        and b are parabolas in the share t of the interval. Each is enclosed by itself.
+        """
+        index, middle = self._place(0.5 * (low + high))
+        n, first, last = self._around(index)
+        width = np.diff(self.knots)[index]
+        ends = [np.clip((v - self.knots[index]) / width, 0.0, 1.0) for v in (low, high)]
+        twist = first + last - 2.0 * n
+        bend = 0.25 * np.abs(twist) * (ends[1] - ends[0]) ** 2
+        above = _range(
+            [last * t * t + 2 * n * t * (1 - t) + first * (1 - t) ** 2 for t in ends], bend
+        )
+        below = _range([n + twist * t * (1 - t) for t in ends], bend)
+        rise = _range([2.0 * (last * t + n * (1 - 2 * t) - first * (1 - t)) for t in ends])
+        fall = _range([twist * (1 - 2 * t) for t in ends])
+        slope = n * n * above[0] / below[1] ** 2, n * n * above[1] / below[0] ** 2
+        gains = _products(rise, below)
+        losses = _products(above, fall)
+        top = gains[0] - 2.0 * losses[1], gains[1] - 2.0 * losses[0]
+        shrink = n * n / (below[1] ** 3 * width), n * n / (below[0] ** 3 * width)
+        straight = (middle == 0.0) | (middle == 1.0)  # beyond the knots
+        tail = np.where(middle == 0.0, self.exponents[..., 0], self.exponents[..., -1])
+        low_bend, high_bend = _products(top, shrink)
+        return (
+            (np.where(straight, tail, slope[0]), np.where(straight, tail, slope[1])),
+            (np.where(straight, 0.0, low_bend), np.where(straight, 0.0, high_bend)),
+        )
 
     def inverse(self, y: Array) -> Array:
         """The v at which y is reached: the root of a quadratic between two knots."""
@@ -147,3 +179,14 @@ def _pick(values: Array, index: Integers) -> Array:
     shape = np.broadcast_shapes(values.shape[:-1], index.shape)
     wide = np.broadcast_to(values, (*shape, values.shape[-1]))
     return np.take_along_axis(wide, np.broadcast_to(index, shape)[..., None], axis=-1)[..., 0]
+
+
+def _range(ends: list[Array], spare: Array | float = 0.0) -> Bounds:
+    """Bounds from values at both ends, and how far a parabola may leave them in between."""
+    return np.minimum(*ends) - spare, np.maximum(*ends) + spare
+
+
+def _products(one: Bounds, other: Bounds) -> Bounds:
+    """Bounds of a product."""
+    ends = [a * b for a in one for b in other]
+    return np.minimum.reduce(ends), np.maximum.reduce(ends)

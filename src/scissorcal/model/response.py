@@ -7,12 +7,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.model.log_spline import LogSpline
+from scissorcal.model.log_spline import Bounds, LogSpline
 
 Array = NDArray[np.float64]
 
 LARGEST_ARGUMENT = 700.0
 """exp() overflows a float64 just above this; beyond it the exponential response is held."""
+
+SERIES_UP_TO = 0.5
+SERIES_TERMS = 15
+"""0.5^15 / 15! is 2e-17 of the sum's first term, 0.5^2 / 2."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class Response:
             power = np.asarray(self.exponent) + 1.0
             return np.asarray(self.force * self.reference_m * u**power / power)
         argument = self._argument(u)
-        shape = (np.expm1(argument) - argument) / np.expm1(self.exponent)
+        shape = _beyond_line(argument) / np.expm1(self.exponent)
         return np.asarray(self.force * self.reference_m * shape / self.exponent)
 
     def stiffness_at(self, indentation: ArrayLike) -> Array:
@@ -90,6 +94,10 @@ class Response:
         grown = np.log1p(ratio * np.expm1(self.exponent))
         return np.asarray(self.reference_m * grown / self.exponent)
 
+    def log_bounds(self, low: Array, high: Array) -> tuple[Bounds, Bounds]:
+        """Bounds of y' and y'' of a spline between logarithms, see :class:`LogSpline`."""
+        return self._spline.derivative_bounds(low, high)
+
     @cached_property
     def _spline(self) -> LogSpline:
         steps = np.cumsum(np.asarray(self.shape, dtype=np.float64), axis=-1)
@@ -103,6 +111,16 @@ class Response:
 
     def _argument(self, relative: Array) -> Array:
         return np.minimum(self.exponent * relative, LARGEST_ARGUMENT)
+
+
+def _beyond_line(a: Array) -> Array:
+    """exp(a) - 1 - a for a >= 0; where that would cancel, its series, to 1e-16 of it."""
+    small = np.minimum(a, SERIES_UP_TO)
+    term = total = 0.5 * small**2
+    for power in range(3, SERIES_TERMS):
+        term = term * small / power
+        total = total + term
+    return np.where(a <= SERIES_UP_TO, total, np.expm1(a) - a)
 
 
 def _logarithm(x: Array) -> Array:

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
 from scissorcal.identity import bytes_digest
+from scissorcal.kernel import Row16, Table, Table16
 from scissorcal.package.manifest import (
     FORMAT,
     LARGEST_MEMBER,
@@ -29,6 +30,8 @@ from scissorcal.package.manifest import (
     canonical,
     content_hash,
 )
+from scissorcal.package.table_record import StoredRow
+from scissorcal.package.tables import Rows
 
 MANIFEST_FILE = "manifest.json"
 LARGEST_ARCHIVE = 16_000_000
@@ -75,13 +78,15 @@ def archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         _add(archive, MANIFEST_FILE, manifest.model_dump_json(indent=2).encode("utf-8"))
         for member in manifest.members:
-            _add(archive, member.file, array_bytes(arrays[member.file]))
+            stored = _stored(arrays[member.file], member.rows)
+            _add(archive, member.file, array_bytes(stored))
     return buffer.getvalue()
 
 
 def read_archive(path: Path) -> tuple[Manifest, dict[str, NDArray[Any]]]:
     """Read and check a package: its manifest, and its arrays by file name.
 
+    Tables in 16-bit numbers are given as the float32 that a kernel decodes from them.
     Raises MissingError where there is no file, and InputError naming file, member and remedy where
     it is no package, or anything in it is not as its manifest states.
     """
@@ -113,17 +118,38 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def member_of(file: str, array: NDArray[Any]) -> Member:
-    """The manifest's entry of one array."""
-    data = array_bytes(array)
-    dtype = array.dtype.newbyteorder("<").str
+def member_of(file: str, array: NDArray[Any], rows: Rows | None = None) -> Member:
+    """The manifest's entry of one array; ``rows`` say how a table goes into 16-bit numbers.
+
+    ValueError where the array holds what such numbers cannot.
+    """
+    stored_rows = None
+    if rows is not None:
+        first, second, third = (StoredRow(offset=row.offset, scale=row.scale) for row in rows)
+        stored_rows = (first, second, third)
+    stored = _stored(array, stored_rows)
+    data = array_bytes(stored)
     return Member(
         file=file,
-        dtype="<f4" if dtype == "<f4" else "<f8",
+        dtype=_DTYPES[stored.dtype.newbyteorder("<").str],
         shape=(array.shape[0], array.shape[1]),
         bytes=len(data),
         sha256=bytes_digest(data),
+        rows=stored_rows,
     )
+
+
+_DTYPES: dict[str, Literal["<f4", "<f8", "<i2"]] = {"<f4": "<f4", "<f8": "<f8", "<i2": "<i2"}
+
+
+def _stored(array: NDArray[Any], rows: tuple[StoredRow, ...] | None) -> NDArray[Any]:
+    """An array as the file holds it."""
+    return array if rows is None else Table16.of(Table(*array), _rows16(rows)).numbers
+
+
+def _rows16(rows: tuple[StoredRow, ...]) -> Rows:
+    first, second, third = (Row16(row.offset, row.scale) for row in rows)
+    return first, second, third
 
 
 def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
@@ -246,6 +272,9 @@ def _read_member(
         raise InputError(f"{where} was changed: it does not have the hash that is stated. {REMEDY}")
     try:
         array = _parse_array(data, member)
+        if member.rows is not None:
+            table = Table16(array, _rows16(member.rows)).decoded()
+            array = np.stack([table.x, table.y, table.slope])
     except (ValueError, SyntaxError, TypeError, KeyError) as error:
         raise InputError(
             f"{where} is not an array as the manifest states: {error}. {REMEDY}"

@@ -50,6 +50,38 @@ class Deviation:
     points: int
 
 
+@dataclass(frozen=True)
+class ExactTorque:
+    """The exact model's torque at places of a scene, within the limit: what tables are held to.
+
+    ``torque`` (n,) is 0 where the model itself jumps, which ``clear`` (n,) says; nothing is
+    compared there.
+    """
+
+    points: Points
+    torque: Array
+    clear: NDArray[np.bool_]
+    limit: float
+
+    @classmethod
+    def at(cls, model: ExactModel, points: Points, limit: float) -> "ExactTorque":
+        """Evaluate a model at points; ``limit`` in N m is the largest torque that is rendered."""
+        place = model.settled(points.opening, points.contact)
+        clear = _clear(model, points, place)
+        torque = model.torque_settled(points.opening, points.opening_rate, place)
+        return cls(points, np.where(clear, np.clip(torque, -limit, limit), 0.0), clear, limit)
+
+    def away(self, torque: Array) -> Array:
+        """How far another torque (n,) at these places is from the exact one, in N m."""
+        other = np.where(self.clear, np.clip(torque, -self.limit, self.limit), 0.0)
+        return np.abs(other - self.torque)
+
+    def deviation(self, average: AverageTorque) -> Array:
+        """How far a package's tables are from the exact model at each place, in N m."""
+        points = self.points
+        return self.away(average.torque(points.opening, points.opening_rate, points.contact))
+
+
 def deviation(
     model: ExactModel,
     average: AverageTorque,
@@ -60,18 +92,18 @@ def deviation(
 ) -> Deviation:
     """Compare kernel and exact model as they are rendered: both within the torque limit.
 
-    First on ``count`` points and more spread over the scene, none of them slower than
-    ``slowest``, and beside the seams of the model; then in shrinking neighbourhoods of the worst.
+    First on the places of `telling_points`; then in shrinking neighbourhoods of the worst.
     """
-    points = spread_points(scene, count, slowest).joined(_seams(model, scene, count, slowest))
-    away, torque = _away(model, average, points, limit)
+    points = telling_points(model, scene, count, slowest)
+    exact = ExactTorque.at(model, points, limit)
+    away, torque = exact.deviation(average), exact.torque
     scene_torque, total = float(np.max(np.abs(torque))), len(away)
     reach = count ** (-1.0 / 3.0)
     for _ in range(ROUNDS):
         worst = np.argsort(-away, kind="stable")[:WORST]
         near = nearby_points(scene, points.at(worst), NEIGHBOURS, reach, slowest)
         points = points.at(worst).joined(near)
-        away, _ = _away(model, average, points, limit)
+        away = ExactTorque.at(model, points, limit).deviation(average)
         total += len(near.opening)
         reach *= 0.2
     first = int(np.argmax(away))
@@ -81,6 +113,14 @@ def deviation(
         float(points.contact[first]),
     )
     return Deviation(float(away[first]), where, scene_torque, total)
+
+
+def telling_points(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Points:
+    """At least ``count`` places spread over the scene and its faces, and beside the seams.
+
+    None of them slower than ``slowest``.
+    """
+    return spread_points(scene, count, slowest).joined(_seams(model, scene, count, slowest))
 
 
 def _seams(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Points:
@@ -103,12 +143,8 @@ def _seams(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Poin
     return Points(opening[inside], rate[inside], contact[inside])
 
 
-def _away(
-    model: ExactModel, average: AverageTorque, points: Points, limit: float
-) -> tuple[Array, Array]:
-    """Deviation and exact torque at each point, 0 where the model itself jumps."""
-    where = points.opening, points.opening_rate, points.contact
-    place = model.settled(points.opening, points.contact)
+def _clear(model: ExactModel, points: Points, place: Array) -> NDArray[np.bool_]:
+    """Where the model itself does not jump."""
     view = edge_height(model.cutting.edge, place, model.blade_angle(points.opening))
     indentation = model.cutting.upper_face_m - view.height
     clear = model.cutting.response.force_at(indentation) < STRONGEST_N
@@ -117,7 +153,4 @@ def _away(
         strongest = STRONGEST_N * model.cutting.moving_blades
         parallel = np.maximum(PARALLEL, 2.0 * model.cutting.fracture_energy / strongest)
         clear &= (view.slope > parallel) | (view.slope < -PARALLEL)
-    torque = model.torque_settled(points.opening, points.opening_rate, place)
-    exact = np.where(clear, np.clip(torque, -limit, limit), 0.0)
-    table = np.where(clear, np.clip(average.torque(*where), -limit, limit), 0.0)
-    return np.abs(table - exact), exact
+    return np.asarray(clear)

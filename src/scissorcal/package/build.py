@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,10 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
-from scissorcal.package.average import AverageTorque
-from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
-from scissorcal.package.check import FITS_CHECK, check_package
-from scissorcal.package.compile import (
-    TOLERANCE,
-    Compiled,
-    compile_model,
-    scene_ranges,
-)
-from scissorcal.package.exact import ExactModel, FitDraws, central_model
+from scissorcal.package.compile import scene_ranges
+from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
-    Bound,
     CutRecord,
     CutStructure,
     FrictionRecord,
@@ -38,18 +29,20 @@ from scissorcal.package.manifest import (
     Parameter,
     PlateRecord,
     Provenance,
-    Ranges,
     canonical,
     content_hash,
     units_of,
 )
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.review import Review
+from scissorcal.package.table_record import Bound
 from scissorcal.recipe.schema import Edge, Recipe
 from scissorcal.verdicts import Verdict, failed
 
+if TYPE_CHECKING:
+    from scissorcal.package.simplest.model import Simplified
+
 MOST_DRAWS = 200
-GRID_POINTS = 40_000
 UNHASHED = "0" * 64
 NO_IDENTITY = "0" * 64
 """Identity of a package that is built outside a workspace: no workspace takes it as current."""
@@ -57,12 +50,16 @@ NO_IDENTITY = "0" * 64
 
 @dataclass(frozen=True)
 class PackageSummary:
-    """A package that was built: its file and manifest, the verdicts on it, and warnings."""
+    """A package that was built: its file and manifest, the verdicts on it, and warnings.
+
+    ``simplified`` is what it was compiled from: the laws that the scene needs, and their tables.
+    """
 
     path: Path
     manifest: Manifest
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
+    simplified: "Simplified"
 
 
 def build_package(
@@ -72,7 +69,7 @@ def build_package(
     path: Path,
     rng: np.random.Generator,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     review: Review | None = None,
     plate: PlateFit | None = None,
     inputs_hash: str = NO_IDENTITY,
@@ -82,11 +79,15 @@ def build_package(
 
     The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
     ``rng`` picks the posterior draws that the package keeps for the band, at most 200; the same
-    fits, recipe and seed give the same bytes. ``tolerance`` is each table's, as a share of its
-    value. ``review`` is the signature under the fits' report; it changes nothing else in the
-    package. ``plate`` is where the plate stands, stored as a pose with its covariance.
-    ``inputs_hash`` is the identity that a workspace gives to recipe, fits and algorithm
-    (`workday.engine`); where it has another one now, the package is stale.
+    fits, recipe and seed give the same bytes. Where ``scene.simplify`` is true the tables hold the
+    simplest laws that are enough for the scene
+    (:func:`~scissorcal.package.simplest.model.simplest_model`), the manifest says what was left
+    out, and the tables are the smallest whose bound fits; else they are those of a fixed fine
+    tolerance. ``tolerance``, each table's as a share of its value, overrides both. ``review`` is
+    the signature under the fits' report; it changes nothing else in the package. ``plate`` is
+    where the plate stands, stored as a pose with its covariance. ``inputs_hash`` is the identity
+    that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has another
+    one now, the package is stale.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
@@ -94,17 +95,22 @@ def build_package(
     ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
     the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
+    # whoever reads a package's parts, as the report does, builds none
+    from scissorcal.package.check import check_package
+    from scissorcal.package.simplest.model import simplest_model
+    from scissorcal.package.stated_bound import stated_bound
+
     cut, friction = _wanted(recipe, friction, cut)
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
-    record = _provenance(recipe, cut, friction, inputs_hash)
-    draws = pick_draws(cut, friction, rng)
-    model = central_model(FitDraws.centre(cut), FitDraws.centre(friction) if friction else None)
-    compiled = compile_model(model, recipe, tolerance=tolerance)
+    picked = pick_draws(cut, friction, rng)
+    simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
+    compiled = simplified.tables[-1]
     ranges = scene_ranges(recipe)
-    bound = _bound(model, compiled, ranges, recipe, tolerance)
-    arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **draws}
-    record = _with_left_out(record, cut, model, bound)
+    bound = stated_bound(simplified.central, compiled, recipe)
+    arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **simplified.draws}
+    record = _provenance(recipe, simplified.cut, simplified.friction, inputs_hash)
+    record = _with_left_out(record, cut, friction, bound)
     manifest = _hashed(
         Manifest(
             format="scissorcal-package/1",
@@ -117,8 +123,11 @@ def build_package(
             mechanics=compiled.mechanics,
             bound=bound,
             provenance=record,
-            members=tuple(member_of(file, array) for file, array in arrays.items()),
+            members=tuple(
+                member_of(file, array, compiled.rows.get(file)) for file, array in arrays.items()
+            ),
             plate=_plate_record(plate) if plate else None,
+            simplification=simplified.record,
             review=review,
             content_hash=UNHASHED,
         )
@@ -132,6 +141,7 @@ def build_package(
         manifest=manifest,
         verdicts=verdicts,
         warnings=package.warnings,
+        simplified=simplified,
     )
 
 
@@ -140,7 +150,8 @@ def put_review(package: ModelPackage, review: Review | None, path: Path) -> Mode
 
     Raises InputError where the file cannot be written.
     """
-    manifest = package.manifest.model_copy(update={"review": review})
+    # hashed anew: a package of an older version lacks keys that this version writes
+    manifest = _hashed(package.manifest.model_copy(update={"review": review}))
     write_archive(path, manifest, package.arrays)
     return ModelPackage(manifest, package.arrays, str(path))
 
@@ -237,14 +248,25 @@ def _provenance(
 
 
 def _with_left_out(
-    record: Provenance, cut: FitResult, model: ExactModel, bound: Bound
+    record: Provenance, cut: FitResult, friction: FitResult | None, bound: Bound
 ) -> Provenance:
-    """The record with the parts of both laws that the tables do not render."""
+    """The record with the parts of both fitted laws that no table renders.
+
+    They are of the fits as they stand: a simpler law that lacks load or presliding does not end
+    them. Where friction as a whole is left out, what is said of it stands with the cut.
+    """
     said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
-    update: dict[str, Any] = {"cut": record.cut.model_copy(update={"left_out": said})}
-    if record.friction and model.friction:
-        said = left_out(model.friction, bound.scene_torque_Nm)
-        update["friction"] = record.friction.model_copy(update={"left_out": said})
+    of_friction: tuple[str, ...] = ()
+    if friction is not None:
+        fitted = central_model(FitDraws.centre(cut), FitDraws.centre(friction)).friction
+        assert fitted is not None
+        of_friction = left_out(fitted, bound.scene_torque_Nm)
+    update: dict[str, Any] = {}
+    if record.friction:
+        update["friction"] = record.friction.model_copy(update={"left_out": of_friction})
+    else:
+        said += of_friction
+    update["cut"] = record.cut.model_copy(update={"left_out": said})
     return record.model_copy(update=update)
 
 
@@ -303,25 +325,6 @@ def pick_draws(
     return {**picked, "draws/friction.npy": own}
 
 
-def _bound(
-    model: ExactModel, compiled: Compiled, ranges: Ranges, recipe: Recipe, tolerance: float
-) -> Bound:
-    eps = compiled.mechanics.friction.rate_eps_rad_per_s if compiled.mechanics.friction else 0.0
-    average = AverageTorque(compiled.mechanics, ranges, compiled.arrays)
-    found = deviation(model, average, ranges, recipe.limits.torque_Nm, GRID_POINTS, eps)
-    stated = STATED_OVER_SEEN * found.largest
-    return Bound(
-        largest_seen_Nm=found.largest,
-        stated_Nm=stated,
-        scene_torque_Nm=found.scene_torque,
-        share=stated / found.scene_torque if found.scene_torque > 0 else 0.0,
-        allowed_share=SHARE_OF_TOLERANCE * recipe.scene.tolerance_percent / 100.0,
-        points=found.points,
-        table_tolerance=tolerance,
-        from_rate_rad_per_s=eps,
-    )
-
-
 def _hashed(manifest: Manifest) -> Manifest:
     facts = json.loads(manifest.model_dump_json())
     return manifest.model_copy(update={"content_hash": content_hash(facts)})
@@ -345,6 +348,8 @@ def _refuse_failed_fits(
 
 
 def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
+    from scissorcal.package.check import FITS_CHECK
+
     own = [verdict for verdict in failed(verdicts) if verdict.check not in (FITS_CHECK, "review")]
     if own:
         reasons = " ".join(verdict.why for verdict in own)

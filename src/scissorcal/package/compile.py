@@ -1,7 +1,8 @@
 """Compile the model to the arrays and scalars that a kernel evaluates."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,19 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import damped, edge_height, mean_share, settled_contact
+from scissorcal.model.curvature import (
+    Bounds,
+    cubic_curvature,
+    edge_breaks,
+    edge_curvature,
+    response_breaks,
+    response_curvature,
+)
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_tables
 from scissorcal.package.grid import Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
-from scissorcal.package.tables import fit_table
+from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, fit_table
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -41,11 +50,44 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class Compiled:
-    """Tables by file name, each (3, knots) of float32, and the scalars that go with them."""
+class TableChoice:
+    """How fine one table is: its tolerance, as a share of its value, and its number format."""
 
-    arrays: dict[str, NDArray[np.float32]]
+    tolerance: float = TOLERANCE
+    number_format: NumberFormat = "float32"
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Tables by file name, each (3, knots), and the scalars that go with them.
+
+    The tables are float32 as a kernel evaluates them (float64 where that was asked for, for
+    comparison alone). ``rows`` say of those stored in int16 how; ``choices``, by table, how fine
+    each was asked for.
+    """
+
+    arrays: dict[str, NDArray[Any]]
     mechanics: Mechanics
+    rows: dict[str, Rows] = field(default_factory=dict)
+    choices: dict[str, TableChoice] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TableLaw:
+    """One law that becomes a table: what `fit_table` takes of it.
+
+    ``curvature`` bounds its second derivative over intervals, none of which contains one of
+    ``breaks``; None where no bound is known.
+    """
+
+    law: Function
+    derivative: Function
+    low: float
+    high: float
+    monotone: bool = False
+    scale: float | None = None
+    curvature: Callable[[Array, Array], Bounds] | None = None
+    breaks: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def scene_ranges(recipe: Recipe) -> Ranges:
@@ -58,60 +100,117 @@ def scene_ranges(recipe: Recipe) -> Ranges:
     )
 
 
-def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLERANCE) -> Compiled:
+def compile_model(
+    model: ExactModel,
+    recipe: Recipe,
+    *,
+    tolerance: float = TOLERANCE,
+    number_format: NumberFormat = "float32",
+) -> Compiled:
     """Compile edge, response, ripple and friction to tables over what the scene can reach.
 
     ``tolerance`` is each table's, as a share of its value. Raises InputError where the scene
     never touches the material, where friction would drive the motion, or where a law cannot be
     held by a table.
     """
+    laws = table_laws(model, recipe)
+    choice = TableChoice(tolerance, number_format)
+    return compile_tables(laws, scene_mechanics(model, recipe), dict.fromkeys(laws, choice))
+
+
+def compile_tables(
+    laws: Mapping[str, TableLaw], mechanics: Mechanics, choices: Mapping[str, TableChoice]
+) -> Compiled:
+    """Make a table of each law as chosen for it. Raises InputError as `compile_model` does."""
+    arrays: dict[str, NDArray[Any]] = {}
+    rows: dict[str, Rows] = {}
+    for name, law in laws.items():
+        fitted = table_of_law(name, law, choices[name])
+        file = table_file(name)
+        exact = choices[name].number_format == "float64"
+        arrays[file] = fitted.array if exact else fitted.array.astype(np.float32)
+        if fitted.rows:
+            rows[file] = fitted.rows
+    return Compiled(arrays, mechanics, rows, dict(choices))
+
+
+def table_of_law(name: str, law: TableLaw, choice: TableChoice) -> Fitted:
+    """One table; InputError where the law cannot be held by any."""
+    try:
+        return fit_table(
+            law.law,
+            law.derivative,
+            law.low,
+            law.high,
+            monotone=law.monotone,
+            scale=law.scale,
+            tolerance=choice.tolerance,
+            number_format=choice.number_format,
+        )
+    except ValueError as error:
+        raise InputError(
+            f"The fitted {name.replace('_', ' ')} cannot be made into a table: {error}. "
+            "Narrow the scene's ranges in the recipe to what was captured, or fit again."
+        ) from error
+
+
+def table_file(name: str) -> str:
+    """The file of a table in a package."""
+    return f"tables/{name}.npy"
+
+
+def table_laws(model: ExactModel, recipe: Recipe) -> dict[str, TableLaw]:
+    """The laws that become tables, by name, over what the scene can reach.
+
+    Raises InputError where the scene never touches the material, or friction would drive it.
+    """
     points = spread_points(scene_ranges(recipe), SCOUTS)
     reach = _reach(model, points, recipe.limits.torque_Nm)
     cutting = model.cutting
     edge, response = cutting.edge, cutting.response
-    laws: dict[str, dict[str, Any]] = {
-        "edge": {
-            "law": edge.offset_at,
-            "derivative": edge.slope_at,
-            "low": reach.lowest_station,
-            "high": reach.highest_station,
-        },
-        "response": {
-            "law": response.force_at,
-            "derivative": response.stiffness_at,
-            "low": 0.0,
-            "high": reach.indentation,
-            "monotone": True,
-            "scale": reach.force_N,
-        },
+    laws = {
+        "edge": TableLaw(
+            edge.offset_at,
+            edge.slope_at,
+            reach.lowest_station,
+            reach.highest_station,
+            curvature=partial(edge_curvature, edge),
+            breaks=edge_breaks(edge),
+        ),
+        "response": TableLaw(
+            response.force_at,
+            response.stiffness_at,
+            0.0,
+            reach.indentation,
+            monotone=True,
+            scale=reach.force_N,
+            curvature=partial(response_curvature, response),
+            breaks=response_breaks(response),
+        ),
     }
-    friction = fracture = None
+    if model.friction is not None:
+        laws |= {n: TableLaw(**a) for n, a in friction_tables(model.friction, recipe).items()}
+    if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
+        laws["mean_energy"] = TableLaw(**_mean_energy_law(model, recipe))
+    return laws
+
+
+def scene_mechanics(model: ExactModel, recipe: Recipe) -> Mechanics:
+    """The scalars that the kernel needs besides the tables."""
+    cutting, scene = model.cutting, recipe.scene
+    fracture = friction = None
     if cutting.fracture_energy is not None:
         fracture = Fracture(
             energy_J_per_m=float(cutting.fracture_energy), kappa=float(cutting.kappa)
         )
     if model.friction is not None:
-        laws |= friction_tables(model.friction, recipe)
-        slowest = recipe.scene.opening_rate_rad_per_s[0]
+        slowest = scene.opening_rate_rad_per_s[0]
         friction = Friction(rate_eps_rad_per_s=max(SLOWEST_EPS, slowest))
-    if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
-        laws["mean_energy"] = _mean_energy_law(model, recipe)
-    arrays: dict[str, NDArray[np.float32]] = {}
-    for name, arguments in laws.items():
-        try:
-            table = fit_table(tolerance=tolerance, **arguments).table
-        except ValueError as error:
-            raise InputError(
-                f"The fitted {name.replace('_', ' ')} cannot be made into a table: {error}. "
-                "Narrow the scene's ranges in the recipe to what was captured, or fit again."
-            ) from error
-        arrays[f"tables/{name}.npy"] = np.stack([table.x, table.y, table.slope])
-    scene = recipe.scene
-    mechanics = Mechanics(
+    return Mechanics(
         moving_blades=2 if cutting.moving_blades == 2 else 1,
         upper_face_m=cutting.upper_face_m,
         handle_radius_m=recipe.rig.handle_radius_mm * 1e-3,
-        tip_station_m=edge.length_m,
+        tip_station_m=cutting.edge.length_m,
         closure=cutting.closure,
         rate_damping_s_per_m=float(cutting.rate_damping),
         loop_rate_Hz=scene.loop_rate_Hz,
@@ -119,7 +218,6 @@ def compile_model(model: ExactModel, recipe: Recipe, *, tolerance: float = TOLER
         fracture=fracture,
         friction=friction,
     )
-    return Compiled(arrays, mechanics)
 
 
 def kernel_tables(
@@ -143,7 +241,7 @@ def kernel_tables(
         energy, kappa = fracture.energy_J_per_m, fracture.kappa
 
     def table(name: str) -> Table:
-        array = arrays.get(f"tables/{name}.npy")
+        array = arrays.get(table_file(name))
         return _NOTHING if array is None else table_of(array)
 
     return ModelTables(
@@ -211,6 +309,7 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
     station = np.minimum(view.station, edge.length_m)
     height = station * np.sin(beta) + edge.offset_at(station) * np.cos(beta)
     ran = place > points.contact
+    _refuse_leaning(points, view.height)
     indentation = np.where(ran | (view.station < edge.length_m), cutting.upper_face_m - height, 0.0)
     touching = indentation > 0
     if not np.any(touching):
@@ -236,6 +335,19 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
     )
 
 
+def _refuse_leaning(points: Points, height: Array) -> None:
+    """Refuse a scene in which, somewhere, no edge stands over the contact."""
+    wrong = np.flatnonzero(np.isnan(height))
+    if len(wrong):
+        first = wrong[int(np.argmin(points.opening[wrong]))]
+        raise InputError(
+            f"At an opening of {np.degrees(points.opening[first]):.0f} degrees no single point of "
+            f"the edge stands over a contact of {points.contact[first] * 1e3:.1f} mm, because the "
+            "edge is upright or leans back there: narrow scene.opening_deg in the recipe, or check "
+            "rig.edge."
+        )
+
+
 def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
     """Mean energy of the crack over its ripple, against the opening, in J/m.
 
@@ -259,4 +371,12 @@ def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
         return (law(opening + STEP_rad) - law(opening - STEP_rad)) / (2.0 * STEP_rad)
 
     low, high = recipe.scene.opening_rad
-    return {"law": law, "derivative": derivative, "low": low, "high": high}
+    constant = cutting.response.family == "power"
+    curvature = partial(cubic_curvature, np.zeros_like) if constant else None
+    return {
+        "law": law,
+        "derivative": derivative,
+        "low": low,
+        "high": high,
+        "curvature": curvature,
+    }

@@ -14,9 +14,8 @@ from scissorcal.model import (
     FrictionLaw,
     edge_height,
     friction_torque,
-    settled_contact,
 )
-from scissorcal.model.cutting import torque_at
+from scissorcal.model.cutting import contact_after_run, torque_at
 
 Array = NDArray[np.float64]
 
@@ -38,15 +37,16 @@ class ExactModel:
         """Average torque felt in N m: cutting resists closing, friction resists any motion.
 
         Arguments (rad, rad/s, m) broadcast; shape (draws, points) with draws and flat arguments.
-        Material beyond the blade's tip is out of reach and gives no torque.
+        Material beyond the blade's tip is out of reach and gives no torque; NaN where no edge
+        stands over the place (:func:`edge_height`).
         """
         return self.torque_settled(opening, opening_rate, self.settled(opening, contact))
 
     def torque_settled(self, opening: ArrayLike, opening_rate: ArrayLike, place: Array) -> Array:
         """The torque of `torque` where the crack stands at ``place`` (m), as `settled` gives it."""
         view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
-        reached = view.station < self.cutting.edge.length_m
-        felt = np.where(reached, torque_at(self.cutting, opening, place, opening_rate), 0.0)
+        beyond = view.station >= self.cutting.edge.length_m
+        felt = np.where(beyond, 0.0, torque_at(self.cutting, opening, place, opening_rate))
         if self.friction is None:
             return felt
         return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))
@@ -56,7 +56,7 @@ class ExactModel:
         place = np.asarray(contact, dtype=np.float64)
         if self.cutting.fracture_energy is None:
             return place
-        return np.asarray(np.maximum(place, settled_contact(self.cutting, opening)))
+        return contact_after_run(self.cutting, opening, place)
 
     def blade_angle(self, opening: ArrayLike) -> Array:
         """Rotation beta of one moving blade, in radians."""

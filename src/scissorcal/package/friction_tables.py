@@ -1,6 +1,7 @@
 """What a package's tables hold of a friction law, and what they cannot hold."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.model.curvature import cubic_curvature, level_curvature
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.terms import Role
 from scissorcal.recipe.schema import Recipe
@@ -35,8 +37,7 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
         )
     fastest = recipe.scene.opening_rate_rad_per_s[1]
     low, high = recipe.scene.opening_rad
-    places = np.linspace(low, high, PLACES)
-    factors = angle_factor(law, places)
+    places, factors = _factors(law, recipe)
     if factors.min() <= 0:
         raise InputError(
             "The friction fit says that friction drives the motion at "
@@ -52,14 +53,21 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
             "derivative": lambda speed, sign=sign: friction_level(law, sign, speed)[1],
             "low": 0.0,
             "high": fastest,
+            "curvature": partial(level_curvature, law, sign),
         }
     laws["friction_angle"] = {
         "law": lambda opening: angle_factor(law, opening),
         "derivative": lambda opening: angle_slope(law, opening),
         "low": low,
         "high": high,
+        "curvature": partial(cubic_curvature, partial(angle_slope, law)),
     }
     return laws
+
+
+def least_factor(law: FrictionLaw, recipe: Recipe) -> float:
+    """The least factor of friction over the openings of a scene."""
+    return float(_factors(law, recipe)[1].min())
 
 
 def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
@@ -115,6 +123,12 @@ def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[s
         f"torque, by {share.mean:.2g} (sd {share.sd:.1g}) of it. Compare rendered torque with the "
         "material's own, not with the motor's.",
     )
+
+
+def _factors(law: FrictionLaw, recipe: Recipe) -> tuple[Array, Array]:
+    """Openings of the scene (rad) and the factor of friction at each."""
+    places = np.linspace(*recipe.scene.opening_rad, PLACES)
+    return places, angle_factor(law, places)
 
 
 def _refuse_driving(law: FrictionLaw, sign: float, fastest: float) -> None:

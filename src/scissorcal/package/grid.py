@@ -9,6 +9,9 @@ from scissorcal.package.manifest import Ranges
 
 Array = NDArray[np.float64]
 
+FELT_SHARE = 0.05
+"""Torques below this share of the scene's largest are not held to the tolerance."""
+
 _GOLDEN = 1.2207440846057596
 """Root of x^4 = x + 1: its inverse powers spread points evenly in three dimensions (the R3
 sequence of Roberts 2018, a generalised golden ratio)."""

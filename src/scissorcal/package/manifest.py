@@ -6,10 +6,22 @@ import json
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import Field, Strict, model_validator
 
 from scissorcal.identity import bytes_digest
 from scissorcal.package.review import Digest, Review
+from scissorcal.package.simplest.record import Simplification
+from scissorcal.package.table_record import (
+    Bound,
+    Finite,
+    Name,
+    NonNegative,
+    Positive,
+    Range,
+    Section,
+    StoredRow,
+    Text,
+)
 from scissorcal.recipe.schema import FrictionRung, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
@@ -17,33 +29,28 @@ FORMAT = "scissorcal-package/1"
 LARGEST_MEMBER = 4_000_000
 """Bytes; a package of 200 draws and five tables has some 40 kB."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
-Text = Annotated[str, Field(max_length=10_000)]
-Range = tuple[Finite, Finite]
-
-
-class Section(BaseModel):
-    """Base of every object in the manifest: frozen, no unknown keys, no conversions, no NaN."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
-    )
-
 
 class Member(Section):
     """One file of the archive besides the manifest: an array as .npy.
 
-    Tables have shape (3, knots): x, y and slope. Draws have shape (draws, parameters).
+    Tables have shape (3, knots): x, y and slope. Draws have shape (draws, parameters). A table in
+    16-bit numbers has ``rows``, which say how each of its three is decoded.
     """
 
     file: Annotated[str, Field(pattern=r"^(tables|draws)/[a-z_]{1,40}\.npy$")]
-    dtype: Literal["<f4", "<f8"]
+    dtype: Literal["<f4", "<f8", "<i2"]
     shape: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
     bytes: Annotated[int, Field(ge=1, le=LARGEST_MEMBER)]
     sha256: Digest
+    rows: tuple[StoredRow, StoredRow, StoredRow] | None = None
+
+    @model_validator(mode="after")
+    def _rows_belong_to_int16(self) -> Member:
+        if (self.dtype == "<i2") != (self.rows is not None):
+            raise ValueError("an array has rows where it is in 16-bit numbers only")
+        if self.rows is not None and not (self.file.startswith("tables/") and self.shape[0] == 3):
+            raise ValueError("only a table of three rows is stored in 16-bit numbers")
+        return self
 
 
 class Ranges(Section):
@@ -109,29 +116,6 @@ class Mechanics(Section):
     render: tuple[Literal["torque", "handle_force", "translation_force"], ...]
     fracture: Fracture | None
     friction: Friction | None
-
-
-class Bound(Section):
-    """How far the kernel's float32 tables may be from the exact model in float64.
-
-    ``largest_seen_Nm`` was found on ``points`` places of the scene independent of the tables'
-    knots; ``stated_Nm`` is twice that and is what the package promises. ``share`` is the stated
-    bound over ``scene_torque_Nm``, the largest torque in the scene; ``allowed_share`` is the part
-    of the scene's tolerance that tables may use up. Torques are compared as they are rendered,
-    within the torque limit, and at rates of at least ``from_rate_rad_per_s``, below which friction
-    is smoothed deliberately. Points where the model itself jumps are left out: within 0.1 mm of the
-    blade's tip, and where the edges are so nearly parallel that no force advances the crack; and
-    where the response would exceed 1e5 N.
-    """
-
-    largest_seen_Nm: NonNegative
-    stated_Nm: NonNegative
-    scene_torque_Nm: NonNegative
-    share: NonNegative
-    allowed_share: Positive
-    points: Annotated[int, Field(ge=1)]
-    table_tolerance: Positive
-    from_rate_rad_per_s: NonNegative
 
 
 class EdgeStructure(Section):
@@ -272,7 +256,10 @@ class Manifest(Section):
 
     ``content_hash`` is the SHA-256 of the canonical JSON of everything here except itself and
     ``review``; through ``members`` it covers every byte of every array. ``review`` is the signature
-    under the report of the package's fits, null as long as there is none.
+    under the report of the package's fits, null as long as there is none. ``simplification`` says
+    which simpler laws were enough for the scene, so that they stand here in the place of the fits'
+    own: structure, parameters and draws are of the law that is rendered. It is null in packages
+    that were built before there was such a choice.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -285,6 +272,7 @@ class Manifest(Section):
     provenance: Provenance
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
     plate: PlateRecord | None = None
+    simplification: Simplification | None = None
     review: Review | None
     content_hash: Digest
 

@@ -20,6 +20,7 @@ from scissorcal.package.exact import (
     exact_model,
     torque_quantiles,
 )
+from scissorcal.package.grid import FELT_SHARE
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -34,8 +35,6 @@ NEAR_SHARE = 0.1
 """A place is supported by data within this share of the scene's range of opening and contact."""
 NEAR_SPEED = 2.0
 """And within this factor of its rate, in the same direction."""
-FELT_SHARE = 0.05
-"""Torques below this share of the scene's largest are not held to the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -114,15 +113,9 @@ def scene_torque(recipe: Recipe, cut: FitResult | None, friction: FitResult | No
     rendered = friction if recipe.scene.render_friction else None
     probe = _Probe(recipe, _wanted(recipe, cut, friction), rendered)
     scene = recipe.scene
-    openings = np.linspace(*scene.opening_rad, OPENINGS)
-    speeds = np.geomspace(_slowest(recipe), scene.opening_rate_rad_per_s[1], SPEEDS)
-    rates = np.concatenate([-speeds[::-1], speeds])
-    contacts = np.linspace(*scene.contact_m, CONTACTS)
-    mesh = np.meshgrid(openings, rates, contacts, indexing="ij")
-    grid = probe.at(*(values.ravel() for values in mesh))
+    grid = probe.at(*scene_grid(recipe))
     size = np.abs(grid.torque)
-    largest = float(np.nanmax(size, initial=0.0))
-    felt = grid.reached & (size >= FELT_SHARE * largest) & (largest > 0)
+    felt = _felt(grid.reached, size)
     share = np.where(felt, 0.5 * (grid.high - grid.low) / np.where(felt, size, 1.0), np.nan)
     return SceneTorque(
         scene.confidence_percent / 100.0,
@@ -133,6 +126,31 @@ def scene_torque(recipe: Recipe, cut: FitResult | None, friction: FitResult | No
         tuple(_slices(recipe, probe)),
         _not_in_band(probe.cut),
     )
+
+
+def scene_grid(recipe: Recipe) -> tuple[Array, Array, Array]:
+    """Places over the scene: opening (n,) in rad, its rate in rad/s, contact in m."""
+    scene = recipe.scene
+    openings = np.linspace(*scene.opening_rad, OPENINGS)
+    speeds = np.geomspace(_slowest(recipe), scene.opening_rate_rad_per_s[1], SPEEDS)
+    rates = np.concatenate([-speeds[::-1], speeds])
+    contacts = np.linspace(*scene.contact_m, CONTACTS)
+    opening, rate, contact = np.meshgrid(openings, rates, contacts, indexing="ij")
+    return opening.ravel(), rate.ravel(), contact.ravel()
+
+
+def felt_places(model: ExactModel, grid: tuple[Array, Array, Array], torque: Array) -> Mask:
+    """Which places (n,) of a grid the blade reaches with a torque (n,) that can be felt."""
+    opening, _, contact = grid
+    place = np.ravel(model.settled(opening, contact))
+    view = edge_height(model.cutting.edge, place, model.blade_angle(opening))
+    reached = np.asarray(view.station < model.cutting.edge.length_m)
+    return _felt(reached, np.where(reached, np.abs(torque), np.nan))
+
+
+def _felt(reached: Mask, size: Array) -> Mask:
+    largest = float(np.nanmax(size, initial=0.0))
+    return np.asarray(reached & (size >= FELT_SHARE * largest) & (largest > 0))
 
 
 def _wanted(recipe: Recipe, cut: FitResult | None, friction: FitResult | None) -> FitResult:

@@ -80,7 +80,13 @@ def requirements(recipe: Recipe) -> Requirements:
             Requirement("fracture", "nothing is cut (scene.cut = false): no toughness, no crack")
         )
     if scene.render_friction:
-        tables.append(Requirement("friction", "rendered (scene.render_friction = true)"))
+        why = "rendered (scene.render_friction = true)"
+        if set(scene.render) == {"translation_force"}:
+            why += (
+                ", although a translation force has none: where the handles carry no motor, set it "
+                "to false"
+            )
+        tables.append(Requirement("friction", why))
     else:
         left_out.append(Requirement("friction table", "scene.render_friction = false"))
     if "translation_force" not in scene.render:

@@ -173,7 +173,12 @@ class Material(Section):
 
 
 class Scene(Section):
-    """What is rendered, over which ranges, how fast and how well."""
+    """What is rendered, over which ranges, how fast and how well.
+
+    ``simplify`` keeps the richest candidate and finest tables where false. ``number_format`` is
+    that of the tables: "int16" halves their bytes in flash, and a program decodes them into RAM
+    before it starts; without ``simplify`` they are "float32".
+    """
 
     cut: bool = True
     render: Annotated[tuple[Rendered, ...], Strict(False), Field(min_length=1)] = ("torque",)
@@ -186,6 +191,8 @@ class Scene(Section):
     loop_rate_Hz: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = 1000.0
     tolerance_percent: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 7.0
     confidence_percent: Annotated[float, Field(gt=50, lt=100)] = 95.0
+    simplify: bool = True
+    number_format: Literal["float32", "int16"] = "float32"
 
     @model_validator(mode="after")
     def _ranges_ascend(self) -> Scene:
@@ -255,8 +262,27 @@ class CaptureCut(Section):
 
 
 class Capture(Section):
+    """What 'scissorcal capture' takes. ``plan = "designed"``: the strokes that narrow the band of
+    the scene's torque the most for their time ('scissorcal plan --explain' shows them); "listed":
+    the speeds and numbers below; "auto": listed where the recipe gives any of them for that
+    capture, else designed. ``handling_s`` is what a person needs to clear the blades, or to put in
+    a fresh piece: it counts in a design's minutes.
+    """
+
+    plan: Literal["auto", "designed", "listed"] = "auto"
+    handling_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 20.0
     friction: CaptureFriction = CaptureFriction()
     cut: CaptureCut = CaptureCut()
+
+    def designed(self, kind: Literal["friction", "cut"]) -> bool:
+        """Whether a capture of this kind takes a designed list.
+
+        >>> Capture().designed("cut"), Capture(cut=CaptureCut(sheets=2)).designed("cut")
+        (True, False)
+        """
+        if self.plan == "auto":
+            return kind not in self.model_fields_set
+        return self.plan == "designed"
 
 
 class FitFriction(Section):

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import BaseModel
@@ -66,6 +66,22 @@ def as_toml(settings: tuple[Setting, ...]) -> str:
             lines += ["", f"[{'.'.join(table)}]"]
         lines.append(f"{setting.toml}  # {setting.origin}")
     return "\n".join(lines) + "\n"
+
+
+def with_designed_captures(recipe: Recipe, text: str) -> str:
+    """``recipe``, which was read from ``text`` and got a designed list of captures, as TOML.
+
+    Comments say on which line of ``text`` a value stands, or that it was designed.
+    """
+    plan = recipe.capture.model_copy(update={"plan": "designed"})
+    planned = recipe.model_copy(update={"capture": plan})
+    settings = recipe_settings(planned, text, defaults=False)
+    return as_toml(
+        tuple(
+            replace(one, origin="designed") if one.table[:1] == ("capture",) else one
+            for one in settings
+        )
+    )
 
 
 def _walk(

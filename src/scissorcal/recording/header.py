@@ -133,7 +133,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
         if count is None or duration_ns is None or not described:
             return None
         notes = tuple(entries.get("note", "") for entries in found.get(NOTE_NAME, ()))
-        return _header(described[0], notes, count, duration_ns * 1e-9)
+        return _header(described[-1], notes, count, duration_ns * 1e-9)
     except (struct.error, KeyError, ValueError, TypeError):
         return None
 

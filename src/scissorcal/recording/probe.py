@@ -37,6 +37,27 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class RestFacts:
+    """What tells blades at rest from a stuck encoder.
+
+    ``handle_zero_N`` is what the force sensor shows without a hand, 0 where nobody measured it;
+    ``breakaway_Nm`` the least torque that moves the blades, None where nobody found it;
+    ``torque_noise_Nm`` and ``force_noise_N`` are standard deviations. ``jitters``: the encoder's
+    readings are noisy enough never to stay the same.
+    """
+
+    handle_zero_N: float = 0.0
+    breakaway_Nm: float | None = None
+    torque_noise_Nm: float = 0.0
+    force_noise_N: float = 0.0
+    jitters: bool = False
+
+
+UNKNOWN_REST = RestFacts()
+"""Of a rig that nobody probed."""
+
+
+@dataclass(frozen=True)
 class ProbeResult:
     """What a probe found; an estimate is None where the device or the motion did not show it.
 
@@ -69,9 +90,16 @@ class ProbeResult:
     format: Literal["scissorcal-probe/1"] = FORMAT
 
     @property
-    def handle_zero_N(self) -> float:  # noqa: N802  (N is the unit)
-        """What the force sensor shows without a hand; 0 where nobody found it."""
-        return 0.0 if self.force_zero_N is None else self.force_zero_N.mean
+    def rest(self) -> RestFacts:
+        """What it found of blades at rest."""
+        facts = self.facts
+        return RestFacts(
+            handle_zero_N=0.0 if self.force_zero_N is None else self.force_zero_N.mean,
+            breakaway_Nm=facts.get("breakaway_Nm"),
+            torque_noise_Nm=facts.get("torque_noise_Nm", 0.0),
+            force_noise_N=facts.get("force_noise_N", 0.0),
+            jitters=facts.get("encoder_jitters", 0.0) > 0.0,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Give the probe as plain values, for JSON; facts that are not finite are left out."""

@@ -22,7 +22,8 @@ CHUNK_BYTES = 64 * 1024
 class SampleFile:
     """An MCAP file being written: the encoding only, not names, locks or renaming.
 
-    The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it.
+    The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it. Of several
+    copies the last sound one counts, so that :meth:`describe` may add to it.
     """
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
@@ -57,6 +58,11 @@ class SampleFile:
             self._flushed_at = max(int(samples["host_time_ns"][0]), 0)
         self._newest_host_time = max(int(samples["host_time_ns"][-1]), 0)
         self.flush_if_due(self._newest_host_time)
+
+    def describe(self, metadata: RecordingMetadata) -> None:
+        """Write the metadata anew, in the place of what was written before."""
+        self._entries = to_entries(metadata)
+        self._mark(METADATA_NAME, self._entries)
 
     def flush_if_due(self, host_time_ns: int) -> None:
         """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""

@@ -176,7 +176,7 @@ class _Walk:
             except ValueError as error:
                 self.metadata_complaint = f"at byte {offset}, {error}"
                 raise _DamageError("the description of the recording") from None
-            self.metadata = self.metadata or metadata
+            self.metadata = metadata
 
     def _take_channel(self, body: bytes) -> None:
         from mcap.records import Channel

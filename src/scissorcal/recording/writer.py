@@ -15,7 +15,7 @@ from scissorcal.recording import layout
 from scissorcal.recording.partfile import create_locked, explained, seal
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
 from scissorcal.recording.samplefile import SampleFile
-from scissorcal.recording.schema import describe
+from scissorcal.recording.schema import describe, stroke_records
 
 
 class RecordingWriter:
@@ -54,11 +54,13 @@ class RecordingWriter:
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + layout.PART_SUFFIX)
         joint, device = joint or Joint(), device or {}
-        metadata = describe(kind, joint, handle_radius_m, strokes, recipe_toml, device, min_travel)
+        self._metadata = describe(
+            kind, joint, handle_radius_m, strokes, recipe_toml, device, min_travel
+        )
         self._stream = create_locked(self.path, self.part)
         self._failed = False
         with self._writing():
-            self._file = SampleFile(self._stream, metadata)
+            self._file = SampleFile(self._stream, self._metadata)
 
     @property
     def sample_count(self) -> int:
@@ -69,6 +71,15 @@ class RecordingWriter:
         """Add samples, shape (n,) with SAMPLE_DTYPE, in the order of time."""
         with self._writing():
             self._file.append(samples)
+
+    def state_strokes(self, strokes: tuple[Stroke, ...]) -> None:
+        """State all strokes anew, where they are chosen while the capture runs.
+
+        Call it before samples of a new stroke are appended, so that a killed capture has it too.
+        """
+        self._metadata = self._metadata.model_copy(update={"strokes": stroke_records(strokes)})
+        with self._writing():
+            self._file.describe(self._metadata)
 
     def poll(self, host_time_ns: int) -> None:
         """Write out buffered samples if due by this clock, where no sample arrives."""

@@ -14,6 +14,8 @@ STEP_RAD = 1e-3
 """Opening over which a slope is taken: some hundred steps of float32 in torque, and an indentation
 change of some 20 um."""
 BINS = 25
+WIDENINGS = 8
+"""Rounds in which intervals are widened; each takes most of what is too steep."""
 STROKE_TICKS = 4000
 LEAST_SHARE = 0.05
 """Of a stroke's largest torque; the cost of derating is compared where torque is above."""
@@ -82,10 +84,26 @@ def softened(tables: ModelTables, steepest: float) -> ModelTables:
         raise ValueError(f"The steepest slope of a response is above 0, not {steepest}.")
     response = tables.response
     x, y = response.x.astype(np.float64), response.y.astype(np.float64)
-    width = np.maximum(np.diff(x), np.diff(y) / steepest)
-    place = np.concatenate([[0.0], np.cumsum(width)]).astype(np.float32)
+    rise = np.diff(y)
+    width = np.maximum(np.diff(x), rise / steepest)
     slope = np.minimum(response.slope, np.float32(steepest))
+    for _ in range(WIDENINGS):  # between few knots a cubic is steeper than at them
+        over = _steepest_inside(width, rise, slope.astype(np.float64)) / steepest
+        width = width * np.maximum(over, 1.0)
+    place = np.concatenate([[0.0], np.cumsum(width)]).astype(np.float32)
     return replace(tables, response=Table(place, response.y, slope))
+
+
+def _steepest_inside(width: Array, rise: Array, slope: Array) -> Array:
+    """Largest derivative of a table's cubics within each interval."""
+    first, last = slope[:-1] * width, slope[1:] * width
+    third = first + last - 2.0 * rise
+    second = rise - first - third
+    turn = np.clip(
+        np.divide(-second, 3.0 * third, out=np.zeros_like(third), where=third < 0.0), 0, 1
+    )
+    inside = first + turn * (2.0 * second + 3.0 * turn * third)
+    return np.asarray(np.maximum(inside, np.maximum(first, last)) / width)
 
 
 def felt_change(tables: ModelTables, other: ModelTables, torque_limit: float) -> float:

@@ -16,7 +16,7 @@ from scissorcal.kernel import Capability, ConfigKey, Identity, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult
 from scissorcal.render.admission import (
     Admission,
     admit_package,
@@ -39,6 +39,8 @@ FAULT_CLEARINGS_PER_S = 0.2
 
 TRAVEL_SHARE = 0.2
 LIMITED_WARNING = 0.01
+STILL_WARNING_S = 2.0
+"""Chosen: a hand that makes strokes turns round faster."""
 
 REQUEST = (
     "Take everything out from between the blades, and hold the handles loosely: they push "
@@ -149,7 +151,7 @@ def _result(
         admission=admission,
         package_hash=package.manifest.content_hash,
         verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission),
-        warnings=warnings + _limited_warning(limited, applied),
+        warnings=warnings + _limited_warning(limited, applied) + _still_warning(watch.still_s),
     )
 
 
@@ -214,7 +216,7 @@ def _servo_config(
     seconds: float,
     rig: RigFacts | None,
 ) -> ServoConfig:
-    zero_N = rig.handle_zero_N if rig else 0.0
+    rest = rig.rest if rig else UNKNOWN_REST
     return ServoConfig(
         torque_limit=applied.torque_Nm,
         torque_slew=applied.torque_slew_Nm_per_s,
@@ -229,7 +231,7 @@ def _servo_config(
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
         passivity=passivity_config(admission, identity),
-        watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s, zero_N),
+        watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s, rest),
     )
 
 
@@ -310,6 +312,16 @@ def _limited_warning(share: float, applied: AppliedLimits) -> tuple[str, ...]:
     return (
         f"In {share:.0%} of the frames the model asked for more than the limits allow "
         f"({applied.torque_Nm:g} N m): the rendered force was weaker than the model.",
+    )
+
+
+def _still_warning(still_s: float) -> tuple[str, ...]:
+    if still_s <= STILL_WARNING_S:
+        return ()
+    return (
+        f"The opening did not change by a single count in the last {still_s:.1f} s. If the blades "
+        "moved meanwhile, the encoder is stuck: check it and its cable, then run 'scissorcal "
+        "device probe'.",
     )
 
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from scissorcal.kernel import Identity
 from scissorcal.package import ModelPackage
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
 from scissorcal.render.admission_rule import LoopFacts
 
 LATE_TICKS = 2.0
@@ -31,7 +31,7 @@ class RigFacts:
     """What is known of the rig itself, None where nobody measured it; see LoopFacts.
 
     ``source`` says where friction and inertia come from, ``late_source`` the delay.
-    ``handle_zero_N`` is what the force sensor shows without a hand, 0 where nobody measured it.
+    ``rest`` is what a probe found of blades at rest.
     """
 
     coulomb_Nm: float | None = None
@@ -40,11 +40,23 @@ class RigFacts:
     late_s: float | None = None
     source: str = ""
     late_source: str = ""
-    handle_zero_N: float = 0.0
+    rest: RestFacts = UNKNOWN_REST
 
 
 def rig_facts(package: ModelPackage) -> RigFacts:
-    """Friction and inertia of the rig from the friction fit in a package; empty without one."""
+    """Friction and inertia of the rig from the friction fit in a package; empty without one.
+
+    Where the package renders a simpler friction than the fit's, or none, those of the fit count.
+    """
+    simplification = package.manifest.simplification
+    own = simplification.rig_friction if simplification else None
+    if own is not None:
+        return RigFacts(
+            coulomb_Nm=own.least_factor * _weakest(own.levels, "coulomb"),
+            damping_Nm_s_per_rad=own.least_factor * _weakest(own.levels, "viscous"),
+            inertia_kg_m2=own.inertia_kg_m2 or None,
+            source="the package's friction fit",
+        )
     record = package.manifest.provenance.friction
     if record is None:
         return RigFacts()
@@ -69,13 +81,13 @@ def fitted_facts(parameters: Sequence[Fitted], least: float, source: str) -> Rig
 
 
 def with_probe(rig: RigFacts, probe: ProbeResult | None) -> RigFacts:
-    """Add what a probe measured: its delay (upper end), its zero, and what nothing else has.
+    """Add what a probe measured: its delay (upper end), blades at rest, and what nothing else has.
 
     Friction and inertia of a probe are rough, so a fit's count where there is one.
     """
     if probe is None:
         return rig
-    found, name = replace(rig, handle_zero_N=probe.handle_zero_N), f"the probe of {probe.made_at}"
+    found, name = replace(rig, rest=probe.rest), f"the probe of {probe.made_at}"
     if probe.delay_s is not None:
         late_s = max(probe.delay_s.interval[1], 0.0)
         found = replace(found, late_s=late_s, late_source=name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from scissorcal.device.motion import Samples
 from scissorcal.device.timing import Percentiles, TimeHistogram
-from scissorcal.kernel import SampleFlag
+from scissorcal.kernel import SampleFlag, StateFlag
 from scissorcal.recording import RecordingWriter, TurningPoints
 
 Progress = Callable[[float, str], None]
@@ -43,12 +43,19 @@ class Watch:
         self._seconds = seconds
         self._began = self._looked_at = -np.inf
         self._lowest, self._highest = np.inf, -np.inf
+        self._changed_at = self._now = -np.inf
+        self._opening = np.nan
         self._recent: deque[tuple[float, float, float]] = deque()  # end, lowest and highest opening
 
     @property
     def strokes(self) -> int:
         """Closings of the blades so far."""
         return self._strokes.closings
+
+    @property
+    def still_s(self) -> float:
+        """For how long the opening has not changed by a single count, away from the stops."""
+        return max(0.0, self._now - self._changed_at) if self._recent else 0.0
 
     @property
     def latency(self) -> Percentiles | None:
@@ -71,9 +78,9 @@ class Watch:
         now = float(samples["device_time_us"][-1]) * 1e-6
         if self._began == -np.inf:
             self._began = float(samples["device_time_us"][0]) * 1e-6
-        opening = samples["opening"][(samples["flags"] & int(SampleFlag.INVALID)) == 0]
-        if len(opening):
-            self._follow(now, opening)
+        valid = samples[(samples["flags"] & int(SampleFlag.INVALID)) == 0]
+        if len(valid):
+            self._follow(now, valid)
         if now - self._looked_at < LOOK_EVERY_S or not self._recent:
             return False
         self._looked_at = now
@@ -88,7 +95,14 @@ class Watch:
         else:
             self._writer.poll(time.time_ns())
 
-    def _follow(self, now: float, opening: np.ndarray) -> None:
+    def _follow(self, now: float, samples: Samples) -> None:
+        opening = samples["opening"]
+        changes = np.diff(opening, prepend=self._opening) != 0.0
+        changes |= (samples["flags"] & int(StateFlag.OPENING_AT_STOP)) != 0
+        if changes.any():
+            last = np.flatnonzero(changes)[-1]
+            self._changed_at = float(samples["device_time_us"][last]) * 1e-6
+        self._now = now
         self._strokes.feed(opening)
         low, high = float(opening.min()), float(opening.max())
         self._lowest, self._highest = min(self._lowest, low), max(self._highest, high)

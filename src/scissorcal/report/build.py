@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
@@ -28,6 +29,9 @@ from scissorcal.report.inputs import (
     summarise_recording,
 )
 from scissorcal.report.twin import twin_text
+
+if TYPE_CHECKING:
+    from scissorcal.package.simplest.choice import SceneChoice
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ def build_report(
     geometry: Geometry | None = None,
     inputs_hash: str = "",
     completeness: Sequence[Cell] = (),
+    choice: SceneChoice | None = None,
     review: Review | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
@@ -63,8 +68,9 @@ def build_report(
     read. ``sheets`` are further parts, such as what a package states (:func:`sheet_from_mapping`);
     ``checks`` are trust checks by fit, ``geometry`` what photographs gave, whose pictures the page
     carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
-    used, cell by cell. The page shows ``review`` (by default the one in ``signature.json`` there)
-    where it was given to this very twin.
+    used, cell by cell; ``choice`` says what of the fitted laws the scene needs. The page shows
+    ``review`` (by default the one in ``signature.json`` there) where it was given to this very
+    twin.
     ``created`` must carry its time zone. The same input gives the same bytes; a report that says
     the same as the one in ``output_dir`` keeps the time of that one.
 
@@ -86,6 +92,7 @@ def build_report(
         checks or {},
         geometry,
         tuple(completeness),
+        choice,
     )
     document = compose(
         recipe,

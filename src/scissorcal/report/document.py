@@ -123,6 +123,10 @@ def compose(
         found, why = None, "A sliding joint carries no blades, so nothing is felt."
     sheet_panels = [closing.sheet_panel(sheet) for sheet in sheets]
     scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
+    if evidence.choice is not None:
+        from scissorcal.report.subjects.simplest import simplest_panel
+
+        scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
     provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
     cells = decision.cells_of(

@@ -63,14 +63,14 @@ def comparison_page(found: Comparison) -> str:
         f"<dt>{name}</dt><dd>{escape(source)}</dd>"
         for name, source in (("A", found.first), ("B", found.second))
     )
-    made = _made(found.created.strftime("%Y-%m-%d %H:%M %Z"), found.scissorcal_version)
+    made = made_line(found.created.strftime("%Y-%m-%d %H:%M %Z"), found.scissorcal_version)
     body = (
         f'<main><section id="decision" class="plain"><p class="kicker">Comparison of two runs</p>'
         f'<h1>A and B</h1><dl>{sides}</dl><p class="finding">{prose(found.sentence)}</p>{made}'
-        f"</section>{_tools([(p.id, p.title) for p in found.panels])}"
+        f"</section>{parts_nav([(p.id, p.title) for p in found.panels])}"
     )
-    body += "".join(_panel(panel, open_=True) for panel in found.panels)
-    return _page("Comparison of two calibration reports", body + "</main>")
+    body += "".join(panel_section(panel, open_=True) for panel in found.panels)
+    return whole_page("Comparison of two calibration reports", body + "</main>")
 
 
 def with_signature(page: str, review: Review) -> str:
@@ -94,12 +94,12 @@ def prose(sentence: str) -> str:
 
 def _report(document: ReportDocument, review: Review | None) -> str:
     body = ['<main id="report">', _decision(document, review)]
-    body.append(_tools([(part.id, part.title.partition(":")[0]) for part in document.parts]))
+    body.append(parts_nav([(part.id, part.title.partition(":")[0]) for part in document.parts]))
     for part in document.parts:
         panels = document.panels_of(part.id)
         sentence = f"<p>{prose(part.sentence)}</p>" if part.sentence else ""
         inner = "".join(
-            _panel(
+            panel_section(
                 panel,
                 open_=len(panels) < 3,
                 above=part.sentence,
@@ -114,10 +114,11 @@ def _report(document: ReportDocument, review: Review | None) -> str:
             f'<details class="part"><summary><h2>{prose(part.title)}</h2>{sentence}</summary>'
             f"{inner}</details></section>"
         )
-    return _page(f"{document.recipe_name}: calibration report", "".join(body) + "</main>")
+    return whole_page(f"{document.recipe_name}: calibration report", "".join(body) + "</main>")
 
 
-def _page(title: str, body: str) -> str:
+def whole_page(title: str, body: str) -> str:
+    """A page of this body, with styles, script and a policy that loads nothing from outside."""
     script = _asset("script.js")
     digest = base64.b64encode(bytes.fromhex(bytes_digest(script.encode()))).decode()
     policy = (
@@ -139,7 +140,8 @@ def _asset(name: str) -> str:
     return resources.files("scissorcal.report").joinpath("assets", name).read_text("utf-8")
 
 
-def _made(when: str, version: str) -> str:
+def made_line(when: str, version: str) -> str:
+    """When and by which version a page was made."""
     return f'<p class="meta">Made {escape(when)} by scissorcal {escape(version)}</p>'
 
 
@@ -147,7 +149,7 @@ def _decision(document: ReportDocument, review: Review | None) -> str:
     """The decision page: one screen, one printed page."""
     origin, *others = document.panels_of("decision")
     lead = ". ".join(part for part in (document.material, document.recipe_description) if part)
-    made = _made(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
+    made = made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
     cards = "".join(_card(panel) for panel in others)
     return (
         f'<section id="decision" aria-labelledby="report-title"><header><div>'
@@ -194,7 +196,7 @@ def _signature(review: Review | None) -> str:
     )
 
 
-def _tools(parts: Sequence[tuple[str, str]]) -> str:
+def parts_nav(parts: Sequence[tuple[str, str]]) -> str:
     """Links to the parts; search, which the script shows."""
     links = "".join(f'<li><a href="#{escape(i)}">{escape(title)}</a></li>' for i, title in parts)
     return (
@@ -204,7 +206,7 @@ def _tools(parts: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def _panel(panel: Panel, *, open_: bool, above: str = "", whole: bool = False) -> str:
+def panel_section(panel: Panel, *, open_: bool, above: str = "", whole: bool = False) -> str:
     """A panel that opens on demand; ``whole`` says that it is all of its part.
 
     Its sentence is left out where it stands ``above`` already.

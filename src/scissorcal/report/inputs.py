@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.edge.result import BladeResult
@@ -13,6 +13,9 @@ from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.numbers import Scalar, scalar
 from scissorcal.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from scissorcal.package.simplest.choice import SceneChoice
 
 GeometryFit = CameraFit | BladeResult | PlateFit
 
@@ -138,6 +141,7 @@ class Evidence:
     ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
     checks by fit ("friction", "cut"), ``geometry`` what photographs gave, ``completeness`` what was
     planned, recorded and used of captures (one without it is counted from recordings and fits).
+    ``choice`` says what of the fitted laws the scene needs.
     """
 
     recordings: tuple[RecordingSummary, ...] = ()
@@ -145,6 +149,7 @@ class Evidence:
     checks: Mapping[str, VerifyResult] = field(default_factory=dict)
     geometry: Geometry = field(default_factory=Geometry)
     completeness: tuple[Cell, ...] = ()
+    choice: "SceneChoice | None" = None
 
 
 @dataclass(frozen=True)

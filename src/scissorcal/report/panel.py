@@ -107,7 +107,8 @@ class Series:
     """A named curve, band, set of points, bars or cells; arrays share one length.
 
     ``low`` and ``high`` bound ``y`` (``x`` where the y axis has categories); ``cells`` carry their
-    value in ``value``. ``toggle`` says that a reader may switch it on and off.
+    value in ``value``; ``labels`` are written beside points. ``toggle`` says that a reader may
+    switch it on and off.
     """
 
     name: str
@@ -117,6 +118,7 @@ class Series:
     low: tuple[Number, ...] = ()
     high: tuple[Number, ...] = ()
     value: tuple[Number, ...] = ()
+    labels: tuple[str, ...] = ()
     look: Look = "ink"
     style: Style = "full"
     group: str = ""

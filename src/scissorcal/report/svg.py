@@ -280,7 +280,19 @@ def _points(one: Series, sx: _Scale, sy: _Scale, *, across: bool) -> str:
         return ""
     error = f'<path class="error" d="{"".join(bars)}"/>' if bars else ""
     size = ' class="large"' if large else ""
-    return f'{error}<path{size} d="{"".join(marks)}"/>'
+    return f'{error}<path{size} d="{"".join(marks)}"/>{_labels(one, sx, sy)}'
+
+
+def _labels(one: Series, sx: _Scale, sy: _Scale) -> str:
+    """Words beside points, above and below in turn, on the side where there is more room."""
+    parts = []
+    for place, (x, y, label) in enumerate(zip(one.x, one.y, one.labels, strict=False)):
+        if x is None or y is None or (sx.log and x <= 0) or (sy.log and y <= 0):
+            continue
+        left = sx(x) > 0.5 * (sx.start + sx.end)
+        at = f'x="{sx(x) + (-5 if left else 5):.1f}" y="{sy(y) + (-5 if place % 2 else 11):.1f}"'
+        parts.append(f'<text {at} class="{"end " if left else ""}cell">{escape(label)}</text>')
+    return "".join(parts)
 
 
 def _bars(one: Series, sx: _Scale, sy: _Scale) -> str:

@@ -2,7 +2,7 @@
 
 import struct
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ class Photo:
 
     ``image`` is (rows, columns) grey or (rows, columns, 3) blue-green-red, eight bits. ``width``
     and ``height`` are those of the whole photograph, turned upright; ``reduction`` says how many of
-    its pixels make one of ``image`` along each side (1, 2, 4 or 8), ``origin`` where the corner of
+    its pixels make one of ``image`` along each side, ``origin`` where the corner of
     ``image`` lies in it. ``orientation`` is EXIF's, 1 to 8; 1 means
     upright. ``sha256`` is of the file's bytes.
     """
@@ -54,6 +54,17 @@ class Photo:
         if self.image.ndim == 2:
             return self.image
         return np.asarray(cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+    def reduced(self, factor: int) -> "Photo":
+        """The same photograph read more coarsely: ``factor`` by ``factor`` pixels make one.
+
+        Raises ValueError unless ``factor`` divides both sides, as the rest would be cut off.
+        """
+        rows, columns = self.image.shape[:2]
+        if factor < 1 or rows % factor or columns % factor:
+            raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
+        image = _averaged(self.image, factor)
+        return replace(self, image=image, reduction=self.reduction * factor)
 
     def whole(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of ``image`` lie in the whole photograph; (0, 0) is a centre."""

@@ -1,21 +1,35 @@
 """What a scene requires of the day: the state of every step, in order, and what comes next."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from scissorcal.recipe.requirements import Requirement, requirements
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.probe import probe_state
 from scissorcal.workday.states import StepState
 from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.package.simplest.choice import SceneChoice
+    from scissorcal.workday.runs.design import CaptureDesign
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All steps in the order of the day, and what the scene does without."""
+    """All steps in the order of the day, and what the scene does without.
+
+    ``probe`` is what is known of the rig's probe. ``choice`` says what of the fitted laws the scene
+    needs; None until the fits are there and a report or a package was made of them. ``design`` is
+    the list of captures that was designed last, if it is for what there is now.
+    """
 
     recipe: str
     steps: tuple[StepState, ...]
     tables: tuple[Requirement, ...]
     left_out: tuple[Requirement, ...]
+    probe: str
+    choice: "SceneChoice | None" = None
+    design: "CaptureDesign | None" = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -43,4 +57,28 @@ def make_plan(workspace: Workspace) -> Plan:
     """
     engine = Engine.of(workspace)
     needs = requirements(engine.recipe)
-    return Plan(engine.recipe.name, engine.states(), needs.tables, needs.left_out)
+    return Plan(
+        engine.recipe.name,
+        engine.states(),
+        needs.tables,
+        needs.left_out,
+        probe_state(workspace, engine.recipe),
+        _choice(engine),
+        _design(engine),
+    )
+
+
+def _choice(engine: Engine) -> "SceneChoice | None":
+    if not engine.workspace.scene_choice_path.is_file():
+        return None
+    from scissorcal.workday.scene_choice import known_scene_choice
+
+    return known_scene_choice(engine)
+
+
+def _design(engine: Engine) -> "CaptureDesign | None":
+    if not engine.workspace.design_path.is_file():
+        return None
+    from scissorcal.workday.runs.design import stored_design
+
+    return stored_design(engine)

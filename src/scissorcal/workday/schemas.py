@@ -17,16 +17,20 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 SOURCES: Mapping[str, str] = {
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
+    "capture-design.schema.json": "scissorcal.workday.runs.design:CaptureDesign",
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
+    "extremes.schema.json": "scissorcal.bench.extremes.result:Extremes",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
     "probe.schema.json": "scissorcal.recording.probe:ProbeResult",
     "recipe.schema.json": "scissorcal.recipe.schema:Recipe",
     "recording.schema.json": "scissorcal.recording:recording_schema",
     "report.schema.json": "scissorcal.report.twin:schema_text",
+    "scene-choice.schema.json": "scissorcal.package.simplest.choice:SceneChoice",
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
     "track.schema.json": "scissorcal.calibration.plate.track:track_schema",
+    "trade.schema.json": "scissorcal.bench.trade.result:Trade",
     "verify.schema.json": "scissorcal.calibration.verify.result:VerifyResult",
 }
 """File name, and where its schema comes from: a pydantic model or dataclass that is described, or

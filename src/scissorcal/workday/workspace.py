@@ -53,12 +53,30 @@ class Workspace:
         return self.root / "device-probe.json"
 
     @property
+    def design_path(self) -> Path:
+        """The last list of captures that was designed."""
+        return self.root / "captures" / "design.json"
+
+    @property
     def report_html(self) -> Path:
         return self.root / "report" / "report.html"
 
     @property
     def report_json(self) -> Path:
         return self.root / "report" / "report.json"
+
+    @property
+    def trade_html(self) -> Path:
+        return self.root / "bench" / "trade.html"
+
+    @property
+    def trade_json(self) -> Path:
+        return self.root / "bench" / "trade.json"
+
+    @property
+    def trade_partial_path(self) -> Path:
+        """Where 'bench trade' keeps each measurement as it is made."""
+        return self.root / "bench" / "trade.partial.jsonl"
 
     @property
     def signature_path(self) -> Path:
@@ -94,6 +112,11 @@ class Workspace:
 
     def package_path(self, recipe: "Recipe") -> Path:
         return self.root / "package" / f"{recipe.name}.zip"
+
+    @property
+    def scene_choice_path(self) -> Path:
+        """What the scene needs of the fits, as it was worked out last."""
+        return self.root / "package" / "scene-choice.json"
 
     def relative(self, path: Path) -> str:
         """Name a file of the workspace as seen from its root."""

@@ -1,5 +1,7 @@
 """Recordings from which no cut can be fitted, and the sentences that say so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,33 @@ def test_cutting_air_is_refused(friction):
     with pytest.raises(InputError, match="hardly touched the material") as refused:
         fit_cut((air,), paper(fracture="smooth"), friction, effort="draft", rng=rng)
     assert "advance was zero at its near edge" in str(refused.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", ["one sample 1e6 sds off", "in mN m"])
+def test_torques_far_from_every_law_are_refused_with_the_farthest_sample(
+    friction, damage, monkeypatch
+):
+    """Without a bound the search took over 30,000 likelihoods, or ended at a point of NaN."""
+    monkeypatch.setattr("scissorcal.calibration.cut.scout.MOST_EVALUATIONS", 500)
+    rng = np.random.default_rng(16)
+    made = cut_recording(TRUTH, rng, sheets=1)
+    samples = made.samples.copy()
+    if damage == "in mN m":
+        samples["motor_torque"] *= 1e3
+    else:
+        samples["motor_torque"][3000] = 1e3
+    with pytest.raises(InputError, match="no law comes near") as refused:
+        fit_cut(
+            (replace(made, samples=samples),),
+            paper(fracture="smooth"),
+            friction,
+            effort="draft",
+            rng=rng,
+        )
+    away = np.abs(samples["motor_torque"] - np.median(samples["motor_torque"]))
+    assert f"sample {np.argmax(away)}: " in str(refused.value)
+    assert "check that torques are in N m" in str(refused.value)
 
 
 def test_a_recording_without_sheets_is_refused(friction):

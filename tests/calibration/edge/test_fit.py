@@ -296,6 +296,33 @@ def test_nothing_to_fit_is_said():
         fit_blade([], None, rng=np.random.default_rng(0))
 
 
+def test_a_photograph_with_too_few_points_of_the_edge_is_refused_by_name():
+    whole = measurement(np.random.default_rng(0))
+    for count, words in ((0, "only 0 points"), (9, "only 9 points")):
+        rows = slice(0, count)
+        few = replace(
+            whole,
+            station=whole.station[rows],
+            offset=whole.offset[rows],
+            sd=whole.sd[rows],
+            modes=whole.modes[rows],
+            softness=whole.softness[rows],
+        )
+        with pytest.raises(InputError, match=f"^a.jpg: {words} of the blade's edge"):
+            edge_cells(few, 40)
+    at_one_place = replace(whole, station=np.full_like(whole.station, 0.02))
+    with pytest.raises(InputError, match="take it again from nearer"):
+        edge_cells(at_one_place, 40)
+
+
+def test_a_photograph_whose_points_lie_in_few_places_is_refused_by_name():
+    whole = measurement(np.random.default_rng(0))
+    away = whole.station.copy()
+    away[1:-1] = np.linspace(0.0200, 0.0201, len(away) - 2)
+    with pytest.raises(InputError, match="stretches without nicks"):
+        edge_cells(replace(whole, station=np.sort(away)), 40)
+
+
 def test_many_photographs_take_fewer_cells_each():
     assert cells_each(1) == 110
     assert cells_each(4) == 40

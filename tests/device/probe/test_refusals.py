@@ -149,6 +149,13 @@ def test_an_encoder_counted_by_half_shows_where_creeping_is_allowed() -> None:
     assert result.facts["range_ratio"] == pytest.approx(1.0, abs=0.01)
 
 
+def test_without_creeping_the_count_scale_is_stated_as_not_checked() -> None:
+    result, _ = probed(FAULTS["encoder counted by half"])
+    verdict = next(item for item in result.verdicts if item.check == "count scale")
+    assert (verdict.status, verdict.value) == ("not_evaluated", None)
+    assert verdict.why.startswith("Not checked: whether the encoder counts")
+
+
 def test_nobody_to_ask_is_refused_before_anything_is_sent() -> None:
     device = StrangeDevice(seed=1)
     with pytest.raises(InputError, match="must ask a person to clear the blades"):

@@ -1,8 +1,10 @@
 """When a workspace's probe counts, what is said, and where it goes."""
 
 import json
+from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,9 +15,10 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import probe_of
 from scissorcal.workday.runs.capture import capture_into, speeds_below_encoder
-from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into
+from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into, probe_state
 from scissorcal.workday.workspace import Workspace, create_workspace
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
+from tests.strange_device.trials import short_recipe
 
 
 @pytest.fixture
@@ -104,6 +107,31 @@ def test_a_capture_probes_and_its_recording_holds_what_was_found(workspace: Work
     assert found is not None
     assert found.inertia_kg_m2 is not None
     assert "motor_sign" not in recording.device
+
+
+def test_probe_and_capture_ask_once_to_clear_the_blades(workspace: Workspace) -> None:
+    """A capture without a probe asks by itself."""
+    recipe = short_recipe()
+    asked: list[str] = []
+    for expected in ("The capture follows at once", "this capture needs them empty"):
+        port = nullcontext(VirtualPort(StrangeDevice(seed=1)))
+        rig = patch("scissorcal.workday.runs.capture.open_rig", return_value=port)
+        with rig, patch.object(Workspace, "recipe", return_value=recipe):
+            capture_into(workspace, "friction", "a port", confirm=asked.append)
+        assert expected in asked.pop()
+        assert not asked
+
+
+def test_the_plan_says_whether_the_probe_counts(workspace: Workspace) -> None:
+    recipe = workspace.recipe()
+    assert "there is no probe of it yet" in probe_state(workspace, recipe)
+    first = ensure_probed(workspace, virtual_rig(), recipe)
+    good = probe_state(workspace, recipe)
+    assert good.startswith(f"{first.device} was probed at {first.made_at}: no check failed")
+    assert "count scale" in good
+    later = datetime.now(UTC) + timedelta(hours=5)
+    assert "probed again before" in probe_state(workspace, recipe, later)
+    assert "rig.motor_sign changed" in probe_state(workspace, changed(recipe, motor_sign=-1))
 
 
 def test_speeds_that_a_coarse_encoder_hides_are_named_before_the_capture(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, first_pose
 from scissorcal.calibration.camera.result import CrossValidation, PixelMap, ViewError
-from scissorcal.errors import VerdictError
+from scissorcal.errors import InputError, VerdictError
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.geometry.camera import Camera
 
@@ -23,9 +23,24 @@ LEAST_P = 0.01
 OUTLYING = 2.5
 """A photograph whose rms is so many times the middle one's is named."""
 
+_BORDER = 0.01
+"""Share of the picture by which a refined corner may lie beyond its border."""
 _PARALLEL_DEG = 6.0
 _UNDETERMINED = 0.05
 _SCOPE = "fit.camera"
+
+
+def refuse_outside(views: Sequence[SeenBoard], width: int, height: int) -> None:
+    """Raise InputError where a corner lies outside of its photograph, or is no number."""
+    for view in views:
+        with np.errstate(invalid="ignore"):
+            inside = np.abs(view.pixels / [width, height] - 0.5) <= 0.5 + _BORDER
+        if not np.all(inside):
+            x, y = view.pixels[np.argmin(np.all(inside, axis=1))]
+            raise InputError(
+                f"{view.name}: a corner is at ({x:.6g}, {y:.6g}) px, outside of the photograph of "
+                f"{width} by {height}: detect its corners again, or leave it out."
+            )
 
 
 def refuse_parallel(views: Sequence[SeenBoard], start: Array) -> None:

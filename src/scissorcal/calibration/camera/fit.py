@@ -12,6 +12,7 @@ from scissorcal.calibration.camera.checks import (
     FEWEST_VIEWS,
     OUTLYING,
     camera_verdicts,
+    refuse_outside,
     refuse_parallel,
     refuse_undetermined,
 )
@@ -57,7 +58,8 @@ def fit_camera(
     that the corners of one photograph err together. Photographs that fit far worse than the others
     are named, none is dropped. ``priors`` are the recipe's.
 
-    Raises MissingError with fewer than three photographs, VerdictError where they do not determine
+    Raises MissingError with fewer than three photographs, InputError where a corner lies outside
+    of its photograph, VerdictError where they do not determine
     the focal length: all taken with the board at one slant.
     """
     tell = progress or (lambda _share, _sentence: None)
@@ -66,6 +68,7 @@ def fit_camera(
     width, height = photos[0].width, photos[0].height
     views = [seen_board(photo.name, photo.detection, priors) for photo in photos]
     start = usual_camera(width, height).parameters
+    refuse_outside(views, width, height)
     refuse_parallel(views, start)
     tell(0.0, "camera: first fit")
     first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))

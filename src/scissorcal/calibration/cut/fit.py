@@ -27,6 +27,7 @@ from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
+    MisfitError,
     Scouted,
     belief_geometry,
     make_experiment,
@@ -40,6 +41,7 @@ from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
+from scissorcal.calibration.signals.soundness import farthest_torque, refuse_unsound
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
@@ -120,9 +122,11 @@ def fit_cut(
     friction, this fit fails too. ``checkpoint`` is a file from which an interrupted thorough fit
     continues. ``last_chosen`` is the law that draft effort fits where the recipe allows several,
     ``stop`` says whether the time limit is reached. ``prior`` replaces the recipe's in a study of
-    simulated data. Raises InputError where the blades hardly touched the material.
+    simulated data. Raises InputError where the blades hardly touched the material, a value is no
+    measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
+    refuse_unsound(recordings)
     data = _Data.of(recordings, recipe, friction, edge, prior)
     _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
@@ -165,6 +169,25 @@ def cut_experiment(
     )
 
 
+def cut_optimum(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    edge: EdgeBelief | None = None,
+    last_chosen: str | None = None,
+) -> tuple[CutExperiment, Array]:
+    """Design and MAP point (p,) of the law that draft effort fits, without a posterior.
+
+    For a capture that goes on meanwhile. Arguments and errors as in :func:`fit_cut`.
+    """
+    data = _Data.of(recordings, recipe, friction, edge)
+    _refuse_no_contact(data)
+    laws = candidates_for("draft", allowed_laws(recipe), last_chosen)
+    scouted = _scouted(data, laws)
+    ((fitted, design),) = _fit_laws(scouted, data, laws, lambda done, sentence: None, None)
+    return design, fitted.optimum.point
+
+
 def _cleaned(
     recordings: tuple[Recording, ...], recipe: Recipe, friction: FitResult, known: KnownFriction
 ) -> tuple[tuple[Recording, ...], KnownFriction]:
@@ -192,6 +215,12 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
             f"{data.names}: no stroke shows the blades unloading the material, so its response "
             "cannot be separated from friction. Check rig.edge and the sheet's place, and open "
             "the blades wide in every stroke."
+        ) from error
+    except MisfitError as error:
+        raise InputError(
+            f"{data.names}: no law comes near the recorded torques ({error}). Look for a torque "
+            f"far from the others ({farthest_torque(data.recordings)}), and check that torques are "
+            "in N m; then remove those samples or record again."
         ) from error
 
 

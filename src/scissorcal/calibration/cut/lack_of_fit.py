@@ -52,7 +52,7 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
     problem = design.candidate(design.observed).problem(design.series)
     step = 0.1 * natural_step(problem.log_posterior, point, 0.1 * problem.prior_sd)
     shifts = {}
-    for kind, changed in _changed(design).items():
+    for kind, changed in changed_designs(design).items():
         other = changed.candidate(changed.observed).problem(changed.series)
 
         def gained(u: Array, other: object = other, problem: object = problem) -> Array:
@@ -60,13 +60,17 @@ def budget_of(design: CutExperiment, point: Array, covariance: Array, share: flo
 
         score = gradient(gained, point, step)[0] / PERTURBATION
         shifts[kind] = covariance @ score
+    return Budget(error_shares(design, point, share), shifts)
+
+
+def error_shares(design: CutExperiment, point: Array, share: float) -> dict[str, float]:
+    """The relative error that is allowed for in each kind of segment of a design."""
     load = float(design.layout.natural(point).get("load_share", 0.0))
     elastic = float(np.hypot(share, LOAD_ERROR * load))
-    shares = {kind: elastic if "loading" in kind else share for kind in shifts}
-    return Budget(shares, shifts)
+    return {kind: elastic if "loading" in kind else share for kind in changed_designs(design)}
 
 
-def _changed(design: CutExperiment) -> dict[str, CutExperiment]:
+def changed_designs(design: CutExperiment) -> dict[str, CutExperiment]:
     """Designs in which one kind of segment was measured larger by ``PERTURBATION``.
 
     Elastic segments may also be wrong in proportion to their torque, from less to more within a

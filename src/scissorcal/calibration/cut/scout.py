@@ -18,7 +18,7 @@ from scissorcal.calibration.cut.path.runs import find_runs
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
-from scissorcal.inference import Optimum, find_optimum
+from scissorcal.inference import Counter, Optimum, find_optimum
 from scissorcal.model import EdgeBelief, Response
 from scissorcal.recipe.schema import Recipe
 
@@ -28,6 +28,16 @@ ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)
 MOST_SDS = 4.0
 """A line is rejected where it lies more standard deviations from the rest of the data."""
+
+MOST_EVALUATIONS = 10_000
+"""Likelihoods after which a preliminary search ends; those of virtual days take 240 to 1,300."""
+LARGEST_MISFIT = 100.0
+"""Root mean square of residuals, in their standard deviations, that no search is needed to reject:
+0.9 to 1.1 where a law holds; over 1,000 with a single torque 1e6 standard deviations off."""
+
+
+class MisfitError(ValueError):
+    """A preliminary search found no optimum, and its best point is nowhere near the data."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +73,7 @@ def scout(
 ) -> Scouted:
     """Fit a power law twice, segment the recordings by its result, and look for the teeth.
 
-    Raises NoUnloadingError where none was seen.
+    Raises NoUnloadingError where none was seen, MisfitError where the law is nowhere near the data.
     """
     materials = tuple(known.material(motion) for motion in motions)
     exponent = recipe.fit.cut.response_exponent
@@ -87,10 +97,10 @@ def scout(
             if not segments.pieces:
                 raise NoUnloadingError("no stroke shows unloading")
             design = make_experiment(segments, geometry, recipe, law, known, values)
-            optimum = find_optimum(design.candidate(design.observed).problem(design.series))
+            optimum = _found(design)
             evaluations += optimum.evaluations
             values = _natural(design, optimum.point)
-            guess = _guess_of(design, values)
+            guess = guess_at(design.key, values)
     found = Scouted(segments, materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
         return found
@@ -184,7 +194,7 @@ def _with_line(
     for _ in range(ROUNDS):
         values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
         design = make_experiment(found.segments, geometry, recipe, design.law, known, values, line)
-        with_line = find_optimum(design.candidate(design.observed).problem(design.series))
+        with_line = _found(design)
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
         again = _line(replace(found, values=values), geometry, design, near=True)
@@ -200,6 +210,18 @@ def _with_line(
         )
         return replace(found, line=line, reason=reason, evaluations=evaluations)
     return replace(found, values=values, line=line, accepted=True, evaluations=evaluations)
+
+
+def _found(design: CutExperiment) -> Optimum:
+    """The optimum of a preliminary fit, or the best of ``MOST_EVALUATIONS``."""
+    counter = Counter()
+    problem = counter.over(design.candidate(design.observed).problem(design.series))
+    optimum = find_optimum(problem, stop=lambda: counter.calls >= MOST_EVALUATIONS)
+    if not optimum.success:
+        misfit = float(np.sqrt(np.mean(design.evaluate(optimum.point).standardised ** 2)))
+        if not misfit < LARGEST_MISFIT:
+            raise MisfitError(f"residuals of {misfit:.3g} standard deviations")
+    return optimum
 
 
 def _line(
@@ -255,8 +277,9 @@ def _values_of(guess: Guess, fracture: str) -> dict[str, float]:
     }
 
 
-def _guess_of(design: CutExperiment, values: Mapping[str, float]) -> Guess:
-    response = response_from(design.key, {k: np.asarray(v) for k, v in values.items()})
+def guess_at(structure: Mapping[str, Any], values: Mapping[str, float]) -> Guess:
+    """Where cracks rest and run by the parameters ``values`` of a law with that structure."""
+    response = response_from(structure, {k: np.asarray(v) for k, v in values.items()})
     if "fracture_energy" not in values:
         return Guess(response, np.inf)
     kappa = values.get("kappa", 1.0)

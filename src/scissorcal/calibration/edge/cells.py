@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.model.bspline import spline_design
+from scissorcal.errors import InputError
+from scissorcal.model.bspline import FEWEST, spline_design
 from scissorcal.vision.blade.measure import BladeMeasurement
 
 Array = NDArray[np.float64]
@@ -59,8 +60,13 @@ def edge_cells(measured: BladeMeasurement, cells: int) -> EdgeCells:
 
     A flexible curve is fitted with Tukey's weights; stretches that lie beyond five robust standard
     deviations of it are left out with their neighbourhood. Inward they are nicks. What has no
-    scale comes in blade lengths.
+    scale comes in blade lengths. Raises InputError where too few points are left of a photograph
+    that is coarse or hardly shows the blade: fewer than the flexible curve has weights, or fewer
+    cells than a cubic has coefficients.
     """
+    points = len(measured.station)
+    if points < _WEIGHTS or not measured.station[-1] > measured.station[0]:
+        raise InputError(_too_few(measured, f"{points} points", f"{_WEIGHTS} points"))
     off = _away_from_smooth(measured)
     spread = 1.4826 * float(np.median(np.abs(off - np.median(off))))
     limit = max(_FAR_OFF * spread, _SHALLOWEST_M if measured.metric else _SHALLOWEST_SHARE)
@@ -118,6 +124,13 @@ def _stretches(off: Array, limit: float, spread: float) -> list[tuple[int, int]]
     return out
 
 
+def _too_few(measured: BladeMeasurement, found: str, needed: str) -> str:
+    return (
+        f"{measured.source}: only {found} of the blade's edge could be measured, and a fit needs "
+        f"{needed}: leave this photograph out, or take it again from nearer or with more pixels."
+    )
+
+
 def _nick(
     measured: BladeMeasurement, off: Array, start: int, stop: int, limit: float
 ) -> FoundNick | None:
@@ -152,6 +165,10 @@ def _averaged(
     weight = 1.0 / np.maximum(measured.sd[keep], 1e-12) ** 2
     total = np.bincount(index, weight, cells)
     filled = np.bincount(index, minlength=cells) >= 2
+    if filled.sum() < FEWEST:
+        raise InputError(
+            _too_few(measured, f"{filled.sum()} stretches without nicks", f"{FEWEST} of them")
+        )
 
     def mean(values: Array) -> Array:
         return np.bincount(index, weight * values, cells)[filled] / total[filled]

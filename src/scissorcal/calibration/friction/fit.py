@@ -37,6 +37,7 @@ from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_frictio
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.sensors import inspect_sensors
+from scissorcal.calibration.signals.soundness import refuse_unsound
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
@@ -81,9 +82,11 @@ def fit_friction(
 
     ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
     of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
-    ``stop`` says whether the time is used up. Raises InputError where there is too little motion.
+    ``stop`` says whether the time is used up. Raises InputError where there is too little motion, a
+    value is no measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
+    refuse_unsound(recordings)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)

@@ -75,6 +75,8 @@ def stroke_offsets(
     tick_s = windows.tick_s
     ticks = np.maximum(np.round(counts * windows.bins.bin_s / tick_s).astype(int), 1)
     explained = np.array([noise.variance_of_mean(int(n), tick_s) for n in ticks])
+    if not np.all(explained > 0.0):  # without noise, all scatter of the means is the strokes'
+        return float(np.sqrt(np.mean(means**2)))
     weights = 1.0 / explained
     excess = (weights @ (means**2 - explained)) / weights.sum()
     return float(np.sqrt(max(excess, 0.0)))

@@ -10,7 +10,7 @@ from scissorcal.calibration.fit_candidate import CandidateProblem
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.inference.least_squares import least_squares
-from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked
 
@@ -218,6 +218,8 @@ def _status(problem: CandidateProblem, point: Array) -> tuple[SearchStatus, tupl
         return SearchStatus.AT_BOUNDS, picked(problem.names, bound)
     law = _law(problem)
     height = law.log_likelihood(point)
+    if is_rounded(height):
+        return SearchStatus.ROUNDED, ()
     silent = np.array(
         [
             all(

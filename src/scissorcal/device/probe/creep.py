@@ -5,13 +5,14 @@ from collections.abc import Callable
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StateFlag
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 RATE_RAD_PER_S = 0.15
 TORQUE_SHARE = 1.5
 """The largest torque of the creep, as a multiple of the breakaway torque; within the bounds."""
 GAIN_S = 0.15
 """Seconds of the stated rate within which the torque grows from 0 to its largest."""
+COUNT_SCALE = "count scale"
 STILL_S = 0.4
 STILL_STEPS = 5.0
 RATIO_LIMIT = 0.05
@@ -36,8 +37,17 @@ def creep(
         f"{stated:.3g}: its counts per turn or its gear are wrong by a factor {ratio:.2g}, or "
         "something blocks the blades. Correct the firmware, or clear them."
     )
-    verdict = judge("probe.sensors", "count scale", abs(ratio - 1.0), RATIO_LIMIT, good, bad)
+    verdict = judge("probe.sensors", COUNT_SCALE, abs(ratio - 1.0), RATIO_LIMIT, good, bad)
     return [verdict], {"range_ratio": ratio}
+
+
+def count_scale_not_checked() -> Verdict:
+    """State that nobody looked at the count scale: only both stops show it."""
+    why = (
+        "Not checked: whether the encoder counts the way between the stops rightly, or half or "
+        "twice of it. rig.probe.creep = true checks it: the blades then move slowly to both stops."
+    )
+    return not_evaluated("probe.sensors", COUNT_SCALE, why, RATIO_LIMIT)
 
 
 def _to_stop(talk: Talk, way: int, most: float) -> Stage[float]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.talk import RELEASE, Stage, Talk
-from scissorcal.kernel import StateFlag
+from scissorcal.kernel import Identity, StateFlag
 from scissorcal.recording.probe import Estimate
 from scissorcal.recording.summarising import missing_frames
 
@@ -19,6 +19,12 @@ CLEARINGS = 100
 """As in the protocol: a fault that remains after so many commands with CLEAR_FAULT stays."""
 CHUNKS = 16
 WINDOW = 10.0
+LAGS = 50
+WHITE_STEPS = 1.0
+"""Readings that go to and fro between two steps, as those of an encoder without noise may where it
+rests between them, are off by half a step at most."""
+WHITE_CORRELATION = 0.3
+"""Ten standard errors over an idle second of 1 kHz. A vibration repeats itself: it nears 1."""
 LEAST_STEPS = 4
 """Differences between readings that tell the encoder's step."""
 
@@ -30,7 +36,8 @@ class Idle:
     ``not_finite`` names fields that were no number. ``clock_ratio`` is the device's clock by
     ``tick_us``, ``host_ratio`` by the host's clock with its standard error; ``step_rad`` the
     encoder's step as seen, ``moved_rad`` how far the blades moved, ``jitter_rad`` the standard
-    deviation of the opening about its slow motion. Shares are of the frames that were due.
+    deviation of the opening about its slow motion and ``jitter_correlation`` the largest
+    magnitude of its autocorrelation. Shares are of the frames that were due.
     """
 
     fault_stays: bool
@@ -40,6 +47,7 @@ class Idle:
     opening_high: float
     moved_rad: float
     jitter_rad: float
+    jitter_correlation: float
     torque_zero: Estimate
     torque_noise: float
     force_zero: Estimate
@@ -79,6 +87,7 @@ def idle(talk: Talk) -> Idle:
         opening_high=float(opening.max()),
         moved_rad=float(np.ptp(slow)),
         jitter_rad=float(np.std(opening - slow)),
+        jitter_correlation=largest_correlation(opening - slow),
         torque_zero=mean_of(torque),
         torque_noise=_sd(torque),
         force_zero=mean_of(force),
@@ -90,6 +99,14 @@ def idle(talk: Talk) -> Idle:
         lost_share=lost / due,
         garbled_share=(talk.link.garbled - garbled) / due,
         duplicate_share=(talk.duplicates - duplicates) / due,
+    )
+
+
+def jitters(found: Idle, identity: Identity) -> bool:
+    """Whether the encoder alone, at rest, repeats no reading for long: noise, and no vibration."""
+    return (
+        found.jitter_rad >= WHITE_STEPS * identity.opening_resolution > 0.0
+        and found.jitter_correlation < WHITE_CORRELATION
     )
 
 
@@ -188,6 +205,16 @@ def _slow(values: Array) -> Array:
     width = max(1, len(values) // 10)
     padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def largest_correlation(values: Array) -> float:
+    """Largest magnitude of the autocorrelation over up to `LAGS` samples; 1 for a constant."""
+    n = len(values)
+    off = values - values.mean()
+    power = float(off @ off)
+    if n <= LAGS or not power > 0.0:
+        return 1.0
+    return max(abs(float(off[lag:] @ off[:-lag])) for lag in range(1, LAGS + 1)) / power
 
 
 def _sd(values: Array) -> float:

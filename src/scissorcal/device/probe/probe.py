@@ -9,8 +9,8 @@ from scissorcal.device.capture import identity_facts
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
-from scissorcal.device.probe.creep import creep
-from scissorcal.device.probe.idle import Idle, idle, observed_step
+from scissorcal.device.probe.creep import count_scale_not_checked, creep
+from scissorcal.device.probe.idle import Idle, idle, jitters, observed_step
 from scissorcal.device.probe.judge import (
     OPENING,
     SLEDGE,
@@ -140,6 +140,8 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
         tell(0.9, "creeping to the stops")
         verdicts, facts = creep(talk, finding.result.facts["breakaway_Nm"], tell)
         finding.add(verdicts, facts=facts)
+    else:
+        finding.add([count_scale_not_checked()])
     finding.add(
         [],
         facts={
@@ -219,6 +221,7 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
             "torque_noise_Nm": found.torque_noise,
             "force_noise_N": found.force_noise,
             "encoder_jitter_rad": found.jitter_rad,
+            "encoder_jitters": float(jitters(found, identity)),
             "clock_ratio": found.clock_ratio,
             "clock_by_host_ratio": found.host_ratio,
             "lost_share": found.lost_share,

@@ -20,16 +20,13 @@ from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S, STOP_MARGIN_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag, decode, encode
-from scissorcal.kernel.servo import OPENING_RATE_LIMIT
+from scissorcal.kernel.loop import STALL_TICKS
+from scissorcal.kernel.servo import LEAP_RATES, OPENING_RATE_LIMIT, STUCK_FRAMES
 
 Done = TypeVar("Done")
 
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
-STALL_TICKS = 5
-"""As in the loop: a longer pause between two states by the host's clock is a stall."""
-STUCK_FRAMES = 20
-"""As in the servo."""
 U32 = 2**32
 
 HEARD = np.dtype(
@@ -319,7 +316,8 @@ class Talk(AbstractContextManager["Talk"]):
             return "its sequence began again: it restarted. Check its supply."
         if len(recent) > 1:
             leap = abs(recent[-1][2] - recent[-2][2])
-            if leap > OPENING_RATE_LIMIT * (recent[-1][0] - recent[-2][0]) * self.tick_s:
+            passed_s = (recent[-1][0] - recent[-2][0]) * self.tick_s
+            if leap > LEAP_RATES * OPENING_RATE_LIMIT * passed_s:
                 return (
                     f"the opening leapt by {leap:.2g} rad within a frame; check the encoder and "
                     "its cable."

@@ -9,14 +9,33 @@ material it takes the end of the cut to be where the blades last crossed.
 import math
 from collections.abc import Iterator
 from enum import Enum
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.device.sim.blade import BladeOnSheet
 from scissorcal.device.sim.sensors import standard_normals
 from scissorcal.device.sim.specimen import Specimen
 
 TREMOR_BANDWIDTH_HZ = 2.0
+
+
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+def minimum_jerk(elapsed: Number) -> tuple[Number, Number]:
+    """Share of the way, and its derivative, at a share ``elapsed`` (0 to 1) of a movement's time.
+
+    The derivative is largest in the middle: 15 / 8 of the mean.
+
+    >>> minimum_jerk(0.5)
+    (0.5, 1.875)
+    """
+    square = elapsed * elapsed
+    rest = 1.0 - elapsed
+    share = square * elapsed * (10.0 + elapsed * (6.0 * elapsed - 15.0))
+    return share, 30.0 * square * rest * rest
 
 
 class Phase(Enum):
@@ -86,8 +105,8 @@ class VirtualHand:
         due = max(self._opening_path[2], self._advance_path[2]) + law.pause_s
         if self._elapsed >= due and not self._next_phase(opening, advance):
             return 0.0, 0.0
-        target, target_rate = _minimum_jerk(self._opening_path, self._elapsed)
-        place, place_rate = _minimum_jerk(self._advance_path, self._elapsed)
+        target, target_rate = _on_path(self._opening_path, self._elapsed)
+        place, place_rate = _on_path(self._advance_path, self._elapsed)
         torque = law.stiffness_Nm_per_rad * (opening - target)
         torque += law.damping_Nm_s_per_rad * (rate - target_rate)
         force = law.advance_stiffness_N_per_m * (place - advance)
@@ -161,16 +180,13 @@ class VirtualHand:
         return low
 
 
-def _minimum_jerk(path: tuple[float, float, float], elapsed: float) -> tuple[float, float]:
+def _on_path(path: tuple[float, float, float], elapsed: float) -> tuple[float, float]:
     """Place and speed at ``elapsed`` seconds on the path (from, to, duration)."""
     start, end, duration = path
     if elapsed >= duration:
         return end, 0.0
-    t = elapsed / duration
-    square = t * t
-    share = square * t * (10.0 + t * (6.0 * t - 15.0))
-    grade = 30.0 * square * (1.0 - t) * (1.0 - t) / duration
-    return start + (end - start) * share, (end - start) * grade
+    share, grade = minimum_jerk(elapsed / duration)
+    return start + (end - start) * share, (end - start) * (grade / duration)
 
 
 def _tremor(

@@ -12,8 +12,9 @@
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 5, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 6, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
+    SC_TICKS_OF_A_STALL = 5,
     SC_HISTOGRAM_BINS = 192,
     SC_BINS_PER_OCTAVE = 8
 };
@@ -61,7 +62,7 @@ typedef struct {
     uint64_t other_frames; /* valid, but no STATE */
     uint64_t answers;      /* commands written */
     uint64_t unsent;       /* commands that the line did not accept in time */
-    uint64_t stalls;       /* more than 5 ticks between two STATE by the host's clock */
+    uint64_t stalls;       /* longer than SC_TICKS_OF_A_STALL between two STATE by the host's clock */
     int64_t started_ns;
     sc_orders orders;
     sc_mailbox mailbox;

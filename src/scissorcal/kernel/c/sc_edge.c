@@ -28,6 +28,12 @@ static int stand_in(const sc_piece *piece, sc_turn turn, float t, sc_edge_point 
     return stand(turn, offset, point);
 }
 
+int sc_edge_stands(float flattest, float steepest, sc_turn turn)
+{
+    const float slope = turn.sine > 0.0f ? steepest : flattest;
+    return turn.cosine - slope * turn.sine > SMALLEST_RUN;
+}
+
 int sc_edge_at_station(const sc_table *edge, sc_turn turn, float station, sc_edge_point *point)
 {
     const sc_piece piece = sc_table_piece(edge, station, point->knot);

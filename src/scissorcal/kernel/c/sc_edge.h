@@ -28,6 +28,10 @@ typedef struct {
     float run;
 } sc_edge_point;
 
+/* 1 unless an edge whose slope e' lies between both ends stands upright or leans back somewhere: then
+ * more than one of its points, or none, may stand over a place. */
+int sc_edge_stands(float flattest, float steepest, sc_turn turn);
+
 /* The edge at a station; 0 if it stands too steeply against the cut there (psi > 87 deg). */
 int sc_edge_at_station(const sc_table *edge, sc_turn turn, float station, sc_edge_point *point);
 

@@ -15,7 +15,6 @@ enum {
     WRITE_PATIENCE_MS = 20,
     READ_BYTES = 4096,
     FAREWELLS = 3,
-    TICKS_OF_A_STALL = 5,
     FRAMES_UNTIL_ASKED_AGAIN = 50,
     EMPTY_READS_OF_AN_END = 10 /* some ports give one now and then without an error */
 };
@@ -161,7 +160,7 @@ static void note_interval(loop *self)
     if (self->has_state) {
         const int64_t interval = self->arrived_ns - self->last_state_ns;
         sc_histogram_add(&block->interval, interval);
-        if (interval > (int64_t)block->config.tick_us * 1000 * TICKS_OF_A_STALL) {
+        if (interval > (int64_t)block->config.tick_us * 1000 * SC_TICKS_OF_A_STALL) {
             block->stalls++;
         }
     }

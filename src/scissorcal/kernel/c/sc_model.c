@@ -14,9 +14,10 @@ static int is_finite_step(const sc_step_output *out)
 }
 
 /* Within half a turn either way: sines of larger angles would only pretend to mean something. */
-static int is_usable(float opening, float rate, float place)
+static int is_usable(const sc_model *model, sc_turn turn, float opening, float rate, float place)
 {
-    return fabsf(opening) <= WIDEST_OPENING && isfinite(rate) && isfinite(place);
+    return fabsf(opening) <= WIDEST_OPENING && isfinite(rate) && isfinite(place) &&
+           sc_edge_stands(model->flattest, model->steepest, turn);
 }
 
 static void refuse(sc_step_output *out)
@@ -187,7 +188,7 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
     bite.point.knot = state->edge_knot;
     bite.knot = state->response_knot;
     memset(out, 0, sizeof *out);
-    if (!is_usable(opening, rate, state->crack - advance) ||
+    if (!is_usable(model, turn, opening, rate, state->crack - advance) ||
         !sc_edge_over(&model->edge, turn, state->crack - advance, &bite.point)) {
         refuse(out);
         return;
@@ -213,29 +214,37 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
     }
 }
 
-float sc_model_settled_torque(const sc_model *model, float opening, float rate, float contact)
+/* 0 where a step would be INVALID. */
+static int settled_torque(const sc_model *model, float opening, float rate, float contact,
+                          float *torque)
 {
     const sc_turn turn = turn_of(model, opening);
     sc_bite bite;
     bite.point.knot = bite.knot = 0;
-    if (!is_usable(opening, rate, contact) ||
+    *torque = 0.0f;
+    if (!is_usable(model, turn, opening, rate, contact) ||
         !sc_edge_over(&model->edge, turn, contact, &bite.point)) {
-        return 0.0f;
+        return 0;
     }
     sc_sit(model, &bite);
-    float torque = 0.0f;
     int reached = bite.point.station < model->tip_station;
     if (reached && model->fracture_energy > 0.0f &&
         sc_release(model, &bite) > model->fracture_energy) {
         reached = sc_run_out(model, turn, falls_at(model, opening), model->fracture_energy, &bite);
     }
     if (reached) {
-        torque = torque_of(model, &bite.point, damped(model, &bite.point, bite.force, rate));
+        *torque = torque_of(model, &bite.point, damped(model, &bite.point, bite.force, rate));
     }
     if (model->render_friction) {
-        torque -= sc_model_friction(model, opening, rate);
+        *torque -= sc_model_friction(model, opening, rate);
     }
-    return isfinite(torque) ? torque : 0.0f;
+    return isfinite(*torque);
+}
+
+float sc_model_settled_torque(const sc_model *model, float opening, float rate, float contact)
+{
+    float torque;
+    return settled_torque(model, opening, rate, contact, &torque) ? torque : 0.0f;
 }
 
 void sc_model_step_many(const sc_model *model, sc_crack *state, int64_t n, const float *opening,
@@ -250,6 +259,8 @@ void sc_model_torque_many(const sc_model *model, int64_t n, const float *opening
                           const float *contact, float *torque)
 {
     for (int64_t i = 0; i < n; i++) {
-        torque[i] = sc_model_settled_torque(model, opening[i], rate[i], contact[i]);
+        if (!settled_torque(model, opening[i], rate[i], contact[i], &torque[i])) {
+            torque[i] = NAN;
+        }
     }
 }

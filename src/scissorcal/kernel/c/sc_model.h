@@ -18,7 +18,8 @@
  *   deeper than the response's table   straight on with its last slope, up to 1e6 N
  *   beyond the edge's table            the edge goes on straight
  *   |rate| beyond the friction tables  the last value is held
- *   opening beyond half a turn, or an edge steeper than some 87 deg: refused (INVALID)
+ *   opening beyond half a turn, or an edge that anywhere stands steeper than some 87 deg or leans
+ *                                      back: refused (INVALID)
  *
  * All outputs of a step are finite: what cannot be evaluated gives zero torque and
  * force with SC_STEP_INVALID set.
@@ -58,6 +59,7 @@ typedef struct {
     float handle_radius;     /* [m] */
     float tip_station;       /* s of the blade's tip [m]; no force from there on; may be huge */
     float opening_min, opening_max, contact_min, contact_max;
+    float flattest, steepest; /* least and largest e' of the edge: sc_model_edge_slopes */
 } sc_model;
 
 typedef struct {
@@ -92,12 +94,17 @@ float sc_model_friction(const sc_model *model, float opening, float rate);
 /* Both over n places; the step keeps its state from one to the next. */
 void sc_model_step_many(const sc_model *model, sc_crack *state, int64_t n, const float *opening,
                         const float *rate, const float *advance, sc_step_output *out);
+/* Not a number where a step would be INVALID. */
 void sc_model_torque_many(const sc_model *model, int64_t n, const float *opening, const float *rate,
                           const float *contact, float *torque);
 
 /* 1 if all tables and numbers are valid: friction and its factor nowhere below 0, a response from
  * (0, 0) whose values never fall. */
 int sc_model_is_sound(const sc_model *model);
+
+/* Find the least and the largest slope of the edge's table, once, and store them in the model; while
+ * both are 0, an edge that leans back is refused only where it stands over the contact. */
+void sc_model_edge_slopes(sc_model *model);
 
 /* 1 if at every opening of the range the release falls outwards along the blade, once it has passed its
  * largest value, as far as it decides where a crack stops. Then a run needs no scan of the edge's

@@ -96,6 +96,21 @@ static float least_value(const sc_table *table)
     return least;
 }
 
+void sc_model_edge_slopes(sc_model *model)
+{
+    const sc_table *edge = &model->edge;
+    model->flattest = model->steepest = edge->slope[0];
+    for (int32_t i = 0; i + 1 < edge->size; i++) {
+        const sc_piece piece = sc_piece_from(edge, i);
+        const float inner = -piece.second / (3.0f * piece.third); /* where the slope is extreme */
+        const float t = inner > 0.0f && inner < 1.0f ? inner : 1.0f;
+        const float bent = piece.start + t * (2.0f * piece.second + t * 3.0f * piece.third);
+        const float end = edge->slope[i + 1];
+        model->flattest = fminf(model->flattest, fminf(end, bent * piece.per_width));
+        model->steepest = fmaxf(model->steepest, fmaxf(end, bent * piece.per_width));
+    }
+}
+
 /* Friction that is negative anywhere would drive the blades. */
 static int opposes(const sc_table *table)
 {

@@ -22,6 +22,11 @@
 #include "sc_watch.h"
 #include "sc_wire.h"
 
+enum {
+    SC_STUCK_UNTIL_STOP = 20, /* states in a row at which the device's clock stood still */
+    SC_LEAP_RATES = 2         /* times the limit of the rate, beyond which no motion is taken */
+};
+
 enum { SC_MODE_IDLE = 0, SC_MODE_TRACK = 1, SC_MODE_RENDER = 2, SC_MODE_DAMP = 3 };
 
 /* Why the servo stopped; once it has, it stays stopped. */

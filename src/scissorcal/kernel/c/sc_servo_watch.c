@@ -3,14 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-static const float LEAP = 2.0f; /* times the limit of the rate, beyond which no motion is taken */
 static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider */
 
 enum {
     SILENCE_UNTIL_STOP = 5,
     LONGEST_US = 0x40000000,
     IMPLAUSIBLE_UNTIL_STOP = 4,
-    STUCK_UNTIL_STOP = 20,
     LONGEST_END_US = 100000
 };
 
@@ -122,7 +120,7 @@ uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
         servo->stuck_frames = 0;
         return passed_us;
     }
-    if (++servo->stuck_frames >= STUCK_UNTIL_STOP) {
+    if (++servo->stuck_frames >= SC_STUCK_UNTIL_STOP) {
         sc_servo_stop(servo, SC_STOP_DEVICE_CLOCK);
     }
     return config->tick_us;
@@ -137,10 +135,9 @@ int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const 
                     state->opening >= config->opening_low &&
                     state->opening <= config->opening_high;
     if (plausible && last->started && passed_us <= SC_LONGEST_GAP_US) {
-        const float time_s = (float)passed_us * 1e-6f;
-        plausible =
-            fabsf(state->opening - last->opening) <= LEAP * config->opening_rate_limit * time_s &&
-            fabsf(state->advance - last->advance) <= LEAP * config->advance_rate_limit * time_s;
+        const float leap_s = (float)SC_LEAP_RATES * 1e-6f * (float)passed_us;
+        plausible = fabsf(state->opening - last->opening) <= config->opening_rate_limit * leap_s &&
+                    fabsf(state->advance - last->advance) <= config->advance_rate_limit * leap_s;
     }
     servo->implausible_frames = plausible ? 0 : servo->implausible_frames + 1;
     if (servo->implausible_frames >= IMPLAUSIBLE_UNTIL_STOP) {

@@ -36,6 +36,7 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
     const float levels[] = {
         config->held_s,       config->swing_rate,   config->swing_torque,     config->swing_Hz,
         config->runaway_rate, config->still_rad,    config->still_m,          config->still_torque,
+        config->rest_torque,  config->rest_share,   config->jitter_s,
         config->least_ratio,  config->most_ratio,   config->ratio_torque,     config->clock_share,
         config->host_clock_share, config->handle_radius, config->runaway_speed,
         config->stop_margin};
@@ -170,6 +171,22 @@ static int is_elsewhere(const sc_watch_config *config, sc_watch *watch, const sc
            over(watch, SC_WATCH_STOP, (float)watch->elsewhere, (float)STATES_UNTIL_STOP);
 }
 
+/* Blades rest where friction holds what motor and hand leave over. Of what the two hold between them
+ * a share may be missing, as their scales may be off. */
+static int rests_against(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
+{
+    const float hand = config->handle_radius * (in->handle_force - config->handle_zero);
+    const float motor = in->measured - watch->zero;
+    const float drive = isfinite(motor - hand) ? motor - hand : 0.0f;
+    const float load = isfinite(motor - hand) ? fminf(fabsf(motor), fabsf(hand)) : 0.0f;
+    watch->imbalance += in->time_s / (SMOOTH_S + in->time_s) * (drive - watch->imbalance);
+    if (!(config->handle_radius > 0.0f && config->rest_torque > 0.0f) || watch->still_s < STILL_S) {
+        return 0;
+    }
+    return over(watch, SC_WATCH_STILL, fabsf(watch->imbalance),
+                config->rest_torque + config->rest_share * load);
+}
+
 static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
     if (!watch->has_still || in->opening != watch->still_opening) {
@@ -183,6 +200,10 @@ static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch
         watch->still_aim_advance = in->aim_advance;
     }
     watch->has_still = 1;
+    watch->still_s = in->at_stop ? 0.0f : watch->still_s + in->time_s;
+    if (over(watch, SC_WATCH_STILL, watch->still_s, config->jitter_s)) {
+        return 1;
+    }
     if (in->tracking) {
         const float moved = fabsf(in->aim_opening - watch->still_aim);
         const float pushed = fabsf(in->torque);
@@ -190,17 +211,9 @@ static int stands(const sc_watch_config *config, sc_watch *watch, const sc_watch
                over(watch, SC_WATCH_STILL,
                     fminf(moved / config->still_rad, pushed / config->still_torque), 1.0f);
     }
-    const float hand = config->handle_radius * (in->handle_force - config->handle_zero);
-    const float drive = in->measured - watch->zero - hand;
-    const float share = in->time_s / (SMOOTH_S + in->time_s);
     watch->still_aim = in->aim_opening;
     watch->still_aim_advance = in->aim_advance;
-    watch->still_s += in->time_s;
-    watch->imbalance += share * ((isfinite(drive) ? drive : 0.0f) - watch->imbalance);
-    if (in->at_stop || !(config->handle_radius > 0.0f) || watch->still_s < STILL_S) {
-        return 0;
-    }
-    return over(watch, SC_WATCH_STILL, fabsf(watch->imbalance), config->still_torque);
+    return rests_against(config, watch, in);
 }
 
 static int advance_stands(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)

@@ -13,7 +13,7 @@ enum {
     SC_WATCH_HELD = 0,          /* torque at its limit for too long */
     SC_WATCH_SWING = 1,         /* blades and torque swing to and fro faster than any hand */
     SC_WATCH_RUNAWAY = 2,       /* blades speed up against the torque */
-    SC_WATCH_STILL = 3,         /* the opening stands while the reference, or a torque, moves on */
+    SC_WATCH_STILL = 3,         /* the opening stands although it cannot */
     SC_WATCH_STILL_ADVANCE = 4, /* so does the advance */
     SC_WATCH_REVERSED = 5,      /* measured torque has the sign opposite to the commanded one */
     SC_WATCH_DIFFERS = 6,       /* measured torque is another one than commanded */
@@ -33,7 +33,11 @@ typedef struct {
     float runaway_speed;     /* of the advance [m/s] */
     float still_rad;         /* motion of the reference while the opening stands ... */
     float still_m;           /* motion of the reference while the advance stands */
-    float still_torque;      /* ... under so large a torque, or imbalance of motor and hand [N m] */
+    float still_torque;      /* ... under so large a torque [N m] */
+    float rest_torque;       /* without a reference, an imbalance of motor and hand [N m] that cannot
+                                leave blades at rest ... */
+    float rest_share;        /* ... beyond this share of the smaller of the two */
+    float jitter_s;          /* an encoder that jitters repeats no reading for so long */
     float least_ratio;       /* of measured to commanded torque ... */
     float most_ratio;        /* ... outside of which they differ */
     float ratio_torque;      /* torques below it say nothing about that [N m]; 0: nothing that is

@@ -75,6 +75,39 @@ def by_blade(photos: Sequence[BladePhoto]) -> dict[str, list[BladeMeasurement]]:
     return dict(sorted(found.items()))
 
 
+@dataclass(frozen=True)
+class Laid:
+    """How blades were laid down for a photograph.
+
+    ``both``: open scissors in place of one blade. ``mat``: on the printed blade mat; without it,
+    ``scale`` (metres per pixel) gives the size. ``edge_side``: the mat's rim that the edge faces.
+    ``pivot_px``: the pivot in the picture, where no hole shows it.
+    """
+
+    both: bool = False
+    mat: bool = True
+    edge_side: EdgeSide = "down"
+    scale: float | None = None
+    pivot_px: tuple[float, float] | None = None
+
+
+def photograph_laid(
+    photo: Photo, camera: Camera | None, laid: Laid, priors: BladePriors = BladePriors()
+) -> BladePhoto:
+    """Measure a photograph of one blade or of scissors, as they were laid down.
+
+    A camera counts only on the mat, and where it took this size of photograph. Raises InputError as
+    `photograph_blade` does.
+    """
+    if camera and (not laid.mat or (camera.width, camera.height) != (photo.width, photo.height)):
+        camera = None
+    if laid.both:
+        return photograph_scissors(photo, camera, priors=priors, mat=laid.mat, scale=laid.scale)
+    return photograph_blade(
+        photo, camera, priors=priors, edge_side=laid.edge_side, pivot_px=laid.pivot_px
+    )
+
+
 def photograph_blade(
     photo: Photo,
     camera: Camera | None = None,

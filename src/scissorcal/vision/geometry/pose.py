@@ -1,11 +1,22 @@
 """Poses: rotation as a unit quaternion, translation in metres, and their covariance."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.errors import InputError
+
 Array = NDArray[np.float64]
+
+NEARLY_UNIT = 1e-6
+"""How far a quaternion's length or a matrix's product with its transpose may be from one: rounding
+of files with six digits, and no more."""
+
+
+class PoseError(InputError, ValueError):
+    """Numbers that are no pose."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +37,16 @@ class Pose:
     translation_m: tuple[float, float, float]
     covariance: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse what is no pose: PoseError."""
+        length = math.hypot(*self.quaternion)
+        if not (abs(length - 1.0) < NEARLY_UNIT and all(map(math.isfinite, self.translation_m))):
+            raise PoseError(
+                f"Quaternion {self.quaternion} with translation {self.translation_m} is no pose: "
+                "it takes a quaternion of length one and finite numbers. Check what it was "
+                "computed from."
+            )
+
     @staticmethod
     def from_rotation_vector(
         vector: ArrayLike, translation_m: ArrayLike, covariance: Array | None = None
@@ -43,12 +64,18 @@ class Pose:
     def from_matrix(
         matrix: ArrayLike, translation_m: ArrayLike, covariance: Array | None = None
     ) -> "Pose":
-        """Pose of a rotation matrix (3, 3) and a translation (m)."""
+        """Pose of a rotation matrix (3, 3) and a translation (m). PoseError where it is none."""
         from scipy.spatial.transform import Rotation
 
-        x, y, z, w = Rotation.from_matrix(np.asarray(matrix, dtype=np.float64)).as_quat(
-            canonical=True
-        )
+        given = np.asarray(matrix, dtype=np.float64)
+        with np.errstate(invalid="ignore"):
+            off = float(np.abs(given @ given.T - np.eye(3)).max())
+        if not off < NEARLY_UNIT or np.linalg.det(given) < 0.0:
+            raise PoseError(
+                f"The matrix {given.round(6).tolist()} is no rotation: its columns must be "
+                "orthogonal, of length one and right-handed. Check what it was computed from."
+            )
+        x, y, z, w = Rotation.from_matrix(given).as_quat(canonical=True)
         t = np.asarray(translation_m, dtype=np.float64)
         return Pose(
             (float(w), float(x), float(y), float(z)),

@@ -18,7 +18,7 @@ from scissorcal.workday.demo.photographs import (
 )
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import open_pool
-from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
@@ -101,23 +101,10 @@ def run_demo(
     tell = progress or (lambda done, sentence: None)
     workspace = create_workspace(folder, recipe_name)
     recipe = workspace.recipe()
+    geometry, outcomes = make_day(
+        workspace, seed=seed, effort=effort, progress=_part(tell, 0.0, 0.85)
+    )
     specimen, streams = _drawn(recipe, seed)
-    with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
-        tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
-        captured = pool.executor.submit(_capture, workspace.root, seed)
-        photograph(workspace, recipe, seed, _part(tell, 0.05, 0.25))
-        geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.25, 0.4))
-        tell(0.4, "waiting for the captures")
-        try:
-            captured.result()
-        except BrokenProcessPool as error:
-            raise ScissorcalError(
-                "The process that captured was killed, most likely for want of memory: free some, "
-                f"remove {folder} and run the demo again."
-            ) from error
-    what = RIG_FITS[recipe.rig.joint]
-    tell_fits = _part(tell, 0.4, 0.85)
-    outcomes = fit_workspace(workspace, what, effort=effort, seed=seed, progress=tell_fits)
     engine = Engine.of(workspace)
     tell(0.85, "building the package")
     built = build_workspace_package(engine, seed=seed, allow_failed=True)
@@ -141,6 +128,38 @@ def run_demo(
         verdicts=(*verdicts, *built.verdicts, *rendering.verdicts),
         files=(*files, built.path, reported.html, reported.json, recording),
     )
+
+
+def make_day(
+    workspace: Workspace,
+    *,
+    seed: int = 0,
+    effort: "Effort | None" = None,
+    progress: Progress | None = None,
+) -> tuple[tuple[FitOutcome, ...], tuple[FitOutcome, ...]]:
+    """Capture and fit all that a new workspace's scene needs, on a virtual rig.
+
+    Gives the fits of photographs and those of recordings. What is drawn for a ``seed``, and the
+    second process, are as in `run_demo`.
+    """
+    tell = progress or (lambda done, sentence: None)
+    recipe = workspace.recipe()
+    with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
+        tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
+        captured = pool.executor.submit(_capture, workspace.root, seed)
+        photograph(workspace, recipe, seed, _part(tell, 0.05, 0.3))
+        geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.3, 0.47))
+        tell(0.47, "waiting for the captures")
+        try:
+            captured.result()
+        except BrokenProcessPool as error:
+            raise ScissorcalError(
+                "The process that captured was killed, most likely for want of memory: free some, "
+                f"remove {workspace.root} and start again."
+            ) from error
+    what = RIG_FITS[recipe.rig.joint]
+    part = _part(tell, 0.47, 1.0)
+    return geometry, fit_workspace(workspace, what, effort=effort, seed=seed, progress=part)
 
 
 def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:

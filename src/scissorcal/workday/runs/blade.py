@@ -73,26 +73,22 @@ def fit(engine: "Engine", request: "Request") -> "Made":
 
 
 def _measured(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "BladePhoto":
-    from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
+    from scissorcal.vision.blade.photo import Laid, photograph_laid
 
-    camera, priors = _camera_for(engine, photo, setup), engine.recipe.fit.blade.priors
-    if setup.both:
-        scale = setup.scale_mm_per_px * 1e-3 if setup.scale_mm_per_px else None
-        return photograph_scissors(photo, camera, priors=priors, mat=setup.mat, scale=scale)
-    return photograph_blade(
-        photo, camera, priors=priors, edge_side=setup.edge_side, pivot_px=setup.pivot_px
-    )
+    scale = setup.scale_mm_per_px * 1e-3 if setup.scale_mm_per_px else None
+    laid = Laid(setup.both, setup.mat, setup.edge_side, scale, setup.pivot_px)
+    camera = _camera(engine) if setup.mat else None
+    return photograph_laid(photo, camera, laid, engine.recipe.fit.blade.priors)
 
 
-def _camera_for(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "Camera | None":
-    """The workspace's camera, where it has one and it took this size of photograph."""
+def _camera(engine: "Engine") -> "Camera | None":
+    """The workspace's camera, where it has one."""
     from scissorcal.workday.runs.fit import load_result
 
-    if not setup.mat or not engine.file("fit camera").is_file():
+    if not engine.file("fit camera").is_file():
         return None
     camera: Camera = load_result(engine, "camera").camera
-    same = (camera.width, camera.height) == (photo.width, photo.height)
-    return camera if same else None
+    return camera
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:

@@ -15,17 +15,22 @@ from scissorcal.workday.steps import BY_NAME
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
+    from scissorcal.package.simplest.choice import SceneChoice
 
 
 @dataclass(frozen=True)
 class Built:
-    """A package and what is known of it; ``cached`` where it was already there as it should be."""
+    """A package and what is known of it; ``cached`` where it was already there as it should be.
+
+    ``choice`` says what of the fitted laws the scene needs, and what leaving the rest out saves.
+    """
 
     path: Path
     manifest: "Manifest"
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
     cached: bool
+    choice: "SceneChoice | None" = None
 
 
 def build_workspace_package(
@@ -41,6 +46,7 @@ def build_workspace_package(
     import numpy as np
 
     from scissorcal.package import build_package, check_package, open_package, put_review
+    from scissorcal.workday.runs.simplest import store_scene_choice, workspace_scene_choice
 
     if not engine.needed("package build"):
         raise InputError(
@@ -62,7 +68,9 @@ def build_workspace_package(
                 package = put_review(package, review, path)
             warnings = _void(engine) + package.warnings
             engine.refresh()
-            return Built(path, package.manifest, check_package(package), warnings, cached)
+            choice = workspace_scene_choice(engine)
+            verdicts = check_package(package)
+            return Built(path, package.manifest, verdicts, warnings, cached, choice)
     summary = build_package(
         engine.recipe,
         fits["friction"],
@@ -76,7 +84,8 @@ def build_workspace_package(
     )
     engine.refresh()
     warnings = _void(engine) + summary.warnings
-    return Built(path, summary.manifest, summary.verdicts, warnings, cached=False)
+    choice = store_scene_choice(engine, summary.simplified, fits)
+    return Built(path, summary.manifest, summary.verdicts, warnings, False, choice)
 
 
 def _fits(engine: Engine) -> dict[str, Any]:

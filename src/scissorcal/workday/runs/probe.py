@@ -111,13 +111,30 @@ def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult
     return found
 
 
+def probe_state(workspace: Workspace, recipe: "Recipe", now: datetime | None = None) -> str:
+    """What the workspace's probe says and whether it still counts, in a sentence.
+
+    Whether it is of the rig that will be connected shows only then.
+    """
+    last = _kept(workspace)
+    if isinstance(last, str):
+        return f"The rig is probed before its first motor run: {last}."
+    said = f"{last.device} was probed at {last.made_at}"
+    why = _outdated(last, recipe, now or datetime.now(UTC))
+    if why:
+        return f"{said}; it is probed again before its next motor run: {why}."
+    without = [v.check for v in last.verdicts if v.status == "not_evaluated" and v.value is None]
+    left_out = f" (not checked: {', '.join(without)})" if without else ""
+    return f"{said}: no check failed{left_out}."
+
+
 def _kept(workspace: Workspace) -> "ProbeResult | str":
     """The probe that the workspace keeps, or why there is none."""
-    from scissorcal.device.probe.result import probe_from_dict
-
     path = workspace.probe_path
     if not path.exists():
         return "there is no probe of it yet"
+    from scissorcal.device.probe.result import probe_from_dict
+
     try:
         return probe_from_dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
@@ -130,12 +147,17 @@ def _most(recipe: "Recipe") -> str:
 
 def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: datetime) -> str:
     """Why a probe does not count, as part of a sentence; empty where it does."""
-    from scissorcal.device.probe.probe import recipe_facts
-
     if isinstance(last, str):
         return last
     if _differs(last, link):
         return f"the last probe was of another rig, firmware or line ({last.device})"
+    return _outdated(last, recipe, now)
+
+
+def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
+    """Why a probe of this rig does not count, as part of a sentence; empty where it does."""
+    from scissorcal.device.probe.probe import recipe_facts
+
     if last.motor_sign != recipe.rig.motor_sign:
         return "rig.motor_sign changed since"
     for name, stated in recipe_facts(recipe).items():

@@ -16,6 +16,7 @@ from scissorcal.workday.steps import steps_of
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.calibration.verify.result import VerifyResult
+    from scissorcal.package.simplest.choice import SceneChoice
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.report import Cell, Geometry
 
@@ -69,6 +70,7 @@ def write_workspace_report(
             geometry=geometry,
             inputs_hash=engine.identity("report"),
             completeness=[cell for what in RIG if what in fits for cell in _cells(engine, what)],
+            choice=_choice(engine),
         )
         engine.refresh()
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
@@ -105,6 +107,16 @@ def _cells(engine: Engine, what: "CaptureKind") -> "list[Cell]":
         Cell(what, row.name, row.planned, row.recorded, row.used, row.unit, row.motion)
         for row in engine.completeness(what).summary
     ]
+
+
+def _choice(engine: Engine) -> "SceneChoice | None":
+    """What the scene needs of the fits; None where their law makes no tables."""
+    from scissorcal.workday.runs.simplest import workspace_scene_choice
+
+    try:
+        return workspace_scene_choice(engine)
+    except InputError:
+        return None  # 'package build' says why; the report is of the fits all the same
 
 
 def _trust_checks(engine: Engine, fits: "dict[str, FitResult]") -> "dict[str, VerifyResult]":

@@ -1,0 +1,1 @@
+"""Numerical stability at the extremes: every quantity from the everyday to the absurd."""

@@ -1,0 +1,1 @@
+"""How cost buys accuracy, one knob at a time and then together."""

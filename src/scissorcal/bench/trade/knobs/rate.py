@@ -1,0 +1,113 @@
+"""Loop rate: share of a core against rendered minus continuous torque, and the stability margin."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.frame_time import frame_time_s
+from scissorcal.bench.trade.models import compiled, nothing_rendered
+from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
+from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
+from scissorcal.bench.trade.stability import known_rig, margin
+from scissorcal.bench.trade.strokes import hand_strokes
+from scissorcal.bench.trade.torque import AVERAGE, WORST
+from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
+
+RATES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
+MOMENTS = "torque at every moment, average"
+IN_HAND, ALONE = "needed over allowed stiffness in a hand", "needed over allowed stiffness alone"
+NO_PORT = (
+    "Missed frames are not counted: the loop ran in lockstep, and only a port that keeps its own "
+    "time can be missed ('scissorcal render' counts them)."
+)
+NOTHING_ALLOWED = (
+    "The rule allows this rig no stiffness: its dry friction is not known to be above 0."
+)
+NO_RIG = "The stability margin is not known: the recordings do not state the rig, or its friction."
+
+
+class Rate:
+    """How often the loop samples the blades and answers.
+
+    Counted against the continuous torque: the same tables at 64 kHz with the true rate of opening,
+    over strokes of a hand.
+    """
+
+    name = "rate"
+    title = "Loop rate"
+    cost = "share of a core"
+    error = AVERAGE
+    against = "the continuous torque: the same tables stepped at 64 kHz with the true rate"
+
+    def missing(self, case: Case) -> str:
+        """Where nothing is rendered no loop runs."""
+        return nothing_rendered(case)
+
+    def settings(self, case: Case) -> tuple[Setting, ...]:
+        """Octaves from 125 Hz to 8 kHz, and the scene's own rate."""
+        own = case.recipe.scene.loop_rate_Hz
+        return tuple(
+            Setting(f"{rate:g} Hz", rate, rate, "hold", present=rate == own)
+            for rate in sorted({*RATES_HZ, own})
+        )
+
+    def applied(self, case: Case, setting: Setting) -> Case:
+        """The case whose scene is rendered at that rate."""
+        scene = case.recipe.scene.model_copy(update={"loop_rate_Hz": float(setting.value)})
+        return replace(case, recipe=case.recipe.model_copy(update={"scene": scene}))
+
+    def expected_s(self, case: Case, setting: Setting) -> float:
+        """The reference takes most of it, and a faster loop more samples."""
+        return 1.5 + 2e-4 * float(setting.value)
+
+    def repeats(self, case: Case, setting: Setting) -> int:
+        """Each repeat begins its samples at another part of a tick."""
+        return 3
+
+    def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
+        """Render the strokes at this rate, and time the loop on frames of the middle one."""
+        rate, model = float(setting.value), compiled(case)
+        strokes, limits = hand_strokes(case.recipe), case.recipe.limits
+        rig = known_rig(case)
+        frame_s = frame_time_s(model.tables, strokes[1], rate, limits)
+        found = rendered_error(
+            model.tables,
+            strokes,
+            rate,
+            continuous_torques(model.tables, strokes, limits.torque_Nm),
+            limit=limits.torque_Nm,
+            cutoff_Hz=RATE_CUTOFF_HZ,
+            encoder_step=rig.encoder_step_rad if rig else 0.0,
+            phase=float(np.random.default_rng([case.seed, repeat]).uniform()),
+        )
+        outcome: dict[str, Any] = {**vars(found)}
+        if rig:
+            outcome |= vars(margin(case, model.tables, rig, rate))
+        notes = [NO_PORT, *(() if rig else (NO_RIG,))]
+        if not all(math.isfinite(value) for value in outcome.values()):
+            notes.append(NOTHING_ALLOWED)
+        return Sample(
+            {
+                "share of a core": Quantity(frame_s * rate, ""),
+                "frame": Quantity(frame_s * 1e6, "us"),
+            },
+            {name: value if math.isfinite(value) else None for name, value in outcome.items()},
+            tuple(notes),
+        )
+
+    def errors(self, case: Case, sample: Sample, reference: Sample | None) -> Mapping[str, Error]:
+        """Rendered minus continuous torque, and needed over allowed stiffness."""
+        found = sample.outcome
+        largest = found["largest"]
+        names = {AVERAGE: "average", WORST: "worst", MOMENTS: "moments"}
+        errors = {
+            label: Error(found[name], "N m", found[name] / largest) for label, name in names.items()
+        }
+        for label, name in ((IN_HAND, "in_hand"), (ALONE, "alone")):
+            if found.get(name) is not None:
+                errors[label] = Error(found[name], "", guarded=True)
+        return errors

@@ -1,0 +1,103 @@
+"""Torque that a loop of one rate renders over hand strokes, against the continuous torque."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.bench.trade.strokes import Stroke
+from scissorcal.kernel import Kernel, ModelTables, estimated_rates
+
+Array = NDArray[np.float64]
+Torques = NDArray[np.float32]
+
+CONTINUOUS_HZ = 64_000.0
+"""Rate of the reference: eight times the fastest loop that is measured."""
+
+BINS = 25
+"""A stroke is averaged over so many parts of its time, which takes the ripple out."""
+
+
+@dataclass(frozen=True)
+class RenderedError:
+    """Rendered minus continuous torque over strokes, in N m.
+
+    ``average`` and ``worst`` are of the mean torque over 25 parts of each movement, which takes the
+    ripple out; ``moments`` is the average at every moment, in which a tooth that starts a little
+    late counts in full. ``largest`` is the largest continuous torque.
+    """
+
+    average: float
+    worst: float
+    moments: float
+    largest: float
+
+
+def continuous_torques(
+    tables: ModelTables, strokes: Sequence[Stroke], limit: float
+) -> tuple[Torques, ...]:
+    """Torque (N m) of each stroke at 64 kHz with the true rate, within the torque limit."""
+    found = []
+    for stroke in strokes:
+        time = _moments(stroke)
+        opening, rate = stroke.at(time)
+        found.append(_stepped(tables, stroke, opening, rate, limit))
+    return tuple(found)
+
+
+def rendered_error(
+    tables: ModelTables,
+    strokes: Sequence[Stroke],
+    rate_Hz: float,
+    continuous: Sequence[Torques],
+    *,
+    limit: float,
+    cutoff_Hz: float,
+    encoder_step: float = 0.0,
+    phase: float = 0.0,
+) -> RenderedError:
+    """Errors of a loop that samples ``rate_Hz`` times a second and holds its torque in between.
+
+    The kernel steps at that rate, with the rate of opening as the servo estimates it: differences
+    of the encoder's counts (``encoder_step`` in rad, 0 for none) behind a low-pass at
+    ``cutoff_Hz``. The first sample is taken ``phase`` (0 to 1) of a tick after the stroke's begin.
+    The loop's delay is not among the errors: it depends on the line, not on the rate alone.
+    """
+    tick_us = round(1e6 / rate_Hz)
+    means, away, total, largest = [], 0.0, 0, 0.0
+    for stroke, reference in zip(strokes, continuous, strict=True):
+        start = phase * tick_us * 1e-6
+        samples = np.arange(start, stroke.duration_s, tick_us * 1e-6)
+        opening, _ = stroke.at(samples)
+        if encoder_step > 0.0:
+            opening = encoder_step * np.round(opening / encoder_step)
+        rate = estimated_rates(opening, tick_us, cutoff_Hz)
+        torque = _stepped(tables, stroke, opening, rate, limit)
+        held = np.searchsorted(samples, _moments(stroke), side="right") - 1
+        first = np.where(held >= 0, torque[np.maximum(held, 0)], reference[0])
+        error = first.astype(np.float64) - reference
+        away, total = away + float(np.abs(error).sum()), total + len(error)
+        largest = max(largest, float(np.abs(reference).max()))
+        means += [float(part.mean()) for part in np.array_split(error, 2 * BINS)]
+    size = np.abs(means)
+    return RenderedError(
+        average=float(size.mean()),
+        worst=float(size.max()),
+        moments=away / total,
+        largest=largest,
+    )
+
+
+def _moments(stroke: Stroke) -> Array:
+    """Middles of the reference's ticks: there a held torque is off by half a tick on average."""
+    count = int(stroke.duration_s * CONTINUOUS_HZ)
+    return np.asarray((np.arange(count) + 0.5) / CONTINUOUS_HZ)
+
+
+def _stepped(
+    tables: ModelTables, stroke: Stroke, opening: Array, rate: Array, limit: float
+) -> Torques:
+    """Torque of a fresh kernel along a stroke, within the limit."""
+    torque = Kernel(tables).step_many(opening, rate, -stroke.contact_m)["torque"]
+    return np.asarray(np.clip(torque, -limit, limit), dtype=np.float32)

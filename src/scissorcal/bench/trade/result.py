@@ -1,0 +1,83 @@
+"""What a run of `bench trade` ends in, as its JSON twin holds it."""
+
+import json
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+from scissorcal.bench.trade.point import Curve, Spread
+from scissorcal.errors import InputError, MissingError
+
+TradeFormat = Literal["scissorcal-trade/1"]
+FORMAT: TradeFormat = "scissorcal-trade/1"
+
+
+@dataclass(frozen=True)
+class Trade:
+    """All knobs of one scene as they were measured.
+
+    ``tolerance`` is the scene's and ``limit`` the part of it that one knob may use, both as shares
+    of the scene's largest torque. ``baseline`` is the step that times are compared with.
+    ``measured_now`` of ``measured`` samples were made by the run that wrote this, the others by
+    earlier runs on the same inputs and machine. ``together`` compares the present settings with all
+    recommended ones at once; None where only some knobs were measured.
+    """
+
+    format: TradeFormat
+    created: datetime
+    scissorcal_version: str
+    recipe_name: str
+    material: str
+    simulated: bool
+    machine: str
+    workers: int
+    seconds: float
+    budget_s: float | None
+    tolerance: float
+    limit: float
+    baseline: Spread
+    measured: int
+    measured_now: int
+    curves: tuple[Curve, ...]
+    together: Curve | None
+    sentences: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def trade_text(trade: Trade) -> str:
+    """The JSON twin; what has its default is left out."""
+    from pydantic import TypeAdapter
+
+    plain = TypeAdapter(Trade).dump_python(trade, mode="json", exclude_defaults=True)
+    return json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def read_trade(path: Path) -> Trade:
+    """Read a JSON twin back.
+
+    Raises MissingError where there is none, InputError where it is of another version or damaged.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    if not path.is_file():
+        raise MissingError(f"There is no {path} yet: run 'scissorcal bench trade' first.")
+    try:
+        plain = json.loads(path.read_text(encoding="utf-8"))
+        found = plain["format"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(
+            f"{path} holds no results of 'bench trade': remove it and run 'scissorcal bench trade'."
+        ) from None
+    if found != FORMAT:
+        raise InputError(
+            f"{path} is of format {found}, and this version reads {FORMAT}: run 'scissorcal bench "
+            "trade', which writes it anew."
+        )
+    try:
+        return TypeAdapter(Trade).validate_python(plain)
+    except ValidationError as error:
+        where = ".".join(str(part) for part in error.errors()[0]["loc"])
+        raise InputError(
+            f"{path} is damaged at {where}: run 'scissorcal bench trade', which writes it anew."
+        ) from None

@@ -1,0 +1,157 @@
+"""What single strokes tell about a fit's parameters, in sums that can be added."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.lack_of_fit import PERTURBATION, changed_designs
+from scissorcal.calibration.cut.model import CutExperiment
+from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.inference.curvature import gradient, natural_step
+from scissorcal.inference.information import Slopes, likelihood_information, slopes_at
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3
+"""Step in prior standard deviations by which a friction law's mean is differentiated."""
+LAGS = 60
+"""Windows over which their noise is correlated at most: 0.3 s."""
+
+
+@dataclass(frozen=True)
+class Information:
+    """What data tell at one point of a fit's unconstrained parameters; sums over strokes.
+
+    ``curvature`` (p, p) is Fisher's information as the fit's likelihood counts it, ``scores``
+    (p, p) the covariance of that likelihood's score, which is larger where noise is correlated.
+    ``errors`` has by kind of segment the change (p,) of the score for a relative error of one in
+    the law, as :class:`~scissorcal.calibration.cut.lack_of_fit.Budget` counts it.
+    """
+
+    curvature: Array
+    scores: Array
+    errors: Mapping[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def none(cls, parameters: int) -> "Information":
+        """That of no data.
+
+        >>> Information.none(2).curvature.tolist()
+        [[0.0, 0.0], [0.0, 0.0]]
+        """
+        empty = np.zeros((parameters, parameters))
+        return cls(empty, empty)
+
+    def __add__(self, other: "Information") -> "Information":
+        kinds = {**self.errors, **other.errors}
+        return Information(
+            self.curvature + other.curvature,
+            self.scores + other.scores,
+            {k: np.asarray(self.errors.get(k, 0.0) + other.errors.get(k, 0.0)) for k in kinds},
+        )
+
+    def times(self, count: float) -> "Information":
+        """That of ``count`` such strokes."""
+        errors = {kind: count * error for kind, error in self.errors.items()}
+        return Information(count * self.curvature, count * self.scores, errors)
+
+
+def friction_information(
+    design: FrictionExperiment, point: Array, noise: TorqueNoise, stroke_sd: float
+) -> dict[int, Information]:
+    """Information of each empty stroke by its label, at ``point`` (p,).
+
+    The fit takes its windows as independent, with curvature H = sum x x' / s^2, x the slopes of the
+    drive. Their noise is correlated: with its covariance R from ``noise`` by sample, and strokes
+    that differ by ``stroke_sd`` (N m), the score has the covariance
+
+        J = sum_strokes (x' R x + stroke_sd^2 (sum x)(sum x)') / s^4,
+
+    and the data are worth H J^-1 H, to which the fit stretches its likelihood (Chandler and Bate
+    2007, doi:10.1093/biomet/asm015).
+    """
+    slopes = gradient(design.mean, point, STEP * design.layout.sd)
+    variance = float(np.exp(2.0 * point[-1]))
+    correlated = _window_covariance(design, noise)
+    found = {}
+    for label in np.unique(design.strokes):
+        here = slopes[design.strokes == label]
+        total = here.sum(axis=0)
+        curvature = here.T @ here / variance
+        spread = here.T @ _convolved(here, correlated) + stroke_sd**2 * np.outer(total, total)
+        scores = spread / variance**2
+        curvature[-1, -1] = scores[-1, -1] = 2.0 * len(here)
+        found[int(label)] = Information(curvature, scores)
+    return found
+
+
+def cut_information(design: CutExperiment, point: Array) -> dict[int, Information]:
+    """Information of each stroke through material by its label, at ``point`` (p,).
+
+    Segments of a sheet are predicted one after the other, so that a stroke's information is what it
+    adds to the strokes before it on the same sheet. The line of the teeth is one number over all
+    strokes and is not among them: see :func:`line_information`.
+    """
+    candidate = design.candidate(design.observed)
+    problem = candidate.problem(design.series)
+    step = natural_step(problem.log_likelihood, point, 0.1 * problem.prior_sd)
+    slopes = slopes_at(replace(problem, standardised=candidate.likelihood.normal), point, step)
+    assert slopes is not None
+    errors = _errors(design, point, slopes)
+    found = {}
+    for label in np.unique(design.strokes):
+        here = design.strokes == label
+        part = Slopes(*(array[here] for array in vars(slopes).values()))
+        curvature = likelihood_information(problem, point, step, part)
+        by_kind = {kind: error[here].sum(axis=0) for kind, error in errors.items()}
+        found[int(label)] = Information(curvature, curvature, by_kind)
+    return found
+
+
+def line_information(design: CutExperiment, point: Array) -> Information:
+    """Information of the line of the teeth, where the design has one.
+
+    Its error is mostly that of the period's formula, which more strokes repeat.
+    """
+    count = len(point)
+    line = design.likelihood.line
+    if line is None:
+        return Information.none(count)
+    slope = gradient(
+        lambda u: np.array([design.evaluate(u).log_period]), point, STEP * design.layout.sd
+    )[0]
+    curvature = np.outer(slope, slope) / line.sd**2
+    return Information(curvature, curvature)
+
+
+def _errors(design: CutExperiment, point: Array, slopes: Slopes) -> dict[str, Array]:
+    """Change of each segment's score (n, p) for a relative error of one, by kind of segment."""
+    found = {}
+    for kind, changed in changed_designs(design).items():
+        if kind == "line":
+            continue
+        moved = (changed.evaluate(point).standardised - slopes.z) / PERTURBATION
+        found[kind] = -moved[:, None] * slopes.by_mean
+    return found
+
+
+def _window_covariance(design: FrictionExperiment, noise: TorqueNoise) -> Array:
+    """Covariance (lags,) of the noise of two windows that begin so many hops apart."""
+    windows = design.windows
+    weights = windows.weights
+    hop = max(1, round(windows.bins.bin_s / windows.tick_s))
+    overlap = np.correlate(weights, weights, "full")
+    apart = np.arange(1 - len(weights), len(weights))[:, None] + hop * np.arange(LAGS)
+    slow = noise.slow_Nm**2 * np.exp(-np.abs(apart) * windows.tick_s / noise.slow_time_s)
+    return np.asarray(overlap @ (noise.white_Nm**2 * (apart == 0) + slow))
+
+
+def _convolved(columns: Array, covariance: Array) -> Array:
+    """The covariance of successive windows times their columns (n, p)."""
+    from scipy.signal import fftconvolve
+
+    kernel = np.concatenate([covariance[:0:-1], covariance])
+    return np.asarray(fftconvolve(columns, kernel[:, None], axes=0)[LAGS - 1 : -LAGS + 1])

@@ -1,0 +1,268 @@
+"""What a design starts from: finished fits with their recordings, or the recipe's priors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
+from scissorcal.calibration.cut.lack_of_fit import error_shares
+from scissorcal.calibration.cut.laws import CutLaw, allowed_laws, cut_layout
+from scissorcal.calibration.cut.model import CutExperiment
+from scissorcal.calibration.cut.path import torque_noise_of
+from scissorcal.calibration.cut.scout import belief_geometry
+from scissorcal.calibration.cut.structure import edge_layout, edge_of, geometry_of
+from scissorcal.calibration.design.band import Sharing
+from scissorcal.calibration.design.information import (
+    Information,
+    cut_information,
+    friction_information,
+    line_information,
+)
+from scissorcal.calibration.design.knowledge import Knowledge
+from scissorcal.calibration.friction.fit import friction_experiment
+from scissorcal.calibration.friction.layout import Drive, friction_layout
+from scissorcal.calibration.parameters import Layout
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.inference.curvature import gradient
+from scissorcal.model import EdgeBelief, FrictionLaw, friction_torque
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Joint, Recording
+
+Array = NDArray[np.float64]
+
+EXPECTED_LAW = "stribeck+angle"
+"""Law of friction that is expected before any data: what draft effort fits to scissors."""
+EXPECTED_SLOW_S = 0.01
+"""Time over which the torque's slow noise is expected to last."""
+ZERO_S = 1.5
+"""Idle seconds at either end of a capture, which show the sensors' zeros."""
+TICK_S = 1e-3
+
+
+@dataclass(frozen=True)
+class FrictionState:
+    """Friction as it is known: ``structure`` of its law, noise by sample, spread of strokes.
+
+    ``zero_sd`` (N m) is how well the sensors' zeros are known; None where the law holds no zero.
+    """
+
+    knowledge: Knowledge
+    structure: Mapping[str, Any]
+    noise: TorqueNoise
+    stroke_sd: float
+    zero_sd: float | None
+    known: KnownFriction
+
+
+@dataclass(frozen=True)
+class CutState:
+    """Response and fracture as they are known, with law and geometry of their fit."""
+
+    knowledge: Knowledge
+    structure: Mapping[str, Any]
+    law: CutLaw
+    geometry: Geometry
+
+
+def fitted_friction(
+    recordings: tuple[Recording, ...], recipe: Recipe, fit: FitResult
+) -> FrictionState:
+    """What a finished fit of friction knows by its own recordings."""
+    design = friction_experiment(recordings, recipe.fit.friction, fit)
+    point = _point(design.layout, fit)
+    noise = torque_noise_of(fit.diagnostics)
+    stroke_sd = _number(fit.diagnostics.get("stroke_offset_sd_Nm"))
+    told = friction_information(design, point, noise, stroke_sd)
+    owners = {int(s): int(r) for s, r in zip(design.strokes, design.bins.recording, strict=True)}
+    zeros = [p.sd for p in design.layout.parameters if p.name == "offset" and p.believed]
+    knowledge = Knowledge(
+        design.layout,
+        point,
+        np.diag(1.0 / design.layout.sd**2),
+        _by_recording(told, owners, len(point)),
+        between=_between(design.layout, fit),
+    )
+    known = KnownFriction.of(fit, recipe.fit.cut.priors)
+    zero_sd = zeros[0] if zeros else None
+    return FrictionState(knowledge, fit.structure, noise, stroke_sd, zero_sd, known)
+
+
+def fitted_cut(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    fit: FitResult,
+    edge: EdgeBelief | None = None,
+) -> CutState:
+    """What a finished fit of a cut knows by its own recordings."""
+    design = cut_experiment(recordings, recipe, friction, fit, edge)
+    return _cut_state(design, _point(design.layout, fit), recipe, _between(design.layout, fit))
+
+
+def latest_cut(
+    recordings: tuple[Recording, ...],
+    recipe: Recipe,
+    friction: FitResult,
+    edge: EdgeBelief | None = None,
+    last_chosen: str | None = None,
+) -> CutState:
+    """What the strokes so far tell, by the optimum of draft effort's law and its information.
+
+    For a capture that goes on meanwhile: it costs less than half of a fit at draft effort, whose
+    band of the torque it gives. Raises InputError as ``fit_cut`` does.
+    """
+    design, point = cut_optimum(recordings, recipe, friction, edge, last_chosen)
+    return _cut_state(design, point, recipe, None)
+
+
+def expected_friction(recipe: Recipe) -> FrictionState:
+    """Friction before any data: the recipe's priors at their centres.
+
+    The noise is that of the prior, half of it lasting :data:`EXPECTED_SLOW_S`.
+    """
+    settings = recipe.fit.friction
+    law = EXPECTED_LAW if settings.rung == "auto" else settings.rung
+    symmetric, adopt = settings.symmetry == "symmetric", settings.adopt
+    centre = float(np.round(np.mean(recipe.scene.opening_rad), 3))
+    structure = {
+        "law": law,
+        "symmetric": symmetric,
+        "angle_center": centre,
+        "adopt": list(adopt),
+    }
+    joint, priors = Joint("rotary"), settings.priors.of("rotary")
+    free = friction_layout(law, symmetric, joint, priors, adopt, Drive(False, TICK_S))
+    size = float(free.natural(free.mean)["noise"])
+    noise = TorqueNoise(size, size, EXPECTED_SLOW_S)
+    zero_sd = float(np.sqrt(noise.variance_of_mean(round(2.0 * ZERO_S / TICK_S), TICK_S)))
+    drive = Drive(False, TICK_S, zero_sd)
+    layout = friction_layout(law, symmetric, joint, priors, adopt, drive)
+    values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
+    floor = recipe.fit.cut.priors.friction_sd_floor_Nm
+    known = KnownFriction(
+        law=FrictionLaw.of_fit(values, centre),
+        offset=float(values.get("offset", 0.0)),
+        inertia=values["inertia"],
+        cogging=(0.0, 0.0, 0.0),
+        noise=noise,
+        closing_sd=floor,
+        opening_sd=floor,
+        stroke_sd=floor,
+    )
+    knowledge = Knowledge(layout, layout.mean, np.diag(1.0 / layout.sd**2))
+    return FrictionState(knowledge, structure, noise, floor, zero_sd, known)
+
+
+def expected_cut(
+    recipe: Recipe, friction: FrictionState, edge: EdgeBelief | None = None
+) -> CutState:
+    """Response and fracture before any data: the recipe's priors at their centres.
+
+    The law is the first that the recipe allows with the richest fracture and, where that is left
+    open, with friction by load: both widen the band.
+    """
+    fractures = ("none", "smooth", "rippled")
+    laws = allowed_laws(recipe)
+    law = max(laws, key=lambda one: (fractures.index(one.fracture), one.loaded))
+    geometry = belief_geometry(recipe, edge or edge_of(recipe))
+    known = friction.known
+    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
+    edge_part = edge_layout(geometry.belief)
+    whole = type(layout)((*layout.parameters, *edge_part.parameters))
+    prior = np.diag(1.0 / whole.sd**2)
+    count = len(edge_part.parameters)
+    if count:
+        prior[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+    structure = {**law.key, **geometry_of(recipe, geometry.belief.edge)}
+    share = 0.01 * recipe.fit.cut.lack_of_fit_percent
+    kinds = (
+        "loading",
+        "unloading",
+        "loading, by its torque",
+        "unloading, by its torque",
+        "running",
+    )
+    shares = dict.fromkeys(kinds, share)
+    return CutState(
+        Knowledge(whole, whole.mean, prior, error_shares=shares), structure, law, geometry
+    )
+
+
+def sharing_of(recipe: Recipe, friction: FrictionState, cut: CutState) -> Sharing:
+    """How friction's uncertainty enters the cut's offsets.
+
+    What the offsets' priors have beyond friction's own uncertainty now is that of the zeros, which
+    stays.
+    """
+    layout, centre = friction.knowledge.layout, float(friction.structure["angle_center"])
+
+    def levels(u: Array) -> Array:
+        values = layout.natural(u)
+        law = FrictionLaw.of_fit(values, centre)
+        torques = [float(friction_torque(law, centre, sign * USUAL_RATE)) for sign in (-1, 1)]
+        return np.array(torques) + float(values.get("offset", np.asarray(0.0)))
+
+    slopes = gradient(levels, friction.knowledge.point, 1e-3 * layout.sd)
+    names = cut.knowledge.layout.names
+    places = (names.index("offset_closing"), names.index("offset_opening"))
+    floor = recipe.fit.cut.priors.friction_sd_floor_Nm
+    if cut.knowledge.recordings:
+        own = np.einsum("ij,jk,ik->i", slopes, friction.knowledge.covariance, slopes)
+        stated = 1.0 / np.diag(cut.knowledge.prior)[list(places)]
+        rest = np.sqrt(np.maximum(stated - np.maximum(own, floor**2), 0.0))
+    else:
+        rest = np.full(2, np.sqrt(2.0) * (friction.zero_sd or 0.0))
+    return Sharing(slopes, places, floor, rest)
+
+
+def _cut_state(
+    design: CutExperiment, point: Array, recipe: Recipe, between: Array | None
+) -> CutState:
+    told = cut_information(design, point)
+    owners = {int(s): int(r) for s, r in zip(design.strokes, design.bins.recording, strict=True)}
+    knowledge = Knowledge(
+        design.layout,
+        point,
+        design.prior_precision,
+        _by_recording(told, owners, len(point)),
+        line_information(design, point),
+        error_shares(design, point, 0.01 * recipe.fit.cut.lack_of_fit_percent),
+        between=between,
+    )
+    return CutState(knowledge, design.key, design.law, design.likelihood.geometry)
+
+
+def _point(layout: Layout, fit: FitResult) -> Array:
+    """Where the fit ended, in unconstrained coordinates; nuisances at their means."""
+    values = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
+    values |= {p.name: p.mean for p in fit.nuisance}
+    return layout.unconstrained({name: values[name] for name in layout.names})
+
+
+def _by_recording(
+    told: Mapping[int, Information], owners: Mapping[int, int], parameters: int
+) -> tuple[Information, ...]:
+    """Sums of the strokes' information over each recording."""
+    sums: dict[int, Information] = {}
+    for stroke, one in told.items():
+        before = sums.get(owners[stroke], Information.none(parameters))
+        sums[owners[stroke]] = before + one
+    return tuple(sums[recording] for recording in sorted(sums))
+
+
+def _between(layout: Layout, fit: FitResult) -> Array | None:
+    """Standard deviations between recordings (p,) as the fit states them."""
+    stated = fit.diagnostics.get("between_recordings_sd")
+    if not stated:
+        return None
+    return np.array([float(stated.get(name, 0.0)) for name in layout.names])
+
+
+def _number(value: Any) -> float:
+    return float(value) if value is not None and np.isfinite(value) else 0.0

@@ -1,0 +1,85 @@
+"""Recordings that no fit may use: values that are no measurement, samples that are copies."""
+
+import hashlib
+
+import numpy as np
+
+from scissorcal.errors import InputError
+from scissorcal.recording.recording import Recording
+
+LARGEST = 1e100
+"""Magnitude from which a value is none of a measurement: the sum of squares of such values may
+overflow."""
+FEWEST_LEVELS = 20
+"""Different torques from which equal strokes are copies: coarse steps alone may repeat."""
+
+_CHANNELS = ("opening", "motor_torque", "handle_force", "advance")
+
+
+def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
+    """Raise InputError for values that are no numbers or absurd, and for copied strokes.
+
+    A sensor has noise, so two strokes never agree to the last digit. A copy would count as a second
+    observation, and intervals would come out too narrow by the root of two.
+    """
+    if not recordings:
+        raise InputError("There is no recording to fit: capture or import one first.")
+    for recording in recordings:
+        if len(recording.samples) < 2:
+            raise InputError(
+                f"{_name(recording)} holds {len(recording.samples)} samples, in which nothing can "
+                "move: record again, or name another file."
+            )
+        _refuse_values(recording)
+    _refuse_copies(recordings)
+
+
+def farthest_torque(recordings: tuple[Recording, ...]) -> str:
+    """The sample whose torque lies farthest from the median of its recording, in words."""
+    found = []
+    for recording in recordings:
+        torque = np.asarray(recording.samples["motor_torque"], dtype=np.float64)
+        away = np.abs(torque - np.median(torque))
+        at = int(np.argmax(away))
+        words = f"{_name(recording)}, sample {at}: {torque[at]:.4g} N m"
+        found.append((float(away[at]), words))
+    return max(found)[1]
+
+
+def _refuse_values(recording: Recording) -> None:
+    for name in _CHANNELS:
+        values = np.asarray(recording.samples[name], dtype=np.float64)
+        with np.errstate(invalid="ignore"):
+            bad = np.flatnonzero(~(np.abs(values) < LARGEST))
+        if len(bad):
+            raise InputError(
+                f"{_name(recording)}, sample {bad[0]}: {name} is {values[bad[0]]:g}, which is no "
+                f"measurement ({len(bad)} such samples in all). Check the sensor and record again, "
+                "or export the recording, remove those rows and import the table with gaps allowed."
+            )
+
+
+def _refuse_copies(recordings: tuple[Recording, ...]) -> None:
+    seen: dict[bytes, str] = {}
+    for recording in recordings:
+        stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
+        edges = np.flatnonzero(np.diff(stroke)) + 1
+        for low, high in zip([0, *edges], [*edges, len(stroke)], strict=True):
+            torque = np.asarray(recording.samples["motor_torque"][low:high], dtype=np.float64)
+            if low == high or stroke[low] < 0 or len(np.unique(torque)) < FEWEST_LEVELS:
+                continue
+            opening = np.asarray(recording.samples["opening"][low:high], dtype=np.float64)
+            force = np.asarray(recording.samples["handle_force"][low:high], dtype=np.float64)
+            key = hashlib.sha256(opening.tobytes() + torque.tobytes() + force.tobytes()).digest()
+            here = f"stroke {stroke[low]} of {_name(recording)}"
+            if key in seen:
+                raise InputError(
+                    f"{here} is a copy of {seen[key]}: every opening and torque is the same to the "
+                    "last digit, which no sensor with noise gives twice. Remove the copy; it would "
+                    "count as a second measurement."
+                )
+            seen[key] = here
+
+
+def _name(recording: Recording) -> str:
+    return recording.source or "the recording"

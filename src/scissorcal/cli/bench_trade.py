@@ -1,0 +1,206 @@
+"""``scissorcal bench trade``"""
+
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import Folder, Seed
+from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.progress import progress
+from scissorcal.cli.verify import Cluster
+from scissorcal.errors import InputError
+
+if TYPE_CHECKING:
+    from scissorcal.bench.trade.point import Curve, Point
+    from scissorcal.bench.trade.result import Trade
+    from scissorcal.workday.workspace import Workspace
+
+_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+_DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)\s*")
+
+Knobs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--knob", metavar="NAME", help="A knob to measure; repeat the option. All if not given."
+    ),
+]
+Budget = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help='Time for the whole run, such as "3 min" or "90 s"; what does not fit is named.',
+    ),
+]
+Recipe = Annotated[
+    str | None,
+    typer.Option(
+        help="A built-in recipe in place of a workspace: its day on the virtual rig is made first, "
+        "in the folder bench-NAME (bench-NAME-SEED for a seed above 0), and kept; a budget counts "
+        "from there on."
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, help="Processes to measure in; one for each core if not given."),
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Measure again what was measured on the same inputs.")
+]
+Show = Annotated[bool, typer.Option("--show", help="Print what the last run found; measure none.")]
+
+
+@command
+def trade(
+    knob: Knobs = None,
+    budget: Budget = None,
+    recipe: Recipe = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    force: Force = False,
+    show: Show = False,
+    seed: Seed = 0,
+    folder: Folder = None,
+) -> Answer:
+    """Measure what accuracy costs, on a workspace's own recordings and scene.
+
+    One knob at a time is turned (effort, windows, amount of capture, tables, loop rate,
+    candidates, photographs), its cost and its error are measured, and the cheapest setting within
+    its part of the scene's tolerance is recommended; then all recommended settings are measured at
+    once. Writes bench/trade.html and bench/trade.json.
+
+    Each measurement is stored when it is made: the command can be interrupted and repeated to
+    continue.
+
+    \b
+    Example:
+      $ scissorcal bench trade --knob effort --budget "2 min"
+      Effort of the fits
+      setting   processor time  worst band error
+      draft             3.81 s             1.70%  Pareto front
+      ...
+    """
+    began = time.time()
+    from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
+
+    allowed = None if budget is None else seconds_of(budget)
+    if recipe is not None and folder is not None:
+        raise InputError("--recipe makes another workspace: leave out --workspace.")
+    if recipe is not None and show:
+        raise InputError("--show reads a workspace: go into the one of --recipe, or leave it out.")
+    if show:
+        return _stored(open_workspace(folder))
+    if recipe is None:
+        workspace = open_workspace(folder)
+    else:
+        workspace = _day(recipe, seed)
+        began = time.time()
+    settings = TradeSettings(tuple(knob or ()), allowed, seed, force)
+    with progress() as tell:
+        found = trade_workspace(
+            workspace,
+            settings,
+            workers=workers,
+            cluster=cluster,
+            progress=tell,
+            began=began,
+        )
+    for sentence in found.notes:
+        note(sentence)
+    return _answer(found.trade, (found.html, found.json))
+
+
+def seconds_of(words: str) -> float:
+    """Seconds of a duration in words. Raises InputError where it is none.
+
+    >>> seconds_of("3 min"), seconds_of("1 h 30 min"), seconds_of("90s")
+    (180.0, 5400.0, 90.0)
+    """
+    parts = _DURATION.findall(words)
+    found = sum(float(number) * _SECONDS[unit] for number, unit in parts)
+    if not found or _DURATION.sub("", words).strip():
+        raise InputError(
+            f'--budget {words}: give a time above zero with its unit, such as "3 min" or "90 s".'
+        )
+    return found
+
+
+def _day(name: str, seed: int) -> "Workspace":
+    """The workspace of a built-in recipe with a day on the virtual rig; made where it is not."""
+    from scissorcal.recipe.library import recipe_path
+    from scissorcal.workday.demo.day import make_day
+    from scissorcal.workday.workspace import Workspace, create_workspace, demo_folder
+
+    recipe_path(name)
+    folder = Path(f"bench-{name}-{seed}" if seed else f"bench-{name}").absolute()
+    workspace = Workspace(folder)
+    finished = folder / ".day-finished"
+    if finished.is_file():
+        return workspace
+    workspace = create_workspace(demo_folder(folder), name)
+    with progress() as tell:
+        make_day(workspace, seed=seed, progress=tell)
+    finished.touch()
+    return workspace
+
+
+def _stored(workspace: "Workspace") -> Answer:
+    from scissorcal.bench.trade.result import read_trade
+
+    return _answer(read_trade(workspace.trade_json), ())
+
+
+def _answer(found: "Trade", files: tuple[Path, ...]) -> Answer:
+    from scissorcal.workday.envelope import plain
+
+    return Answer({"trade": plain(found)}, _text(found), files=files)
+
+
+def _text(found: "Trade") -> str:
+    curves = [one for one in found.curves if one.points]
+    blocks = [_block(one) for one in (*curves, *([found.together] if found.together else []))]
+    closing = [
+        *found.sentences,
+        *found.notes,
+        f"measured {found.measured_now} of {found.measured} samples in this run, "
+        f"{found.seconds:.0f} s; page: bench/trade.html",
+    ]
+    return "\n\n".join([*blocks, "\n".join(closing)])
+
+
+def _block(found: "Curve") -> str:
+    costs = list(dict.fromkeys(name for p in found.points for name in p.costs))[:3]
+    errors = [found.error]
+    rows = [["setting", *costs, *errors, ""]]
+    rows += [_row(point, costs, errors) for point in found.points]
+    lines = [found.title, table(rows, right=range(1, len(costs) + 2))]
+    lines += [f"{p.setting.label}: {p.failed}" for p in found.points if p.failed]
+    if found.unmeasured:
+        lines.append(f"not measured within the budget: {'; '.join(found.unmeasured)}")
+    return "\n".join(lines)
+
+
+def _row(point: "Point", costs: list[str], errors: list[str]) -> list[str]:
+    cells = [point.setting.label]
+    for name in costs:
+        spread = point.costs.get(name)
+        cells.append(spread.words if spread else "-")
+    for name in errors:
+        error = point.errors.get(name)
+        if error is None:
+            cells.append("-")
+        elif error.share is not None:
+            cells.append(f"{error.share:.2%}")
+        else:
+            cells.append(f"{error.value:.3g} {error.unit}".rstrip())
+    marks = {
+        "failed": bool(point.failed),
+        "present": point.setting.present,
+        "recommended": point.recommended,
+        "Pareto front": point.front,
+        "reference": point.reference,
+    }
+    return [*cells, ", ".join(word for word, is_so in marks.items() if is_so)]

@@ -1,0 +1,99 @@
+"""Run the segments of a capture on a motion, record them, and say what is going on."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.recorder import Recorder, unloaded_sentence
+from scissorcal.device.trajectory import Segment
+from scissorcal.device.unloaded import LoadWatch
+from scissorcal.recording import Stroke
+
+CaptureProgress = Callable[[float, str, Recorder], None]
+"""Called with the share done (0 to 1), a sentence, and what was recorded so far."""
+
+IDLE_S = 1.5
+"""Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
+
+
+class Drive:
+    """Runs segments of a capture, records them and reports progress.
+
+    ``strokes`` are those of the recording; a list may grow while the capture runs. ``total`` are
+    the ticks of all segments, as far as they are known: see :meth:`expect`.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        recorder: Recorder,
+        strokes: Sequence[Stroke],
+        progress: CaptureProgress | None,
+        total: int,
+        *,
+        cuts: bool | None = None,
+    ) -> None:
+        self._motion = motion
+        self._recorder = recorder
+        self._strokes = strokes
+        self._tell = progress or silent
+        self._total = total
+        self._done = 0
+        loaded = any(stroke.sheet >= 0 for stroke in strokes) if cuts is None else cuts
+        radius = motion.identity.handle_radius
+        self._load = LoadWatch(strokes, radius) if loaded else None
+        self._warned = 0
+
+    def expect(self, ticks: int) -> None:
+        """Say how many ticks of segments are expected still, where nobody knows all of them."""
+        self._total = self._done + max(ticks, 1)
+
+    def warning(self) -> str:
+        """What to tell the person who loads the next piece about the last; empty if it was cut."""
+        empty, self._warned = self._recorder.empty[self._warned :], len(self._recorder.empty)
+        return f"{unloaded_sentence(empty[-1])} " if empty else ""
+
+    def go_to_start(self, segment: Segment) -> None:
+        """Bring the rig to where a segment starts, so that material can be loaded there."""
+        for samples in self._motion.track(segment.reference.head()):
+            self._take(samples, "moving to where the next piece is loaded")
+
+    def follow(self, segment: Segment) -> None:
+        """Run a segment and record it."""
+        begun = self._done
+        for samples in self._motion.track(segment.reference):
+            passed = self._motion.track_index - self._motion.approach_ticks
+            self._done = max(self._done, begun + min(passed, len(segment.reference)))
+            self._take(samples, self._doing(samples))
+        self._done = begun + len(segment.reference)
+
+    def idle(
+        self, seconds: float = IDLE_S, doing: str = "motors off, measuring sensor zeros"
+    ) -> None:
+        """Record with the motors off, which shows the sensor zeros."""
+        for samples in self._motion.idle(seconds):
+            if self._load and self._done == 0:
+                self._load.rest(samples)
+            self._take(samples, doing)
+
+    def _take(self, samples: Samples, sentence: str) -> None:
+        self._recorder.take(samples, self._motion.garbled)
+        for stroke in self._load.take(samples) if self._load and len(samples) else ():
+            self._recorder.unloaded(stroke)
+            self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)
+        self._tell(self._done / self._total, sentence, self._recorder)
+
+    def _doing(self, samples: Samples) -> str:
+        labels = samples["stroke"]
+        if len(labels) == 0 or labels[-1] < 0:
+            return "between strokes"
+        stroke = self._strokes[int(labels[-1])]
+        speed = f" at {stroke.speed:g} rad/s" if np.isfinite(stroke.speed) else ""
+        sheet = f", piece {stroke.sheet + 1}" if stroke.sheet >= 0 else ""
+        of = f"stroke {stroke.index + 1} of {len(self._strokes)}{sheet}"
+        return f"{stroke.kind}{speed} ({of})"
+
+
+def silent(done: float, sentence: str, recorder: Recorder) -> None:
+    """Report no progress."""

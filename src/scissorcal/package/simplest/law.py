@@ -1,0 +1,107 @@
+"""A fitted law at its MAP point and at posterior draws, with its parameters by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.package.exact import ExactModel, FitDraws, central_model, exact_model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Law:
+    """The law of a cut and of friction: the MAP point in the first row, then posterior draws.
+
+    Both have equally many rows. ``friction`` is None where none is rendered.
+    """
+
+    cut: FitDraws
+    friction: FitDraws | None
+
+    @classmethod
+    def of_fits(cls, cut: FitResult, friction: FitResult | None, draws: Mapping[str, Array]) -> Law:
+        """The law of two fits; ``draws`` are those of :func:`scissorcal.package.build.pick_draws`.
+
+        They have the keys "draws/cut.npy" and, with friction, "draws/friction.npy".
+        """
+
+        def rows(fit: FitResult) -> FitDraws:
+            picked = draws[f"draws/{fit.what}.npy"]
+            return FitDraws.of(fit, np.vstack([fit.map_point[None, :], picked]))
+
+        return cls(rows(cut), rows(friction) if friction else None)
+
+    @property
+    def rows(self) -> int:
+        """One more than there are draws."""
+        return len(self.cut.draws)
+
+    def model(self) -> ExactModel:
+        """The exact model of all rows, its parameters of shape (rows, 1)."""
+        return exact_model(self.cut, self.friction)
+
+    def central(self) -> ExactModel:
+        """The exact model at the MAP point, its parameters scalars: what tables are compiled of."""
+        return central_model(self.cut, self.friction)
+
+    def at(self, row: int) -> Law:
+        """The law of one row alone."""
+        return self.of_rows(np.array([row]))
+
+    def of_rows(self, rows: NDArray[np.int64]) -> Law:
+        """The law of some of the rows."""
+        friction = self.friction and replace(self.friction, draws=self.friction.draws[rows])
+        return Law(replace(self.cut, draws=self.cut.draws[rows]), friction)
+
+    def part(self, what: str) -> FitDraws:
+        """The draws of the fit called ``what``; ValueError for friction that is not rendered."""
+        found = self.cut if what == "cut" else self.friction
+        if found is None:
+            raise ValueError("this law has no friction")
+        return found
+
+    def with_part(self, what: str, part: FitDraws | None) -> Law:
+        """The law with another cut or friction."""
+        if what == "friction":
+            return replace(self, friction=part)
+        if part is None:
+            raise ValueError("a law has a cut")
+        return replace(self, cut=part)
+
+
+def column(part: FitDraws, name: str) -> Array:
+    """One parameter over the rows, shape (rows,); KeyError if the law has none of this name."""
+    if name not in part.names:
+        raise KeyError(name)
+    return part.draws[:, part.names.index(name)]
+
+
+def with_columns(part: FitDraws, columns: Mapping[str, Array]) -> FitDraws:
+    """The part with parameters (rows,) set by name; those that it lacks are added at the end."""
+    names, draws = list(part.names), part.draws.copy()
+    for name, values in columns.items():
+        if name in names:
+            draws[:, names.index(name)] = values
+        else:
+            names.append(name)
+            draws = np.column_stack([draws, values])
+    return FitDraws(part.structure, tuple(names), draws)
+
+
+def without(part: FitDraws, names: Iterable[str]) -> FitDraws:
+    """The part without the named parameters."""
+    left_out = set(names)
+    kept = [index for index, name in enumerate(part.names) if name not in left_out]
+    return FitDraws(part.structure, tuple(part.names[i] for i in kept), part.draws[:, kept])
+
+
+def structured(part: FitDraws, **changes: Any) -> FitDraws:
+    """The part with other discrete choices."""
+    return replace(part, structure={**part.structure, **changes})

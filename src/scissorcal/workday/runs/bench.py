@@ -1,0 +1,335 @@
+"""`bench trade` in a workspace: its case, its measurements kept one by one, its results."""
+
+import math
+import pickle
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import scissorcal
+from scissorcal.errors import InputError
+from scissorcal.files import replacing
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.records import Record, RecordFile
+from scissorcal.workday.runs.bench_case import (
+    coverage_notes,
+    inputs_hash,
+    load_case,
+    machine,
+    wanted_knobs,
+)
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.bench.trade.case import Case
+    from scissorcal.bench.trade.point import Curve
+    from scissorcal.bench.trade.result import Trade
+    from scissorcal.bench.trade.schedule import Schedule
+    from scissorcal.bench.trade.study import Task
+
+Progress = Callable[[float, str], None]
+
+FINISH_S = 2.0
+"""Time within a budget for writing the results."""
+
+RESERVED_SHARE = 0.3
+"""At most this share of a budget is kept for measuring all recommended settings at once."""
+
+STRETCH = 2.0
+"""All recommended settings are begun where this many times the time left is expected for them."""
+
+
+@dataclass(frozen=True)
+class TradeSettings:
+    """Which knobs, all if none is named; seconds for the whole run, without limit if None."""
+
+    knobs: tuple[str, ...] = ()
+    budget_s: float | None = None
+    seed: int = 0
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class TradeOutcome:
+    """The result, its files, and what to say on the side."""
+
+    trade: "Trade"
+    html: Path
+    json: Path
+    notes: tuple[str, ...] = ()
+
+
+def trade_workspace(
+    workspace: Workspace,
+    settings: TradeSettings | None = None,
+    *,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+    began: float | None = None,
+) -> TradeOutcome:
+    """Measure how cost buys accuracy on a workspace's own recordings, scene and fits.
+
+    Each measurement is kept in bench/trade.partial.jsonl as soon as it is made, so that a killed
+    run goes on where it was and nothing is measured twice on the same inputs and computer, unless
+    ``force``. ``began`` is the time (of `time.time`) from which the budget counts. The page is
+    written to bench/trade.html, its JSON twin to bench/trade.json.
+
+    Raises MissingError where a fit that the scene needs is missing or stale, InputError where a
+    knob is unknown or not of this scene, the budget is too small for any measurement, the cluster
+    cannot be used, or another run holds the file.
+    """
+    from scissorcal.bench.trade.knob import KNOBS
+    from scissorcal.bench.trade.result import trade_text
+    from scissorcal.report.trade import trade_page
+
+    start = time.time() if began is None else began
+    chosen = settings or TradeSettings()
+    tell = progress or (lambda done, sentence: None)
+    tell(0.0, "reading recordings and fits")
+    engine = Engine.of(workspace)
+    case = load_case(engine, chosen.seed)
+    names = wanted_knobs(case, chosen.knobs)
+    deadline = None if chosen.budget_s is None else start + chosen.budget_s - FINISH_S
+    inputs = inputs_hash(engine, case)
+    if chosen.force:
+        with RecordFile(workspace.trade_partial_path, inputs):  # refused where another run holds it
+            workspace.trade_partial_path.unlink()
+    with RecordFile(workspace.trade_partial_path, inputs) as file:
+        run = _Run(case, file, chosen.budget_s, deadline, tell)
+        with open_pool(workers, cluster) as pool:
+            run.measure(pool, names, keep_time=len(names) > 1)
+            curves = run.curves(names if chosen.knobs else tuple(KNOBS))
+            made = run.made
+            together = run.together(pool, curves) if len(names) > 1 else None
+            # time that was kept, and that nothing new was compared in, goes to the knobs
+            if run.made == made and run.measure(pool, names, keep_time=False):
+                curves = run.curves(names if chosen.knobs else tuple(KNOBS))
+                together = run.together(pool, curves) if len(names) > 1 else None
+        trade = run.result(engine, curves, together, time.time() - start, pool.workers)
+        notes = (file.note,) if file.note else ()
+    for path, text in (
+        (workspace.trade_json, trade_text(trade)),
+        (workspace.trade_html, trade_page(trade)),
+    ):
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")
+    return TradeOutcome(trade, workspace.trade_html, workspace.trade_json, notes)
+
+
+class _Run:
+    """One run over a record file: what it measures, how long it may, and what comes of it."""
+
+    def __init__(
+        self,
+        case: "Case",
+        file: RecordFile,
+        budget_s: float | None,
+        deadline: float | None,
+        tell: Progress,
+    ) -> None:
+        self._case, self._file, self._tell = case, file, tell
+        self._budget_s, self._deadline = budget_s, deadline
+        self._blob = pickle.dumps(case)
+        self._began, self.made = time.time(), 0
+
+    def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
+        """Measure the tasks of the knobs named that have no record yet; whether any was.
+
+        With ``keep_time`` some of a budget is left for all recommended settings at once.
+        """
+        from scissorcal.bench.trade.schedule import Schedule
+        from scissorcal.bench.trade.study import (
+            PRESENT_TASK,
+            key_of,
+            knob_of,
+            setting_of,
+            tasks_of,
+        )
+        from scissorcal.bench.trade.together import TOGETHER, Together
+
+        together = Together(())
+        present = together.settings(self._case)[0]
+        tasks = tasks_of(self._case, names)
+        known = {key_of(record) for record in self._file.records}
+        left = [task for task in tasks if task.key not in known]
+        expected = {}
+        for task in tasks:
+            knob = knob_of(task)
+            setting = setting_of(knob, self._case, task.label)
+            expected[task] = knob.expected_s(self._case, setting)
+        schedule = Schedule(left, expected, self._deadline)
+        for record in self._file.records:
+            schedule.learn(record)
+
+        def reserve() -> float:
+            # without the present fits there is nothing to compare all settings at once with
+            if self._budget_s is None or not keep_time or PRESENT_TASK in schedule.left:
+                return 0.0
+            wanted = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
+            return min(wanted, RESERVED_SHARE * self._budget_s)
+
+        schedule.reserve = reserve
+        before = self.made
+        self._work(pool, schedule, len(left))
+        if not self._file.records and self._budget_s is not None and left:
+            fixed = self._budget_s - (self._deadline or 0.0) + self._began
+            least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
+            raise InputError(
+                f"A budget of {self._budget_s:g} s is too small for any measurement of this scene: "
+                f'try --budget "{10 * math.ceil(0.1 * least)} s".'
+            )
+        return self.made > before
+
+    def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
+        """The curves of the knobs named, from all records."""
+        from scissorcal.bench.trade.assemble import curve_of, limit_of
+        from scissorcal.bench.trade.knob import make_knob
+
+        case, limit = self._case, limit_of(self._case)
+        return tuple(curve_of(case, make_knob(name), self._of(name), limit) for name in names)
+
+    def together(self, pool: Pool, curves: "Sequence[Curve]") -> "Curve | None":
+        """Measure the present and all recommended settings; None where they are the same."""
+        from scissorcal.bench.trade.assemble import measured_curve, reference_sample
+        from scissorcal.bench.trade.knob import make_knob
+        from scissorcal.bench.trade.recommend import choices_of, together_sentence
+        from scissorcal.bench.trade.schedule import Schedule
+        from scissorcal.bench.trade.study import PRESENT_TASK, Task, key_of
+        from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
+
+        effort = make_knob("effort")
+        reference = reference_sample(self._case, effort, self._of("effort"))
+        choices = choices_of(curves)
+        if reference is None or not choices:
+            return None
+        present = {c.knob: p.setting.label for c in curves for p in c.points if p.setting.present}
+        changed = tuple(pair for pair in choices if present.get(pair[0]) != pair[1])
+        if not changed:
+            return None
+        tasks = [PRESENT_TASK, Task(TOGETHER, RECOMMENDED, choices=changed)]
+        known = {key_of(record) for record in self._file.records}
+        left = [task for task in tasks if task.key not in known]
+        knob = Together(changed)
+        expected = {
+            task: knob.expected_s(self._case, setting)
+            for task in tasks
+            for setting in knob.settings(self._case)
+            if setting.label == task.label
+        }
+        # nothing else waits for the time that is left, so it is used even where it may not do
+        schedule = Schedule(left, expected, self._deadline, share=STRETCH, stretch=STRETCH)
+        for record in self._file.records:
+            schedule.learn(record)
+        self._work(pool, schedule, len(left))
+        keys = {task.key for task in tasks}
+        own = [record for record in self._of(TOGETHER) if key_of(record) in keys]
+        curve = measured_curve(self._case, knob, own, reference)
+        against = next((one.against for one in curves if one.knob == "effort"), curve.against)
+        told = (together_sentence(curve),)
+        return replace(curve, against=against, sentences=told) if own else None
+
+    def result(
+        self,
+        engine: Engine,
+        curves: "tuple[Curve, ...]",
+        together: "Curve | None",
+        seconds: float,
+        workers: int,
+    ) -> "Trade":
+        """Everything that was found, with the sentences that it ends in."""
+        from scissorcal.bench.trade.assemble import limit_of
+        from scissorcal.bench.trade.point import Quantity, Spread
+        from scissorcal.bench.trade.result import FORMAT, Trade
+
+        records = self._file.records
+        sentences = [
+            f"{curve.title}: {curve.sentences[0]}"
+            for curve in curves
+            if curve.points and curve.sentences
+        ]
+        if together is not None:
+            sentences += together.sentences
+        notes = [f"{curve.title}: {curve.missing}" for curve in curves if curve.missing]
+        if untouched := [c.title for c in curves if not c.points and not c.missing]:
+            notes.append(f"Not measured at all within the budget: {'; '.join(untouched)}.")
+        notes += coverage_notes(engine)
+        if workers > 1:
+            notes.append(
+                f"{workers} measurements were made at a time: times are processor seconds, which "
+                "shared caches and memory make somewhat longer than one measurement alone would."
+            )
+        return Trade(
+            format=FORMAT,
+            created=datetime.now(UTC),
+            scissorcal_version=scissorcal.__version__,
+            recipe_name=engine.recipe.name,
+            material=engine.recipe.material.name,
+            simulated=self._case.simulated,
+            machine=machine(),
+            workers=workers,
+            seconds=round(seconds, 1),
+            budget_s=self._budget_s,
+            tolerance=engine.recipe.scene.tolerance_percent / 100.0,
+            limit=limit_of(self._case),
+            baseline=Spread.of([Quantity(1e3 * r["baseline_s"], "ms") for r in records]),
+            measured=len(records),
+            measured_now=self.made,
+            curves=curves,
+            together=together,
+            sentences=tuple(sentences),
+            notes=tuple(notes),
+        )
+
+    def _of(self, name: str) -> list[Record]:
+        from scissorcal.bench.trade.study import records_of
+
+        return records_of(self._case, name, self._file.records)
+
+    def _work(self, pool: Pool, schedule: "Schedule", count: int) -> None:
+        """Make measurements, and keep each; within a budget no worker is handed a second one."""
+        jobs = (
+            (self._blob, task, self._deadline and self._deadline - schedule.reserve())
+            for task in schedule
+        )
+        done = 0
+
+        def keep(record: Record | None) -> None:
+            nonlocal done
+            done += 1
+            if record is None:
+                return
+            self._file.append(record)
+            schedule.learn(record)
+            self.made += 1
+            share = done / max(count, done)
+            if self._budget_s is not None:
+                spent = time.time() - (self._deadline or 0.0) + self._budget_s
+                share = max(share, min(spent / self._budget_s, 0.99))
+            self._tell(share, f"{record['knob']}: {record['label']}")
+
+        handed = pool if self._deadline is None else replace(pool, ahead=1)
+        try:
+            handed.work(_do, jobs, keep)
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"The cluster's workers lack {error.name}: install this version of scissorcal "
+                "where they run."
+            ) from error
+
+
+def _do(job: "tuple[bytes, Task, float | None]") -> Record | None:
+    from scissorcal.bench.trade.study import run_task
+
+    blob, task, end = job
+    return run_task(_unpacked(blob), task, end)
+
+
+@lru_cache(maxsize=2)
+def _unpacked(blob: bytes) -> Any:
+    return pickle.loads(blob)

@@ -1,0 +1,135 @@
+"""What `bench trade` starts from in a workspace: its case, knobs, and the identity of both."""
+
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import scissorcal
+from scissorcal.errors import InputError
+from scissorcal.identity import digest
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.recordings import used_recordings
+from scissorcal.workday.runs.bench_photographs import with_photographs
+from scissorcal.workday.runs.cut import edge_of_photographs
+from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.workspace import FitKind
+
+if TYPE_CHECKING:
+    from scissorcal.bench.trade.case import Case
+    from scissorcal.recording import Recording
+
+ALGORITHM = 2
+"""Raised whenever a measurement of the same inputs would mean something else."""
+
+
+def load_case(engine: Engine, seed: int = 0) -> "Case":
+    """What a workspace gives to a benchmark: recipe, used recordings and current fits.
+
+    Raises MissingError with the command that must come first.
+    """
+    from scissorcal.bench.trade.case import Case
+    from scissorcal.bench.trade.models import held_law, nothing_rendered
+
+    kinds: tuple[FitKind, ...] = ("friction", "cut")
+    needed = [kind for kind in kinds if engine.needed(f"fit {kind}")]
+    if not needed:
+        raise InputError(
+            f"{engine.workspace.recipe_path}: this scene needs no fit of friction or a cut, so "
+            "there is nothing to measure."
+        )
+    fits = {kind: load_result(engine, kind) for kind in needed}
+    recordings = {
+        kind: used_recordings(engine.workspace, engine.recipe, kind, engine.index)
+        for kind in needed
+    }
+    edge, verdicts = edge_of_photographs(engine)
+    case = Case(
+        recipe=engine.recipe,
+        friction=recordings.get("friction", ()),
+        cut=recordings.get("cut", ()),
+        edge=edge,
+        edge_verdicts=verdicts,
+        friction_fit=fits.get("friction"),
+        cut_fit=fits.get("cut"),
+        effort=next(fit.effort for fit in reversed(fits.values())),
+        seed=seed,
+        number_format=engine.recipe.scene.number_format,
+        simulated=any(_virtual(one) for own in recordings.values() for one in own),
+    )
+    if case.cut_fit is not None and not nothing_rendered(case):
+        case = replace(case, held=held_law(case, case.cut_fit, case.friction_fit))
+    return with_photographs(case, engine)
+
+
+def wanted_knobs(case: "Case", wanted: Sequence[str]) -> tuple[str, ...]:
+    """The knobs to measure; InputError for one that is unknown or that the scene does not have."""
+    from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
+
+    for name in wanted:
+        if name not in KNOBS:
+            raise InputError(f"--knob {name} is no knob; choose from {', '.join(KNOBS)}.")
+        if why := make_knob(name).missing(case):
+            raise InputError(f"--knob {name}: this scene does not have it. {why}")
+    there = scene_knobs(case)
+    return tuple(name for name in there if not wanted or name in wanted)
+
+
+def coverage_notes(engine: Engine) -> list[str]:
+    """What trust checks of this workspace found of the intervals' coverage, where there are any."""
+    from scissorcal.calibration.store import load
+    from scissorcal.calibration.verify.result import VerifyResult
+
+    found = []
+    for name in ("verify friction", "verify cut"):
+        if engine.needed(name) and engine.state(name).state in ("done", "failed"):
+            check = load(engine.file(name), VerifyResult)
+            if check.calibration:
+                shares = [quantity.coverage[1].share for quantity in check.calibration.quantities]
+                found.append(
+                    f"The trust check of {check.what} ({check.effort} effort, "
+                    f"{check.calibration.fits} simulated fits) found the truth in {min(shares):.0%}"
+                    f" to {max(shares):.0%} of its 90 % intervals, by quantity."
+                )
+    return found or [
+        "How often intervals hold the truth was not measured here: 'scissorcal verify' measures it."
+    ]
+
+
+def machine() -> str:
+    """The computer in words: processor, cores, system."""
+    name = platform.processor() or platform.machine()
+    cpu = Path("/proc/cpuinfo")
+    if cpu.is_file():
+        lines = cpu.read_text(encoding="utf-8", errors="replace").splitlines()
+        named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+        name = named[0] if named else name
+    return f"{name}, {os.cpu_count()} cores, {platform.system()}"
+
+
+def inputs_hash(engine: Engine, case: "Case") -> str:
+    """Identity of all that a measurement depends on, the computer among it."""
+    fits = {
+        fit.what: engine.index.digest(engine.file(f"fit {fit.what}"))
+        for fit in (case.friction_fit, case.cut_fit)
+        if fit is not None
+    }
+    return digest(
+        {
+            "algorithm": ALGORITHM,
+            "version": scissorcal.__version__,
+            "fits": fits,
+            "recordings": [one.content_hash for one in (*case.friction, *case.cut)],
+            "recipe": engine.recipe.model_dump(mode="json"),
+            "seed": case.seed,
+            "machine": machine(),
+        }
+    )
+
+
+def _virtual(recording: "Recording") -> bool:
+    from scissorcal.kernel import Capability
+
+    return bool(int(recording.device.get("capabilities", 0)) & Capability.SIMULATOR)

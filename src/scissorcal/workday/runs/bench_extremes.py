@@ -1,0 +1,98 @@
+"""`bench extremes`: its jobs spread over processes, its page and JSON twin."""
+
+import platform
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import scissorcal
+from scissorcal.files import replacing
+from scissorcal.workday.pool import open_pool
+
+if TYPE_CHECKING:
+    from scissorcal.bench.extremes.result import Extremes
+    from scissorcal.bench.extremes.study import Extent, Job
+
+Progress = Callable[[float, str], None]
+
+FINISH_S = 2.0
+"""Time within a budget for writing the results, and for the jobs that are under way."""
+
+
+@dataclass(frozen=True)
+class ExtremesOutcome:
+    """The result and its files."""
+
+    result: "Extremes"
+    html: Path
+    json: Path
+
+
+def run_extremes(
+    extent: "Extent",
+    folder: Path,
+    *,
+    seed: int = 0,
+    budget_s: float | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+) -> ExtremesOutcome:
+    """Try the extremes and write extremes.html and extremes.json into ``folder``.
+
+    The same extent and seed try the same states; with ``budget_s`` no job begins that would end
+    later, and what was tried is some of everything. Needs no workspace.
+    """
+    from scissorcal.bench.extremes.cells import all_cells
+    from scissorcal.bench.extremes.result import Run, extremes_text, summarise
+    from scissorcal.bench.extremes.study import Done, do, jobs
+    from scissorcal.report.extremes import extremes_page
+
+    began = time.monotonic()
+    tell = progress or (lambda done, sentence: None)
+    deadline = None if budget_s is None else began + budget_s - FINISH_S
+    every = list(jobs(extent, seed))
+    planned = sum(len(job.states) for job in every)
+    done: list[Done] = []
+
+    def keep(one: Done) -> None:
+        done.append(one)
+        tell(len(done) / len(every), f"{len(done)} of {len(every)} jobs")
+
+    with open_pool(workers, cluster) as pool:
+        pool.work(do, _in_time(every, deadline), keep)
+        count = pool.workers
+    run = Run(
+        created=datetime.now(UTC),
+        version=scissorcal.__version__,
+        machine=f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
+        workers=count,
+        seed=seed,
+        seconds=time.monotonic() - began,
+        budget_s=budget_s,
+        planned=planned,
+    )
+    result = summarise(run, done, all_cells())
+    folder.mkdir(parents=True, exist_ok=True)
+    outcome = ExtremesOutcome(result, folder / "extremes.html", folder / "extremes.json")
+    for path, text in (
+        (outcome.json, extremes_text(result)),
+        (outcome.html, extremes_page(result)),
+    ):
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")
+    return outcome
+
+
+def _in_time(every: "list[Job]", deadline: float | None) -> "Iterator[Job]":
+    """The jobs that may begin: none that would, at the longest so far, end after the deadline."""
+    longest, before = 0.0, time.monotonic()
+    for job in every:
+        now = time.monotonic()
+        longest, before = max(longest, now - before), now
+        if deadline is not None and now + longest > deadline:
+            return
+        yield job

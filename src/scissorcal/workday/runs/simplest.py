@@ -1,0 +1,65 @@
+"""What a workspace's scene needs of its fits: worked out once, then read."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from scissorcal.files import replacing
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.scene_choice import STEP, known_scene_choice
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.result import FitResult
+    from scissorcal.package.simplest.choice import SceneChoice
+    from scissorcal.package.simplest.model import Simplified
+
+NEEDED = ("friction", "cut")
+SEED = 0
+"""Picks the draws, as `scissorcal package build` does unless it is given another."""
+
+
+def workspace_scene_choice(engine: Engine) -> "SceneChoice | None":
+    """What the scene needs of the fits, and what leaving the rest out saves.
+
+    Steps are timed when it is worked out; it is then kept in package/scene-choice.json for as long
+    as fits and recipe are the same. None where a fit is missing or stale, or where there is nothing
+    to build. Raises InputError where the fitted law cannot be compiled.
+    """
+    import numpy as np
+
+    from scissorcal.package.build import pick_draws
+    from scissorcal.package.simplest.model import simplest_model
+
+    if not engine.needed(STEP) or set(available(engine, NEEDED)) != set(NEEDED):
+        return None
+    found = known_scene_choice(engine)
+    if found is not None:
+        return found
+    cut, friction = load_result(engine, "cut"), load_result(engine, "friction")
+    rendered = friction if engine.recipe.scene.render_friction else None
+    draws = pick_draws(cut, rendered, np.random.default_rng(SEED))
+    simplified = simplest_model(engine.recipe, cut, rendered, draws)
+    return store_scene_choice(engine, simplified, {"cut": cut, "friction": friction})
+
+
+def store_scene_choice(
+    engine: Engine, simplified: "Simplified", fits: "Mapping[str, FitResult | None]"
+) -> "SceneChoice":
+    """Keep what a scene needs of its fits (friction, cut) in package/scene-choice.json.
+
+    Steps are timed here.
+    """
+    from scissorcal.package.simplest.choice import scene_choice
+
+    friction = fits["friction"] if engine.recipe.scene.render_friction else None
+    found = scene_choice(
+        engine.recipe,
+        simplified,
+        {"cut": fits["cut"], "friction": friction},
+        engine.identity(STEP),
+    )
+    path = engine.workspace.scene_choice_path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        part.write_text(found.model_dump_json(indent=1), encoding="utf-8")
+    return found

@@ -1,0 +1,48 @@
+"""Cells of estimation: none is wrong, and the cells themselves can find something wrong."""
+
+import pytest
+
+from scissorcal.bench.extremes import cut_cells, import_cells, statistics_cells, vision_cells
+from scissorcal.bench.extremes.cells import try_cell
+from scissorcal.bench.extremes.friction_cells import cells as friction
+from scissorcal.bench.extremes.inference_cells import cells as inference
+
+QUICK = [
+    cell
+    for module in (cut_cells, import_cells, statistics_cells, vision_cells)
+    for cell in module.cells()
+    if not cell.slow
+]
+LONGEST = "1e7 samples"
+FITTED = [cell for cell in (*inference(), *friction()) if cell.name != LONGEST]
+FITTED += [cell for module in (cut_cells, vision_cells) for cell in module.cells() if cell.slow]
+
+
+@pytest.mark.parametrize("cell", QUICK, ids=lambda cell: cell.name)
+def test_no_quick_cell_is_wrong(cell) -> None:
+    found = try_cell(cell, 11)
+    assert found.outcome != "wrong", found.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cell", FITTED, ids=lambda cell: cell.name)
+def test_no_fitted_cell_is_wrong(cell) -> None:
+    """About 70 cells with four or more standard errors of margin: a false alarm in 100 runs."""
+    found = try_cell(cell, 11)
+    assert found.outcome != "wrong", found.sentence
+
+
+def test_a_silent_error_is_found(monkeypatch) -> None:
+    """Draws shifted by a standard deviation are wrong, whatever their status says."""
+    from scissorcal.bench.extremes import inference_cells
+
+    honest = inference_cells.infer
+
+    def shifted(problem, effort, rng):
+        from dataclasses import replace
+
+        found = honest(problem, effort, rng)
+        return replace(found, draws=found.draws + found.draws.std(axis=0))
+
+    monkeypatch.setattr(inference_cells, "infer", shifted)
+    assert try_cell(inference()[0], 11).outcome == "wrong"

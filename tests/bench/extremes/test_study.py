@@ -1,0 +1,166 @@
+"""States, cells and what a run of them ends in."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.bench.extremes import cells as cells_module
+from scissorcal.bench.extremes import compare
+from scissorcal.bench.extremes.cells import Cell, Found, all_cells, judged, try_cell, worst_of
+from scissorcal.bench.extremes.compare import compare_kernel, compare_model
+from scissorcal.bench.extremes.quantities import QUANTITIES
+from scissorcal.bench.extremes.states import SWEPT, everyday_state, random_state
+from scissorcal.bench.extremes.study import Extent, jobs, planned, try_state
+from scissorcal.errors import InputError
+from scissorcal.package.exact import ExactModel
+from scissorcal.workday.runs.bench_extremes import run_extremes
+
+
+def cell(run) -> Cell:
+    return Cell("a cell", "model", "what is extreme", "what is stated", "how it is known", run)
+
+
+@pytest.mark.parametrize("name", list(QUANTITIES))
+def test_values_and_draws_stay_within_the_ranges(name):
+    one = QUANTITIES[name]
+    low, high = one.extreme
+    assert low <= one.everyday[0] <= one.everyday[1] <= high
+    values = one.values(9)
+    assert values[0] == pytest.approx(low)
+    assert values[-1] == pytest.approx(high)
+    rng = np.random.default_rng(1)
+    for extreme, (least, most) in ((True, one.extreme), (False, one.everyday)):
+        drawn = [one.draw(rng, extreme=extreme) for _ in range(200)]
+        assert least <= min(drawn)
+        assert max(drawn) <= most
+        assert len(set(drawn)) > 20
+
+
+def test_the_same_seed_tries_the_same_states():
+    extent = Extent(values=3, repeats=1, grid=3, random=5, everyday=5, slow=False)
+    first, again, other = (planned(extent, seed) for seed in (1, 1, 2))
+    assert first == again != other
+    assert {one.plan for one in first} == {"everyday", "random", "one", "pair"}
+    assert {one.swept[0] for one in first if one.plan == "one"} == set(SWEPT)
+    assert sum(len(job.states) for job in jobs(extent, 1)) == len(first)
+    assert not [job for job in jobs(extent, 1) if job.cell and "thrown" in job.cell]
+
+
+def test_a_run_that_ends_early_has_tried_some_of_everything():
+    begun = list(jobs(Extent(), 1))[:40]
+    parts = {cell.name: cell.part for cell in all_cells()}
+    tried = {parts[job.cell] for job in begun if job.cell}
+    assert tried >= {"kernel", "model", "inference", "signals", "vision"}
+    assert {one.plan for job in begun for one in job.states} >= {"random", "one", "pair"}
+
+
+def test_everyday_states_are_right_and_nothing_extreme_is_wrong():
+    rng = np.random.default_rng(130)
+    for state in [
+        *(everyday_state(rng) for _ in range(8)),
+        *(random_state(rng) for _ in range(8)),
+    ]:
+        for one in try_state(state).compared:
+            assert one.outcome != "wrong", (one, state)
+            if state.plan == "everyday":
+                assert one.outcome == "right", (one, state)
+
+
+def test_an_error_of_the_model_beyond_its_roundings_is_found(monkeypatch):
+    state = _loaded(1e-4)
+    assert compare_model(state).outcome == "right"
+    true = ExactModel.torque_settled
+    monkeypatch.setattr(ExactModel, "torque_settled", lambda *a: true(*a) * (1.0 + 1e-9))
+    assert compare_model(state).outcome == "wrong"
+
+
+def test_an_error_of_the_kernel_beyond_its_roundings_is_found(monkeypatch):
+    state = _loaded(1e-4)
+    assert compare_kernel(state)[0].outcome == "right"
+    step = compare.Kernel.step
+    monkeypatch.setattr(
+        compare.Kernel, "step", lambda *a: (o := step(*a))._replace(torque=o.torque * 1.01)
+    )
+    assert compare_kernel(state)[0].outcome == "wrong"
+
+
+def _loaded(depth: float):
+    """Everyday blades that press a sheet in, without a crack."""
+    base = everyday_state(np.random.default_rng(3))
+    values = {**base.values, "indentation": depth, "edge_offset": -0.008, "rate_damping": 0.0}
+    return dataclasses.replace(base, values=values, cut=False, by_depth=True)
+
+
+def test_a_refusal_without_reason_is_wrong(monkeypatch):
+    monkeypatch.setattr(ExactModel, "torque_settled", lambda *a: np.asarray(np.nan))
+    assert compare_model(_loaded(1e-4)).outcome == "wrong"
+
+
+def test_errors_are_refusals_only_with_a_sentence_of_this_program():
+    def refuses(_):
+        raise InputError("The recipe has no blade: add one.")
+
+    def numpy_fails(_):
+        np.linalg.inv(np.zeros((2, 2)))
+
+    def mute(_):
+        raise InputError("no")
+
+    assert try_cell(cell(refuses), 1).outcome == "refused"
+    assert try_cell(cell(numpy_fails), 1).outcome == "wrong"
+    assert try_cell(cell(mute), 1).outcome == "wrong"
+
+
+def test_many_outcomes_become_the_worst():
+    found = worst_of([judged(1e-9, 1e-6, "one"), judged(1e-7, 1e-6, "two", states=3)])
+    assert (found.outcome, found.error, found.states) == ("right", 1e-7, 4)
+    assert worst_of([found, Found("wrong", "three")]).sentence == "three"
+    assert judged(float("nan"), 1e-6, "not a number").outcome == "wrong"
+
+
+def test_names_of_cells_are_unique(monkeypatch):
+    assert len(all_cells()) > 20
+    monkeypatch.setattr(cells_module, "CELLS", cells_module.CELLS[:1] * 2)
+    with pytest.raises(ValueError, match="two cells are named"):
+        all_cells()
+
+
+@pytest.mark.parametrize(
+    "one",
+    [c for c in all_cells() if not c.slow and c.part in ("kernel", "model")],
+    ids=lambda c: c.name,
+)
+def test_a_cell_keeps_what_it_states(one):
+    assert try_cell(one, 130).outcome in ("right", "refused"), try_cell(one, 130).sentence
+
+
+def test_a_run_with_a_budget_writes_its_page_and_twin(tmp_path: Path, monkeypatch):
+    only = tuple(c for c in all_cells() if c.name == "model, power response")
+    monkeypatch.setattr("scissorcal.bench.extremes.study.all_cells", lambda: only)
+    extent = Extent(values=3, repeats=1, grid=3, random=50, everyday=50, slow=False)
+    found = run_extremes(extent, tmp_path, seed=4, budget_s=4.5, workers=1)
+    result = found.result
+    assert 0 < result.states < result.planned
+    assert [one.name for one in result.cells] == ["model, power response"]
+    page = found.html.read_text(encoding="utf-8")
+    assert result.sentence in page
+    assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
+    twin = json.loads(found.json.read_text(encoding="utf-8"))
+    assert twin["format"] == "scissorcal-extremes/1"
+    assert twin["states"] == result.states
+    (verdict,) = result.verdicts
+    assert verdict.status == "pass"
+
+
+def test_a_wrong_answer_fails_the_run(tmp_path: Path, monkeypatch):
+    only = (cell(lambda _: Found("wrong", "a number from nowhere")),)
+    monkeypatch.setattr("scissorcal.bench.extremes.study.all_cells", lambda: only)
+    monkeypatch.setattr("scissorcal.bench.extremes.cells.all_cells", lambda: only)
+    monkeypatch.setattr("scissorcal.bench.extremes.study.planned", lambda extent, seed: [])
+    result = run_extremes(Extent(), tmp_path, workers=1).result
+    (verdict,) = result.verdicts
+    assert verdict.status == "fail"
+    assert "1 wrong" in result.sentence

@@ -1,0 +1,46 @@
+"""`bench trade` on a day of the virtual rig, with its real knobs."""
+
+import pytest
+
+from scissorcal.bench.trade.knob import scene_knobs
+from scissorcal.bench.trade.study import tasks_of
+from scissorcal.workday.demo.day import make_day
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
+from scissorcal.workday.runs.bench_case import load_case
+from scissorcal.workday.workspace import Workspace, create_workspace
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    workspace = create_workspace(tmp_path_factory.mktemp("trade") / "day", "press-only")
+    make_day(workspace, seed=9320, effort="draft")
+    return workspace
+
+
+@pytest.mark.slow
+def test_every_knob_of_a_scene_has_one_present_setting(day: Workspace) -> None:
+    from scissorcal.bench.trade.knob import make_knob
+
+    case = load_case(Engine.of(day))
+    names = scene_knobs(case)
+    assert {"effort", "window", "capture", "tables", "rate"} <= set(names)
+    for name in names:
+        settings = make_knob(name).settings(case)
+        assert sum(one.present for one in settings) == 1, name
+        assert len({one.label for one in settings}) == len(settings), name
+    assert len(tasks_of(case, names)) > 50
+
+
+@pytest.mark.slow
+def test_a_day_is_measured_within_a_budget_and_goes_on(day: Workspace) -> None:
+    chosen = TradeSettings(knobs=("effort", "tables"), budget_s=60.0)
+    first = trade_workspace(day, chosen, workers=2).trade
+    print(f"{first.seconds:.1f} s of {first.budget_s} s allowed")
+    assert first.measured_now == first.measured > 0
+    tables = next(curve for curve in first.curves if curve.knob == "tables")
+    for point in tables.points:
+        assert point.errors[tables.error].value > 0.0
+        assert point.costs[tables.cost].median > 0.0
+    second = trade_workspace(day, chosen, workers=2).trade
+    assert second.measured == first.measured + second.measured_now

@@ -1,0 +1,113 @@
+"""Pareto front and recommendation: what no other setting beats, and the cheapest within a limit."""
+
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scissorcal.bench.trade.pareto import pareto_front
+from scissorcal.bench.trade.point import Curve, Error, Point, Quantity, Setting, Spread
+from scissorcal.bench.trade.recommend import choices_of, recommend, together_sentence
+
+NUMBERS = st.floats(0.0, 10.0).map(lambda value: round(value, 1))
+
+
+@given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=12))
+def test_a_point_is_on_the_front_exactly_where_no_other_is_better(
+    points: list[tuple[float, float]],
+) -> None:
+    front = pareto_front([a for a, _ in points], [b for _, b in points])
+    assert any(front)
+    for (cost, error), on in zip(points, front, strict=True):
+        beaten = any((a < cost and b <= error) or (a <= cost and b < error) for a, b in points)
+        assert on != beaten
+
+
+def spread(*values: float) -> Spread:
+    return Spread.of([Quantity(value, "s") for value in values])
+
+
+def point(label: str, costs: Spread, share: float | None, *, present: bool = False) -> Point:
+    errors = {} if share is None else {"error": Error(share, "N m", share)}
+    return Point(Setting(label, 1.0, present=present), {"time": costs}, errors)
+
+
+CURVE = Curve("made", "Made", "time", "error", against="the truth")
+COARSE = point("coarse", spread(1.0), 0.2)
+MIDDLE = point("middle", spread(2.0, 2.2), 0.004)
+FINE = point("fine", spread(5.0), 0.001, present=True)
+
+
+def recommended(*points: Point) -> Curve:
+    return recommend(replace(CURVE, points=points), 0.01, 0.07)
+
+
+def test_the_cheapest_setting_within_the_limit_is_recommended() -> None:
+    found = recommended(COARSE, MIDDLE, FINE)
+    assert choices_of([found]) == (("made", "middle"),)
+    assert found.sentences[0] == (
+        "middle is enough: 2.1 s time in place of 5 s with fine, 58 % less. Its error is 0.4 % of "
+        "the scene's largest torque against the truth; the limit of one knob is 1 %, its part of "
+        "the tolerance of 7 %."
+    )
+
+
+def test_the_present_setting_stays_where_costs_cannot_be_told_apart() -> None:
+    close = replace(FINE, costs={"time": spread(2.1, 2.3)})
+    assert choices_of([recommended(COARSE, MIDDLE, close)]) == (("made", "fine"),)
+
+
+def test_the_present_setting_stays_where_what_is_cheaper_is_too_far_off() -> None:
+    found = recommended(COARSE, FINE)
+    assert choices_of([found]) == (("made", "fine"),)
+    assert "fine stays: coarse would save 80 % time, but its error is 20 %." in found.sentences[0]
+
+
+def test_a_setting_whose_fit_fails_a_check_of_its_own_is_not_recommended() -> None:
+    failing = replace(MIDDLE, rejected=("k-hat",))
+    assert choices_of([recommended(COARSE, failing, FINE)]) == (("made", "fine"),)
+    cheapest = recommended(failing, FINE).sentences[0]
+    assert "middle would save 58 % time, but it fails the check k-hat." in cheapest
+    both = replace(FINE, rejected=("k-hat",))
+    assert choices_of([recommended(COARSE, failing, both)]) == (("made", "middle"),)
+
+
+def test_a_setting_with_a_guarded_error_beyond_the_present_one_is_not_recommended() -> None:
+    def guarded(one: Point, value: float) -> Point:
+        return replace(one, errors={**one.errors, "needed": Error(value, "", guarded=True)})
+
+    allowed = recommended(guarded(MIDDLE, 0.9), guarded(FINE, 0.1))
+    assert choices_of([allowed]) == (("made", "middle"),)
+    worse = recommended(guarded(MIDDLE, 4.0), guarded(FINE, 2.0))
+    assert choices_of([worse]) == (("made", "fine"),)
+    assert "but its needed is 4 in place of 2." in worse.sentences[0]
+
+
+def test_nothing_is_recommended_beyond_the_limit_or_without_a_share() -> None:
+    found = recommended(COARSE)
+    assert choices_of([found]) == ()
+    assert found.sentences[0].startswith("No measured setting keeps the error within 1 %")
+    lengths = [replace(one, errors={"error": Error(1.0, "um")}) for one in (COARSE, MIDDLE, FINE)]
+    found = recommended(*lengths)
+    assert choices_of([found]) == ()
+    assert "no share of the torque" in found.sentences[0]
+
+
+def test_a_failed_setting_is_named_with_its_reason() -> None:
+    broken = Point(Setting("broken", 0.0), {}, {}, failed="It broke.")
+    assert "broken gave no result: It broke." in recommended(broken, MIDDLE, FINE).sentences
+
+
+def test_all_settings_at_once_are_told_with_their_measured_costs() -> None:
+    both = replace(CURVE, points=(FINE, MIDDLE))
+    assert together_sentence(both) == (
+        "All recommended settings at once, measured: time 2.1 s in place of 5 s; error 0.4 % of "
+        "the scene's largest torque in place of 0.1 %."
+    )
+    assert "not measured within the budget" in together_sentence(replace(CURVE, points=(FINE,)))
+
+
+def test_a_spread_has_median_ends_and_multiples_of_the_baseline() -> None:
+    found = Spread.of([Quantity(v, "ms") for v in (3.0, 1.0, 2.0)], baseline_s=0.001)
+    assert (found.median, found.low, found.high, found.ratio) == (2.0, 1.0, 3.0, 2.0)
+    assert Spread.of([Quantity(5.0, "B")], baseline_s=0.001).ratio is None

@@ -1,0 +1,191 @@
+"""`bench trade` in a workspace: measurements kept, runs that go on, files and refusals."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from scissorcal.bench.trade import knob as knobs
+from scissorcal.bench.trade import study
+from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.library import schemas_dir
+from scissorcal.workday.runs import bench
+from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace
+from scissorcal.workday.workspace import Workspace
+from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, made_case
+from tests.workday.made import quick_workspace
+
+ALL = 2 * (len(ERRORS) + 1)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """A workspace whose case is made up and whose only knob is `Steps`."""
+    monkeypatch.setattr(knobs, "KNOBS", {"steps": MADE["steps"]})
+    monkeypatch.setattr(bench, "load_case", lambda engine, seed: made_case())
+    monkeypatch.setattr(bench, "inputs_hash", lambda engine, case: "these inputs")
+    monkeypatch.setattr(study, "baseline_s", lambda: 0.02)
+    return quick_workspace(tmp_path / "paper")
+
+
+def run(workspace: Workspace, **settings: object) -> TradeOutcome:
+    return trade_workspace(workspace, TradeSettings(**settings), workers=1)  # type: ignore[arg-type]
+
+
+def test_a_run_writes_a_page_and_a_twin_that_keeps_its_schema(workspace: Workspace) -> None:
+    found = run(workspace)
+    assert (found.trade.measured, found.trade.measured_now) == (ALL, ALL)
+    page = found.html.read_text(encoding="utf-8")
+    assert "<script src" not in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    for words in ("Steps", "coarse", "No step is that fine.", "Pareto front", "middle is enough"):
+        assert words in page
+    twin = json.loads(found.json.read_text(encoding="utf-8"))
+    schema = json.loads((schemas_dir() / "trade.schema.json").read_text(encoding="utf-8"))
+    jsonschema.validate(twin, schema)
+    assert read_trade(found.json) == found.trade
+
+
+def test_a_second_run_measures_nothing_again(workspace: Workspace) -> None:
+    first = run(workspace)
+    again = run(workspace)
+    assert (again.trade.measured, again.trade.measured_now) == (ALL, 0)
+    assert again.trade.curves == first.trade.curves
+    assert run(workspace, force=True).trade.measured_now == ALL
+
+
+def test_an_interrupted_run_goes_on_where_it_was(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = run(workspace).trade
+    path = workspace.trade_partial_path
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    path.write_text("".join(lines[:4]) + lines[4][:30], encoding="utf-8")
+    found = run(workspace)
+    assert (found.trade.measured, found.trade.measured_now) == (ALL, ALL - 3)
+    assert found.notes == ()
+    labels = [[point.setting.label for point in one.points] for one in found.trade.curves]
+    assert labels == [[point.setting.label for point in one.points] for one in whole.curves]
+
+
+def test_measurements_of_other_inputs_are_put_aside(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(workspace)
+    monkeypatch.setattr(bench, "inputs_hash", lambda engine, case: "other inputs")
+    found = run(workspace)
+    assert found.trade.measured_now == ALL
+    assert "made from other inputs" in found.notes[0]
+
+
+def test_measurements_of_another_version_are_put_aside(workspace: Workspace) -> None:
+    workspace.trade_partial_path.parent.mkdir()
+    old = '{"format": "scissorcal-records/0", "inputs": "these inputs"}\n'
+    workspace.trade_partial_path.write_text(old, encoding="utf-8")
+    found = run(workspace)
+    assert found.trade.measured_now == ALL
+    assert "kept as trade.partial.jsonl.unreadab" in found.notes[0]
+
+
+def test_a_budget_too_small_for_anything_is_refused_with_one_that_is_enough(
+    workspace: Workspace,
+) -> None:
+    with pytest.raises(InputError, match=r"budget of 2 s is too small .* try --budget \"\d+ s\""):
+        run(workspace, budget_s=2.0)
+    assert not workspace.trade_html.exists()
+
+
+def test_a_budget_says_what_was_left_out(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hardly_any(case: Case, names: object) -> tuple[object, ...]:
+        return whole(case, ["steps"])[:2]
+
+    whole = study.tasks_of
+    monkeypatch.setattr(study, "tasks_of", hardly_any)
+    found = run(workspace, budget_s=60.0)
+    assert found.trade.curves[0].unmeasured == ("middle", FAILING)
+    assert found.trade.budget_s == 60.0
+    assert found.trade.seconds < 66.0
+    assert "Not measured within the budget: middle" in found.html.read_text(encoding="utf-8")
+
+
+def test_a_knob_that_a_budget_leaves_out_as_a_whole_is_named(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = {name: MADE[name] for name in ("steps", "slow")}
+    monkeypatch.setattr(knobs, "KNOBS", every)
+    whole = study.tasks_of
+    monkeypatch.setattr(study, "tasks_of", lambda case, names: whole(case, ["steps"]))
+    monkeypatch.setattr(Slow, "title", "Slow steps")
+    monkeypatch.setattr(bench._Run, "together", lambda *_: None)
+    found = run(workspace, budget_s=60.0)
+    assert "Not measured at all within the budget: Slow steps." in found.trade.notes
+    page = found.html.read_text(encoding="utf-8")
+    assert "No setting was measured within the budget." in page
+
+
+def test_time_kept_for_all_settings_at_once_is_used_where_there_is_nothing_to_compare(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(knobs, "KNOBS", {name: MADE[name] for name in ("steps", "broken")})
+    monkeypatch.setattr(study, "PRESENT_ALIKE", ())
+    monkeypatch.setattr(bench._Run, "together", lambda *_: None)
+    kept = []
+    whole = bench._Run.measure
+
+    def noted(self: bench._Run, *arguments: Any, keep_time: bool) -> bool:
+        kept.append(keep_time)
+        return whole(self, *arguments, keep_time=keep_time)
+
+    monkeypatch.setattr(bench._Run, "measure", noted)
+    assert run(workspace, budget_s=600.0).trade.measured == 2 * ALL
+    assert kept == [True, False]
+
+
+def test_an_unknown_knob_is_refused(workspace: Workspace) -> None:
+    with pytest.raises(InputError, match="--knob speed is no knob; choose from steps"):
+        run(workspace, knobs=("speed",))
+
+
+def test_a_knob_that_the_scene_does_not_have_is_refused(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.bench.made_trade import Steps
+
+    monkeypatch.setattr(Steps, "missing", lambda self, case: "Nothing has steps here.")
+    with pytest.raises(InputError, match="does not have it"):
+        run(workspace, knobs=("steps",))
+
+
+def test_a_workspace_without_fits_says_what_comes_first(tmp_path: Path) -> None:
+    with pytest.raises(MissingError, match="There is no fit of friction yet: run 'scissorcal"):
+        trade_workspace(quick_workspace(tmp_path / "paper"), workers=1)
+
+
+def test_results_of_another_version_are_refused(workspace: Workspace) -> None:
+    with pytest.raises(MissingError, match="run 'scissorcal bench trade' first"):
+        read_trade(workspace.trade_json)
+    path = run(workspace).json
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace(FORMAT, "scissorcal-trade/0"), encoding="utf-8")
+    with pytest.raises(InputError, match="is of format scissorcal-trade/0"):
+        read_trade(path)
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(InputError, match="holds no results"):
+        read_trade(path)
+    plain = json.loads(text)
+    del plain["curves"]
+    path.write_text(json.dumps(plain), encoding="utf-8")
+    with pytest.raises(InputError, match="is damaged at curves"):
+        read_trade(path)
+
+
+def test_the_twin_reads_back_as_it_was(workspace: Workspace) -> None:
+    found = run(workspace)
+    found.json.write_text(trade_text(read_trade(found.json)), encoding="utf-8")
+    assert read_trade(found.json) == found.trade

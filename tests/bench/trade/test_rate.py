@@ -1,0 +1,108 @@
+"""Loop rate: strokes, rendered against continuous torque, time of a frame, stability margin."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.bench.trade.frame_time import frame_time_s
+from scissorcal.bench.trade.knobs.rate import IN_HAND, NO_PORT, NO_RIG, Rate
+from scissorcal.bench.trade.models import compiled
+from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
+from scissorcal.bench.trade.stability import known_rig, margin
+from scissorcal.bench.trade.strokes import PEAK_OVER_MEAN, Stroke, hand_strokes
+from scissorcal.bench.trade.torque import AVERAGE, WORST
+from scissorcal.errors import ScissorcalError
+from scissorcal.kernel import estimated_rates
+from tests.bench.trade.cases import case, linear, pressing
+
+
+def test_a_stroke_closes_and_opens_with_the_rate_that_is_its_derivative():
+    stroke = Stroke(0.9, 0.2, 0.5, 0.02)
+    time = np.linspace(0.0, 1.0, 2001)
+    opening, rate = stroke.at(time)
+    assert opening[[0, 1000, -1]] == pytest.approx([0.9, 0.2, 0.9])
+    assert rate == pytest.approx(np.gradient(opening, time), abs=2e-3)
+    assert rate.min() == pytest.approx(-PEAK_OVER_MEAN * 0.7 / 0.5)
+
+
+def test_strokes_cover_openings_and_rates_of_the_scene():
+    one = case()
+    strokes = hand_strokes(one.recipe)
+    assert {(s.wide, s.narrow) for s in strokes} == {one.recipe.scene.opening_rad[::-1]}
+    peaks = [-stroke.at(np.array([0.5 * stroke.half_s]))[1][0] for stroke in strokes]
+    assert peaks == pytest.approx(np.geomspace(0.1, 1.0, 3))
+    contacts = [stroke.contact_m for stroke in hand_strokes(pressing().recipe)]
+    assert contacts == pytest.approx(np.linspace(*pressing().recipe.scene.contact_m, 3))
+
+
+def test_estimated_rates_are_the_servos_low_pass_of_differences():
+    tick_s, cutoff_Hz = 1e-3, 100.0
+    rates = estimated_rates(1e-3 * np.arange(50), tick_us=1000, cutoff_Hz=cutoff_Hz)
+    share = 2.0 * math.pi * cutoff_Hz * tick_s
+    share /= 1.0 + share
+    assert rates == pytest.approx(1.0 - (1.0 - share) ** np.arange(50), abs=2e-4)
+    with pytest.raises(ValueError, match="at least 1 us"):
+        estimated_rates([0.0], tick_us=0, cutoff_Hz=0.0)
+
+
+def test_holding_errs_by_half_a_tick_of_the_torques_slope():
+    """A smooth torque without friction: held over T it is off by T/2 |d(tau)/dt| on average."""
+    one = pressing()
+    tables, limit = compiled(one).tables, one.recipe.limits.torque_Nm
+    strokes = [replace(hand_strokes(one.recipe)[0], half_s=0.4)]
+    continuous = continuous_torques(tables, strokes, limit)
+    slope = np.abs(np.gradient(continuous[0].astype(float), 1.0 / 64_000.0)).mean()
+    for rate_Hz in (125.0, 1000.0, 8000.0):
+        found = rendered_error(
+            tables, strokes, rate_Hz, continuous, limit=limit, cutoff_Hz=100.0, phase=0.0
+        )
+        assert found.moments == pytest.approx(0.5 / rate_Hz * slope, rel=0.05)
+        assert found.average <= found.moments * 1.01
+        assert found.largest == np.abs(continuous[0]).max()
+
+
+def test_the_loops_own_time_is_measured_and_an_early_end_is_an_error():
+    one = case(kappa=0.75)
+    tables, limits = compiled(one).tables, one.recipe.limits
+    stroke = hand_strokes(one.recipe)[1]
+    assert frame_time_s(tables, stroke, 1000.0, limits, frames=50) > 0.0
+    nowhere = replace(stroke, wide=math.nan)
+    with pytest.raises(ScissorcalError, match="4 frames in a row"):
+        frame_time_s(tables, nowhere, 1000.0, limits, frames=50)
+
+
+def test_needed_over_allowed_stiffness_is_proportional_to_the_tick():
+    one = case(kappa=0.75)
+    rig = known_rig(one)
+    assert rig is not None
+    assert rig.encoder_step_rad == pytest.approx(4.8e-5)
+    tables = compiled(one).tables
+    slow, fast = (margin(one, tables, rig, rate) for rate in (500.0, 1000.0))
+    assert slow.in_hand == pytest.approx(2.0 * fast.in_hand)
+    assert slow.alone > slow.in_hand
+    assert known_rig(replace(one, friction_fit=None)) is None
+
+
+def test_the_knob_measures_each_rate_against_the_continuous_torque():
+    one = pressing(opening_rate_rad_per_s=(0.5, 1.0))
+    knob = pickle.loads(pickle.dumps(Rate()))
+    settings = {setting.value: setting for setting in knob.settings(one)}
+    assert [rate for rate, setting in settings.items() if setting.present] == [1000.0]
+    assert knob.applied(one, settings[250.0]).recipe.scene.loop_rate_Hz == 250.0
+    found = {rate: knob.measure(one, settings[rate], 0) for rate in (125.0, 4000.0)}
+    errors = {rate: knob.errors(one, sample, None) for rate, sample in found.items()}
+    assert errors[4000.0][AVERAGE].value < 0.1 * errors[125.0][AVERAGE].value
+    assert errors[125.0][WORST].share > errors[125.0][AVERAGE].share > 0.0
+    assert errors[125.0][IN_HAND].value == pytest.approx(32.0 * errors[4000.0][IN_HAND].value)
+    assert found[125.0].notes == (NO_PORT,)
+    imported = replace(one, friction=(), cut=())
+    assert NO_RIG in knob.measure(imported, settings[125.0], 0).notes
+
+
+def test_nothing_rendered_has_no_rate():
+    assert "linear joint" in Rate().missing(linear())
+    assert "no fit of the material" in Rate().missing(replace(case(), cut_fit=None))
+    assert "no fit of friction" in Rate().missing(replace(case(), friction_fit=None))

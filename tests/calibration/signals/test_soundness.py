@@ -1,0 +1,54 @@
+"""Values that are no measurement, and copies of strokes, are refused by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.signals.soundness import refuse_unsound
+from scissorcal.errors import InputError
+from tests.calibration.truth import Truth, friction_recording
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return friction_recording(Truth(), np.random.default_rng(1))
+
+
+def test_a_sound_recording_passes(recording):
+    refuse_unsound((recording, friction_recording(Truth(), np.random.default_rng(2))))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("channel", ["opening", "motor_torque", "handle_force", "advance"])
+def test_what_is_no_measurement_is_named(recording, channel, value):
+    samples = recording.samples.copy()
+    samples[channel][[700, 900]] = value
+    with pytest.raises(InputError, match=rf"sample 700: {channel} is .*2 such samples"):
+        refuse_unsound((replace(recording, samples=samples),))
+
+
+def test_an_empty_recording_is_named(recording):
+    with pytest.raises(InputError, match="holds 0 samples"):
+        refuse_unsound((replace(recording, samples=recording.samples[:0]),))
+
+
+def test_a_recording_twice_is_a_copy(recording):
+    with pytest.raises(InputError, match=r"stroke 0 of friction\.mcap is a copy of stroke 0"):
+        refuse_unsound((recording, recording))
+
+
+def test_a_stroke_twice_is_a_copy(recording):
+    samples = recording.samples
+    first = samples[samples["stroke"] == 3].copy()
+    first["stroke"] = len(recording.strokes)
+    twice = replace(recording, samples=np.concatenate([samples, first]))
+    with pytest.raises(InputError, match=rf"stroke {len(recording.strokes)} .* copy of stroke 3"):
+        refuse_unsound((twice,))
+
+
+def test_coarse_or_still_strokes_may_repeat(recording):
+    samples = recording.samples.copy()
+    samples["motor_torque"] = np.round(samples["motor_torque"], 2)
+    coarse = replace(recording, samples=samples)
+    refuse_unsound((coarse, coarse))
