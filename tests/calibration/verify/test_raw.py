@@ -10,6 +10,7 @@ from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.result import Calibration
 from scissorcal.calibration.verify.simulation import (
     CutTruth,
     DriveTruth,
@@ -18,13 +19,15 @@ from scissorcal.calibration.verify.simulation import (
     simulate_cut,
 )
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
-from scissorcal.calibration.verify.study import run
+from scissorcal.calibration.verify.study import Study, run
 from scissorcal.model import Cutting, Response
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from tests.second_rig import capture_cut, capture_friction, draw_truth, fine, paper, recipe_for
 
 pytestmark = pytest.mark.slow
+
+FITS = 30
 
 
 @dataclass(frozen=True)
@@ -97,33 +100,37 @@ def test_another_materials_parameters_and_teeth_are_recovered(day: Day, load_sha
 
 
 def test_the_fit_of_friction_is_calibrated_on_raw_samples(day: Day) -> None:
-    """30 whole fits, 1 % of false alarms, and no parameter's intervals too narrow by a half."""
     settings = day.recipe.fit.friction
     design = friction_experiment((day.empty,), settings, day.friction)
     simulator = friction_simulator((day.empty,), settings, day.friction, design.layout)
     study = make_study(design, day.friction, simulator, seed=1)
-    records = [run(study, task) for task in tasks_of(study, ("sbc",), 30)]
-    result = assess(study, day.friction, ("sbc",), records)
-    assert result.calibration is not None
-    assert not result.calibration.broken
-    assert result.calibration.other_law < 0.2
-    assert max(quantity.width for quantity in result.calibration.quantities) < 1.5
-    assert {v.status for v in result.verdicts} == {"pass"}
+    assert calibrated(study, day.friction).other_law < 0.2
 
 
 def test_the_fit_of_a_cut_is_calibrated_on_raw_samples(day: Day) -> None:
-    """20 whole fits: 90 % intervals hold 16 of 20 at least in all but 4 % of the cases each."""
+    """About half of the fits are averages over laws with and without load-dependent friction."""
     rng = np.random.default_rng(6)
     fit = fit_cut((day.cuts,), day.recipe, day.friction, effort="standard", rng=rng)
     design = cut_experiment((day.cuts,), day.recipe, day.friction, fit)
     simulator = cut_simulator((day.cuts,), day.recipe, day.friction, fit, design.layout)
-    study = make_study(design, fit, simulator, seed=1)
-    records = [run(study, task) for task in tasks_of(study, ("sbc",), 20)]
+    quantities = calibrated(make_study(design, fit, simulator, seed=1), fit).quantities
+    names = [quantity.name for quantity in quantities[:4]]
+    assert names == ["response_force", "response_exponent", "fracture_energy", "kappa"]
+    assert [len(quantity.ranks) for quantity in quantities[:4]] == [FITS] * 4
+
+
+def calibrated(study: Study, fit: FitResult) -> Calibration:
+    """The calibration by 30 whole fits, which must pass; 2 % of false alarms over all quantities.
+
+    Intervals that are too narrow by a half are found with 95 %. The predicted effort is ranked only
+    where a fit chose the study's own law, so its limits of coverage are wider.
+    """
+    records = [run(study, task) for task in tasks_of(study, ("sbc",), FITS)]
     result = assess(study, fit, ("sbc",), records)
+    assert {verdict.status for verdict in result.verdicts} == {"pass"}
     assert result.calibration is not None
     assert not result.calibration.broken
-    names = [quantity.name for quantity in result.calibration.quantities]
-    assert names[:4] == ["response_force", "response_exponent", "fracture_energy", "kappa"]
     for quantity in result.calibration.quantities:
-        assert quantity.coverage[1].share >= 0.8, quantity.name
-        assert quantity.width < 1.6, quantity.name
+        assert all(one.low <= one.share for one in quantity.coverage), quantity.name
+        assert quantity.width < 1.5, quantity.name
+    return result.calibration
