@@ -55,6 +55,7 @@ from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.device import capture as rig_capture
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.probe.probe import probe
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
 from scissorcal.device.trajectory import friction_plan
@@ -91,7 +92,7 @@ class Day(Protocol):
 
 
 class FirstRig:
-    """The simulator of the product, by its own link, specimen drawn by a seed."""
+    """The simulator of the product, by its own link and probed, specimen drawn by a seed."""
 
     def __init__(self, name: str, seed: int) -> None:
         self.name = name
@@ -99,6 +100,7 @@ class FirstRig:
         rng = np.random.default_rng(seed)
         specimen = varied(load_specimen(self.recipe.specimen or ""), rng)
         self._link = LockstepLink(specimen, rng.spawn(1)[0])
+        self._probe = probe(self._link, self.recipe)
         self.identity = self._link.identity
 
     def capture(self, kind: Kind, recipe: Recipe) -> Recording:
@@ -108,9 +110,9 @@ class FirstRig:
             path = Path(folder) / f"{kind}.mcap"
             with rig_capture.open_writer(path, kind, self._link, recipe, text) as writer:
                 if kind == "friction":
-                    rig_capture.capture_friction(self._link, recipe, writer)
+                    rig_capture.capture_friction(self._link, recipe, writer, probe=self._probe)
                 else:
-                    rig_capture.capture_cut(self._link, recipe, writer)
+                    rig_capture.capture_cut(self._link, recipe, writer, probe=self._probe)
             return read_recording(path)
 
 

@@ -2,7 +2,8 @@
 
     python benchmarks/until.py --first 9450 --count 20 [--effort standard] [--json rows.json]
 
-Each day has another specimen, drawn around the recipe's own as in `benchmarks/design.py`. Friction
+Each day has another specimen, drawn around the recipe's own as in `benchmarks/design.py`, on a rig
+that was probed. Friction
 and cut are captured until the tolerance, with the recipe's minutes as their limit. Then both are
 fitted by themselves, and the fits are compared with the specimen's truth:
 
@@ -35,6 +36,8 @@ from scissorcal.device.capture import open_writer
 from scissorcal.device.capture_by_parts import capture_by_parts
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.probe.probe import probe
+from scissorcal.device.probe.result import ProbeResult
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque, true_parameters, varied
 from scissorcal.device.trajectory import friction_plan
@@ -101,13 +104,14 @@ def captured(seed: int, effort: Effort) -> Day:
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen(recipe.specimen or ""), rng)
     link = LockstepLink(specimen, rng.spawn(1)[0])
+    found = probe(link, recipe)
     plans = friction_plan(recipe, link.identity), cut_plan(recipe, link.identity)
     listed = (seconds_at_rig(recipe, plans[0]) / 60.0, seconds_at_rig(recipe, plans[1]) / 60.0)
     spent: list[float] = []
-    swept, first = _capture(link, recipe, "friction", Earlier(), listed[0], spent)
+    swept, first = _capture(link, found, recipe, "friction", Earlier(), listed[0], spent)
     friction = fit_friction((swept,), recipe.fit.friction, effort=effort, rng=rng)
     earlier = Earlier(friction_recordings=(swept,), friction=friction)
-    strokes, second = _capture(link, recipe, "cut", earlier, listed[1], spent)
+    strokes, second = _capture(link, found, recipe, "cut", earlier, listed[1], spent)
     median_s = float(np.median(spent))
     return Day(seed, name, specimen, listed, swept, strokes, friction, (first, second), median_s)
 
@@ -144,6 +148,7 @@ def judged(day: Day, effort: Effort) -> Row:
 
 def _capture(
     link: LockstepLink,
+    probed: ProbeResult,
     recipe: Recipe,
     kind: CaptureKind,
     earlier: Earlier,
@@ -163,7 +168,10 @@ def _capture(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{kind}.mcap"
         with open_writer(path, kind, link, recipe, text, by_parts=True) as writer:
-            capture_by_parts(link, choice.recipe, kind, writer, timed, longest_s=60.0 * minutes)
+            longest_s = 60.0 * minutes
+            capture_by_parts(
+                link, choice.recipe, kind, writer, timed, longest_s=longest_s, probe=probed
+            )
         return read_recording(path), choice.marks[-1]
 
 

@@ -18,7 +18,7 @@ K_HAT_LIMIT = 0.7
 ADAPTED_LIMIT = 0.5
 """The same for a proposal that was adapted to draws: such a one has seen no region that it lacks,
 and k-hat cannot tell of what was never visited. With 0.7 a bent valley passed with a standard
-deviation 8 to 20 % too small; with 0.5, and components made wider, within 3 %."""
+deviation 8 to 20 % too small."""
 
 GOOD_K = 0.5
 """k-hat above which a better proposal is sought: from there on weights have no variance."""
@@ -29,7 +29,9 @@ tail may look short: with a proposal 1,000 standard deviations off, 5 of 2,000 d
 weight and k-hat was -0.2. Fifty draws give a standard deviation to 10 %."""
 
 GOOD_MIXTURE_K = 0.3
-"""k-hat at which a mixture is not improved further."""
+"""k-hat at which a mixture is not improved further, and above which ensembles take its place. Along
+the ridge below, 12 of 66 mixtures with a k-hat up to 0.5 had a quantile off by more than 0.3 sds,
+and 1 of 30 with one up to 0.3 (200 seeds)."""
 
 COLLAPSED = 1e-2
 """Width of the weighted draws, in that of the first proposal, below which an adapted one counts as
@@ -118,7 +120,7 @@ def sample_by_importance(
     def refit(sampled: Sampled) -> Mixture:
         return fit_mixture(sampled.draws, sampled.weights, components, rng)
 
-    adapted = _adapted(log_posteriors, first, refit, count, rng, rounds - 1, GOOD_K)
+    adapted = _adapted(log_posteriors, first, refit, count, rng, rounds - 1, ADAPTED_LIMIT)
     if first.trusted and not adapted.trusted:
         return replace(first, evaluations=adapted.evaluations)
     return adapted
@@ -167,7 +169,8 @@ def _adapted(
     proposals (Cornuet et al. 2012, doi:10.1111/j.1467-9469.2011.00756.x).
     The lowest of several k-hats is too low by its very choice, and a proposal that was fitted to
     draws looks better on them than it is; so what was adapted is drawn from afresh, twice as often,
-    and with ``beyond`` half of these draws come from farther out than it reaches.
+    and with ``beyond`` half of these draws come from farther out than it reaches. A k-hat up to
+    ``good`` ends the search, and counts as trusted.
     """
     sampled, lowest, used = first, np.inf, first.evaluations
     chosen = refit(first)
@@ -184,7 +187,7 @@ def _adapted(
     judging = chosen.joined(wide_mixture(chosen, LOOKED_BEYOND), 0.5) if beyond else chosen
     fresh = _once(log_posteriors, judging, 2 * count, rng)
     for _ in range(MORE_BATCHES if beyond else 0):
-        if fresh.k_hat > ADAPTED_LIMIT or fresh.effective >= ENOUGH * count:
+        if fresh.k_hat > good or fresh.effective >= ENOUGH * count:
             break
         more = _once(log_posteriors, judging, 2 * count, rng)
         fresh = _weigh(
@@ -194,7 +197,7 @@ def _adapted(
         )
     if first.proposal is not None and _width(fresh, first.proposal) < COLLAPSED:
         fresh = replace(fresh, k_hat=np.inf)
-    return replace(fresh, evaluations=used + len(fresh.draws), limit=ADAPTED_LIMIT)
+    return replace(fresh, evaluations=used + len(fresh.draws), limit=good)
 
 
 def _width(sampled: Sampled, proposal: Mixture) -> float:

@@ -79,7 +79,7 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
 
     With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`mean_share`.
     Solved along the edge by Newton steps on y(s) = y_top - delta_c(psi(s)), one step for a
-    straight edge; along a bent one where they do not end, by halving the first interval in which
+    straight edge, from where it meets the plate so that no longer length is rounded; along a bent one where they do not end, by halving the first interval in which
     the release falls to that energy, from the pivot outwards. Where the edges are parallel or open
     towards the tip (tan(psi) <= 0) no force along the cut arises, the crack cannot advance, and the
     result is -inf.
@@ -97,6 +97,10 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
     far = FARTHEST * edge.length_m
     moved, still = np.full(shape, np.inf), np.zeros(shape, dtype=bool)
     with np.errstate(all="ignore"):
+        if edge.straight:
+            rise = sine + edge.slope_at(0.0) * cosine
+            meets = (cutting.upper_face_m - edge.offset_at(0.0) * cosine) / rise
+            station = np.where(np.isfinite(meets), np.clip(meets, -far, far), station)
         for _ in range(1 if edge.straight else SETTLING_STEPS):
             gap, rise = _gap(cutting, station, sine, cosine)
             cuts = np.isfinite(gap)

@@ -18,9 +18,6 @@ HALVINGS = 64
 CLOSE = 1e-9
 """Share of the place within which Newton's last step must stay."""
 
-STEEPNESS_PLACES = 8
-"""Places in each interval of a spline at which its steepest slope is looked for."""
-
 
 @dataclass(frozen=True)
 class Edge:
@@ -70,15 +67,13 @@ class Edge:
     @cached_property
     def steepest(self) -> Array:
         """Largest slope e'(s) on the blade, from the pivot to the tip; shape of the parameters."""
-        places: list[float | Array] = [0.0, self.length_m]
+        ends = np.array([0.0, self.length_m])
         if self.family == "spline":
-            pieces = STEEPNESS_PLACES * (np.shape(self.spline_m)[-1] - FEWEST + 1)
-            places += np.linspace(0.0, self.length_m, pieces + 1).tolist()
-        elif np.any(self.bend_per_m2):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                turn = np.nan_to_num(-np.asarray(self.curvature_per_m) / self.bend_per_m2)
-            places.append(np.clip(turn, 0.0, self.length_m))
-        return np.asarray(np.max(np.stack([self.slope_at(s) for s in places]), axis=0))
+            pieces = np.shape(self.spline_m)[-1] - FEWEST + 1
+            knots = np.linspace(self.spline_start_m, self.length_m, pieces + 1)
+            ends = np.unique(np.clip(np.append(knots, 0.0), 0.0, self.length_m))
+        slopes = np.stack([self.slope_at(s) for s in _with_middles(ends)])
+        return _largest_of_parabolas(slopes[:-1:2], slopes[1::2], slopes[2::2])
 
     def offset_at(self, station: ArrayLike) -> Array:
         """Offset e(s) in metres; ``station`` broadcasts with the parameters."""
@@ -214,6 +209,23 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
         height = station * sine + offset * cosine
         slope = np.where(stands, (sine + taper * cosine) / run, np.nan)
         return EdgeView(height, slope, station, x + height * slope)
+
+
+def _with_middles(ends: Array) -> Array:
+    """Ends of pieces, with the middle of each piece between them."""
+    return np.insert(ends, np.arange(1, len(ends)), 0.5 * (ends[:-1] + ends[1:]))
+
+
+def _largest_of_parabolas(first: Array, middle: Array, last: Array) -> Array:
+    """Largest value of parabolas over pieces, by their values at both ends and in the middle.
+
+    All are (pieces, ...); the result has the other axes. A slope is one parabola on each piece.
+    """
+    bend = 2.0 * (first + last - 2.0 * middle)
+    with np.errstate(all="ignore"):
+        top = 0.5 * (1.0 - (last - first) / bend)
+        inner = np.where((bend < 0.0) & (top > 0.0) & (top < 1.0), first - bend * top**2, first)
+    return np.asarray(np.max(np.maximum(np.maximum(first, last), inner), axis=0))
 
 
 def _station_over(edge: Edge, x: Array, sine: Array, cosine: Array) -> Array:

@@ -24,6 +24,7 @@ from scissorcal.report.panel import (
 if TYPE_CHECKING:
     from scissorcal.bench.extremes.cells import Outcome
     from scissorcal.bench.extremes.result import ErrorMap, Extremes, Refusal, Sweep, Total
+    from scissorcal.bench.extremes.states import State
 
 PART = "extremes"
 TITLES = {
@@ -174,13 +175,21 @@ def _wrong(result: Extremes) -> Panel:
     rows = [
         Row(
             f"{place + 1}, {one.subject}",
-            tuple(number(_words(name), value, digits=3) for name, value in one.values.items()),
-            note=one.sentence,
+            tuple(number(_words(name), value, digits=3) for name, value in one.state.values.items()),
+            note=f"{one.sentence} ({_choices(one.state)})",
             marked=True,
         )
         for place, one in enumerate(result.wrong)
     ]
     return Panel("wrong", PART, "Wrong", "Numbers that are neither right nor refused.", tuple(rows))
+
+
+def _choices(state: State) -> str:
+    """What a state has besides its numbers."""
+    blades = "both blades move" if state.moving == 2 else "one blade moves"
+    cut = "cut" if state.cut else "pressed"
+    contact = "contact by indentation" if state.by_depth else "contact as given"
+    return f"{state.family} response, {state.closure} closure, {blades}, {cut}, {contact}"
 
 
 def _cells(result: Extremes) -> Panel:

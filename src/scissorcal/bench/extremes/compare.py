@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -37,14 +38,15 @@ SHORTEST_RIPPLE_m = 1e-7
 
 PLACE_ROUNDINGS = (0.0, 1.0, 4.0, 16.0)
 VALUE_ROUNDINGS = 16.0
-"""Stated error. The number is right for a plate that stands up to this many roundings of the
-lengths that are added elsewhere, blades turned by as many roundings of a radian, or a fracture
+"""Stated error. The number is right for a plate or a crack that stands up to this many roundings of
+the lengths that are added elsewhere, blades turned by as many roundings of a radian, or a fracture
 energy changed by as many; times 1 +- 16 roundings. The displacements are tried from the
 least on."""
 
 RIPPLE_BLUR = 16.0
-"""A step whose teeth add up, by this many displacements and one more for each tooth, to a length of
-a tooth has no phase: any torque of its cycle is right."""
+"""The place of a crack after several teeth in one step is known to this many displacements and one
+more for each tooth. Every torque is right that the crack has within that; any of the tooth's cycle,
+where it is as long as a tooth or the crack stands so close to the tooth's end."""
 
 LARGEST_FLOAT32 = 3.4e38
 LARGEST_N = 1e30
@@ -133,13 +135,15 @@ def compare_kernel(state: State) -> tuple[Compared, Compared]:
 
 def _model_answer(law: Blade, turned: Turned, spot: Spot, rate: Any, least: Any) -> dict[str, Any]:
     rests, before_tip, rises = spot, spot.station < law.tip, False
-    if law.toughness > 0 and turned.released(spot) > mean_target(turned, spot):
+    if before_tip and law.toughness > 0 and turned.released(spot) > mean_target(turned, spot):
         rests, before_tip, rises = turned.rests(spot, mean_target)
     torque = turned.torque(rests, rate) if before_tip else mp.mpf(0)
     answer = {"stands": 1.0, "least": least, "torque": torque, "rises": float(rises)}
     if before_tip:
         answer |= {"crack": rests.x, "energy": rests.stored}
-    return answer | _sizes(law, rests, rate)
+    answer |= _sizes(law, rests, rate)
+    blur = answer["reach"] * answer["steep"]
+    return answer | {"blurred": partial(_blurred, turned, rate, rests.x, before_tip, (), blur)}
 
 
 def _sizes(law: Blade, spot: Spot, rate: Any) -> dict[str, Any]:
@@ -197,12 +201,29 @@ def _kernel_answer(law: Blade, turned: Turned, spot: Spot, rate: Any, least: Any
         "crack": rests.x, "energy": on * rests.stored, "fracture": fracture, "arrest": arrest,
     }  # fmt: skip
     answer |= _sizes(law, rests, rate)
+    blur = answer["reach"] * answer["steep"]
     if envelope:
-        answer["envelope"] = tuple(turned.torque(one, rate) for one in envelope)
-        answer["ripple"] = envelope[1].x - envelope[0].x
-        teeth = abs(rests.x - spot.x) / answer["ripple"]
-        answer["blur"] = (RIPPLE_BLUR + teeth) * (answer["reach"] * answer["steep"] + abs(spot.x))
+        teeth = abs(rests.x - spot.x) / (envelope[1].x - envelope[0].x)
+        blur = (RIPPLE_BLUR + teeth) * (blur + abs(spot.x))
+    answer["blurred"] = partial(_blurred, turned, rate, rests.x, before_tip, envelope, blur)
     return answer
+
+
+def _blurred(
+    turned: Turned,
+    rate: Any,
+    place: Any,
+    before_tip: bool,
+    tooth: tuple[Spot, ...],
+    blur: Any,
+    eps: float,
+) -> list[Any]:
+    """Torques of cracks that stand by ``eps`` times ``blur`` (m) elsewhere, in their tooth."""
+    away = eps * blur
+    if tooth and min(place - tooth[0].x, tooth[1].x - place) <= away:
+        return [turned.torque(one, rate) for one in tooth]
+    near = (turned.over(place + way * away)[0] for way in (-1, 1)) if before_tip else ()
+    return [turned.torque(one, rate) for one in near if one is not None]
 
 
 def _judged(
@@ -269,9 +290,8 @@ def _explained(
             except OverflowedError:
                 return True
     torques = [v["torque"] for v in values if v["stands"]]
-    ripple = truth.get("ripple")
-    if ripple is not None and ripple < roundings * eps * truth["blur"]:
-        torques += list(truth["envelope"])
+    if roundings:
+        torques += truth["blurred"](roundings * eps)
     slack = VALUE_ROUNDINGS * eps * float(max(v["scale"] for v in values if v["stands"]))
     low, high = float(min(torques)), float(max(torques))
     slack += float(truth["stiffness"] * truth["reach"] * truth["steep"]) * roundings * eps

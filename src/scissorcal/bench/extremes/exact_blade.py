@@ -130,14 +130,19 @@ class Turned:
         return None, -1.0
 
     def _before_upright(
-        self, contact: Number, low: float, high: float, outwards: bool
+        self, contact: Number, low: float, high: float, outwards: bool, closer: int = 4
     ) -> tuple[Spot | None, float]:
-        """As `over`, within the piece in which the edge comes to stand upright."""
+        """As `over`, within the piece in which the edge comes to stand upright.
+
+        The part in which it does is looked at ``closer`` and closer.
+        """
         step = (high - low) / 256
         for k in range(256):
             near, far = low + k * step, low + (k + 1) * step
             if self.scout.least_run(*sorted((near, far))) <= 0.0:
-                return None, -1.0
+                if not closer:
+                    return None, -1.0
+                return self._before_upright(contact, near, far, outwards, closer - 1)
             x = self.scout.x_at(far)
             if x >= float(contact) if outwards else x <= float(contact):
                 place = root(lambda s: self.x_at(s) - contact, mp.mpf(near), mp.mpf(far))

@@ -13,8 +13,9 @@ import numpy as np
 from scissorcal.bench.extremes.cells import Cell, Outcome, Part
 from scissorcal.bench.extremes.compare import Compared, Subject
 from scissorcal.bench.extremes.quantities import QUANTITIES, Quantity
+from scissorcal.bench.extremes.states import State
 from scissorcal.bench.extremes.study import PAIRS, Done, Tried, unit_of
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 ExtremesFormat = Literal["scissorcal-extremes/1"]
 FORMAT: ExtremesFormat = "scissorcal-extremes/1"
@@ -115,7 +116,7 @@ class Wrong:
 
     subject: Subject
     sentence: str
-    values: Mapping[str, float]
+    state: State
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,9 @@ class Extremes:
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """One verdict: nothing is wrong."""
+        if not self.states:
+            why = "No state was tried within the budget: allow more with --budget."
+            return (not_evaluated("bench", "wrong", why, 0.0),)
         count = sum(total.outcomes["wrong"] for total in self.totals)
         count += sum(cell.outcome == "wrong" for cell in self.cells)
         remedy = f"{self.sentence} Each is listed in the page: report them."
@@ -328,7 +332,7 @@ def _without_numbers(sentence: str) -> str:
 
 def _wrong(tried: Sequence[Tried]) -> tuple[Wrong, ...]:
     found = [
-        Wrong(one.subject, one.sentence, {**tried_one.state.values})
+        Wrong(one.subject, one.sentence, tried_one.state)
         for tried_one in tried
         for one in tried_one.compared
         if one.outcome == "wrong"

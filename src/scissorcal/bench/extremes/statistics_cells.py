@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 Check = Callable[[np.random.Generator], tuple[bool, str]]
 """Whether what was stated holds, and what was found."""
 
+PLAYS, MOST_LOW = 200, 0.06
+WHITE = "p above 0.01 for 94 % of 200 series of independent residuals"
+"""False alarms: 2e-7 where p is uniform, 2e-3 where 2.5 % of it are below 0.01."""
+
 
 def cells() -> tuple[Cell, ...]:
     """The cells of single statistics."""
@@ -39,17 +43,17 @@ def cells() -> tuple[Cell, ...]:
          lambda rng: _is(rank_r_hat(np.arange(4.0)[:, None] * np.ones((4, 100))), np.inf)),
         ("R-hat of 3 draws", "3 draws a chain", "NaN: nothing is known",
          lambda rng: _is(rank_r_hat(rng.standard_normal((4, 3))), np.nan)),
-        ("whiteness of 3 residuals", "3 residuals, 20 lags asked for", "p between 0.001 and 1",
-         lambda rng: _p(rng.standard_normal(3))),
-        ("whiteness of 20 residuals", "as many residuals as lags", "p between 0.001 and 1",
-         lambda rng: _p(rng.standard_normal(20))),
-        ("whiteness of no residuals", "0 residuals", "p of 1", lambda rng: _p(np.zeros(0))),
+        ("whiteness of 3 residuals", "3 residuals, 20 lags asked for", WHITE,
+         lambda rng: _p(rng.standard_normal((PLAYS, 3)))),
+        ("whiteness of 20 residuals", "as many residuals as lags", WHITE,
+         lambda rng: _p(rng.standard_normal((PLAYS, 20)))),
+        ("whiteness of no residuals", "0 residuals", "p of 1", lambda rng: _p(np.zeros((1, 0)))),
         ("whiteness of constant residuals", "100 residuals of 0.1", "p of 1",
-         lambda rng: _p(np.full(100, 0.1))),
-        ("whiteness of residuals of 1e-200", "squares underflow", "p between 0.001 and 1",
-         lambda rng: _p(1e-200 * rng.standard_normal(500))),
-        ("whiteness of residuals of 1e200", "squares overflow", "p between 0.001 and 1",
-         lambda rng: _p(1e200 * rng.standard_normal(500))),
+         lambda rng: _p(np.full((1, 100), 0.1))),
+        ("whiteness of residuals of 1e-200", "squares underflow", WHITE,
+         lambda rng: _p(1e-200 * rng.standard_normal((PLAYS, 500)))),
+        ("whiteness of residuals of 1e200", "squares overflow", WHITE,
+         lambda rng: _p(1e200 * rng.standard_normal((PLAYS, 500)))),
         ("whiteness of a NaN", "a residual is NaN", "p is NaN, which fails verdicts",
          lambda rng: _is(ljung_box(np.append(np.zeros(50), np.nan), np.zeros(51, int)).share,
                          np.nan)),
@@ -113,9 +117,13 @@ def _between(value: float, low: float, high: float) -> tuple[bool, str]:
     return low <= value <= high, f"found {value:.3g}"
 
 
-def _p(residuals: Array) -> tuple[bool, str]:
-    found = ljung_box(residuals, np.zeros(len(residuals), dtype=np.int64))
-    return 0.001 < found.p_value <= 1.0 and found.share > 0.1, f"p {found.p_value:.3g}"
+def _p(every: Array) -> tuple[bool, str]:
+    """Each row of residuals is independent, and most should count as that."""
+    found = [ljung_box(row, np.zeros(len(row), dtype=np.int64)) for row in every]
+    low = sum(not 0.01 < one.p_value <= 1.0 for one in found)
+    most = float(np.median([one.share for one in found]))
+    holds = low <= MOST_LOW * len(found) and most > 0.5
+    return holds, f"{low} of {len(found)} p up to 0.01"
 
 
 def _sd(residuals: Array, true: float) -> tuple[bool, str]:

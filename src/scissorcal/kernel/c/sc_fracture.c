@@ -10,6 +10,9 @@ static const float RESOLUTION = 1e-7f;  /* of a station: about the resolution of
  * of less than its square, 1e-6. */
 static const float SMALL_CHANGE = 1e-3f;
 
+/* Share of the lengths that a gap is the difference of, up to which it is their rounding. */
+static const float ROUNDED = 1e-6f;
+
 /* Up to this share of the station, a step that is left is made along the tangent of the edge. */
 static const float SHORT_STEP = 1e-4f;
 
@@ -112,6 +115,13 @@ static float farthest(const sc_model *model, sc_turn turn)
     return leaves < model->tip_station ? leaves : model->tip_station;
 }
 
+/* Whether the station is as fine as it gets and yet leaves a gap: along edges that are all but
+ * parallel, where a rounding of the station changes what the edge would bear. */
+static int is_coarse(const sc_model *model, const bearing *at, const sc_edge_point *point)
+{
+    return fabsf(at->gap) > ROUNDED * (fabsf(model->upper_face) + fabsf(point->y));
+}
+
 /* The crack rests where the gap is closed. */
 static int rest(const sc_model *model, const bearing *at, sc_bite *bite)
 {
@@ -146,6 +156,10 @@ static ending close_gap(const sc_model *model, sc_turn turn, float target, float
         bear(model, target, point, stands, &at);
         const float step = at.gap / at.grade;
         if (fabsf(step) <= RESOLUTION * fabsf(point->station)) {
+            if (is_coarse(model, &at, point)) {
+                sc_sit(model, bite); /* the force of its depth */
+                return SC_RESTS;
+            }
             return rest(model, &at, bite);
         }
         if (at.gap > 0.0f) {
