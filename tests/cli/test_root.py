@@ -60,6 +60,16 @@ def test_the_day_is_there() -> None:
     }
 
 
+def test_the_module_runs_the_command_line() -> None:
+    said = subprocess.run(
+        [sys.executable, "-m", "scissorcal", "--version"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert said.stdout == f"scissorcal, version {scissorcal.__version__}\n"
+
+
 @pytest.mark.parametrize("path", COMMANDS)
 def test_help_has_an_example_with_output_and_json(path: str, cli: Cli) -> None:
     said = cli(*path.split(), "--help")

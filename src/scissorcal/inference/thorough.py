@@ -274,6 +274,8 @@ def _advance(
     sampler = emcee.EnsembleSampler(
         walkers, size, many or log_posterior, moves=moves, vectorize=many is not None
     )
+    # emcee's own wrapper prints what passes through it, an interrupt with all coordinates
+    sampler.log_prob_fn = many or log_posterior
     state = emcee.State(walk.coords, log_prob=walk.heights, random_state=walk.random_state)
     try:
         for last in sampler.sample(

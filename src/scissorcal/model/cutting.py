@@ -79,10 +79,10 @@ def settled_contact(cutting: Cutting, opening: ArrayLike) -> Array:
 
     With a ripple (kappa < 1) the energy is the mean over a cycle, see :func:`mean_share`.
     Solved along the edge by Newton steps on y(s) = y_top - delta_c(psi(s)), one step for a
-    straight edge, from where it meets the plate so that no longer length is rounded; along a bent one where they do not end, by halving the first interval in which
-    the release falls to that energy, from the pivot outwards. Where the edges are parallel or open
-    towards the tip (tan(psi) <= 0) no force along the cut arises, the crack cannot advance, and the
-    result is -inf.
+    straight edge, from where it meets the plate so that no longer length is rounded; along a bent
+    one where they do not end, by halving the first interval in which the release falls to that
+    energy, from the pivot outwards. Where the edges are parallel or open towards the tip
+    (tan(psi) <= 0) no force along the cut arises, the crack cannot advance, and the result is -inf.
     """
     if cutting.fracture_energy is None:
         raise ValueError("nothing is cut here: settled_contact needs a fracture energy")

@@ -175,7 +175,9 @@ def _wrong(result: Extremes) -> Panel:
     rows = [
         Row(
             f"{place + 1}, {one.subject}",
-            tuple(number(_words(name), value, digits=3) for name, value in one.state.values.items()),
+            tuple(
+                number(_words(name), value, digits=3) for name, value in one.state.values.items()
+            ),
             note=f"{one.sentence} ({_choices(one.state)})",
             marked=True,
         )

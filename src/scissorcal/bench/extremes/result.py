@@ -161,7 +161,7 @@ class Extremes:
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """One verdict: nothing is wrong."""
-        if not self.states:
+        if not self.states and not self.cells:
             why = "No state was tried within the budget: allow more with --budget."
             return (not_evaluated("bench", "wrong", why, 0.0),)
         count = sum(total.outcomes["wrong"] for total in self.totals)

@@ -74,13 +74,25 @@ def _first(records: Sequence[Record]) -> Record:
 
 
 def _reference(own: dict[str, Setting], made: dict[str, list[Record]]) -> str:
-    """The label of the most accurate setting that was measured; empty where there is none."""
+    """The label of the most accurate setting that was measured; empty where there is none.
+
+    A setting that fails a check which the present one passes is no reference.
+    """
+    good = {label: [r for r in made[label] if "failed" not in r] for label in own}
+    present = next((label for label in own if own[label].present and good[label]), "")
+    passed = _rejected(good[present]) if present else None
     able = [
         setting
         for label, setting in own.items()
-        if setting.accuracy > 0 and any("failed" not in r for r in made[label])
+        if setting.accuracy > 0
+        and good[label]
+        and (passed is None or _rejected(good[label]) <= passed)
     ]
     return max(able, key=lambda one: one.accuracy).label if able else ""
+
+
+def _rejected(records: Sequence[Record]) -> set[str]:
+    return {check for record in records for check in record["rejected"]}
 
 
 def _point(

@@ -40,7 +40,8 @@ class Setting:
     ``method`` are joined by a line. ``value`` is what the knob itself needs to apply it; plain
     values only, which pickle and JSON hold. ``present`` marks what the workspace uses now.
     ``accuracy`` orders settings by how good a reference they are: the errors of a knob are counted
-    against the measured setting of the highest accuracy above 0.
+    against the measured setting of the highest accuracy above 0 that fails no check which the
+    present one passes.
     """
 
     label: str

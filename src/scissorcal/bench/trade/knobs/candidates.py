@@ -1,4 +1,4 @@
-"""Candidate laws: what a simpler or a richer law costs and how far its torque is from the richest.
+"""Candidate laws: what a simpler or a richer one costs, and how far its torque is from the fitted.
 
 Each kind of law is a knob: response, rate damping, fracture, friction, closure, edge. One candidate
 is fitted at a time, all other choices as the present fits made them.
@@ -52,13 +52,16 @@ NO_MINUTES = "Minutes of capture are not known: the recordings do not state thei
 
 
 class CandidateKnob(ABC):
-    """One kind of law; the settings are its candidates, the last and richest is the reference."""
+    """One kind of law; the settings are its candidates, the one that data support the reference.
+
+    A richer one that the data do not ask for differs from it by what they leave open.
+    """
 
     name: Aspect
     title: str
     cost = PROCESSOR
     error = WORST
-    against = "the richest candidate that was measured"
+    against = "the candidate that the data support"
     fits = "cut"
     slow: ClassVar[Mapping[str, float]] = {}
     """How many times as long as others some candidates take: a first guess for the schedule."""
@@ -70,6 +73,10 @@ class CandidateKnob(ABC):
     @abstractmethod
     def fitted(self, case: Case) -> str:
         """Name of the candidate that the present fits have."""
+
+    def supported(self, case: Case) -> str:
+        """Name of the candidate that errors are counted against: that of the present fits."""
+        return self.fitted(case)
 
     def present(self, case: Case) -> str:
         """Name of the candidate that a package of the present fits holds.
@@ -92,10 +99,11 @@ class CandidateKnob(ABC):
 
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """The candidates, simplest first."""
-        own = self.present(case)
+        own, names = self.present(case), list(self.candidates(case))
+        best = names.index(self.supported(case)) + 1
         return tuple(
-            Setting(name, place, name, self.name, name == own, place)
-            for place, name in enumerate(self.candidates(case), start=1)
+            Setting(name, place, name, self.name, name == own, place if place <= best else 0)
+            for place, name in enumerate(names, start=1)
         )
 
     def applied(self, case: Case, setting: Setting) -> Case:
@@ -244,6 +252,11 @@ class Closure(CandidateKnob):
     """How torque follows from the force at the edge: the published equation 4, or the work."""
 
     name, title = "closure", "Candidate: closure"
+    against = "the work of the forces"
+
+    def supported(self, case: Case) -> str:
+        """The work, which follows from the forces alone."""
+        return "work"
 
     def candidates(self, case: Case) -> Sequence[str]:
         """Equation 4, which neglects the contact's height, and the gradient of the energy."""
