@@ -58,8 +58,11 @@ def judge(law: TableLaw, tolerance: float, number_format: NumberFormat) -> None:
     table = table_of(array)
     away = np.abs(table.evaluate(x).astype(np.float64) - law.law(x.astype(np.float64)))
     assert np.max(away) <= proof.proved
-    # what float32 rounds is bounded for the worst case and hardly seen: beside it, near the truth
-    assert proof.proved <= 1.6 * seen_deviation(law, array) + np.max(proof.rounding)
+    # what float32 rounds is bounded for the worst case and hardly seen: beside it, near the truth,
+    # or, where a cubic holds the law exactly, a thousandth of the largest value: what the cells in
+    # which curvatures are bounded leave
+    little = 1e-3 * float(np.max(np.abs(array[1])))
+    assert proof.proved <= 1.6 * seen_deviation(law, array) + np.max(proof.rounding) + little
     place = np.searchsorted(proof.high, x.astype(np.float64)).clip(0, len(proof.high) - 1)
     assert np.all(away <= proof.value[place] + proof.rounding[place])
 

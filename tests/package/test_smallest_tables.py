@@ -9,8 +9,11 @@ import pytest
 from scissorcal.errors import InputError
 from scissorcal.kernel.compiled_step import missing_tools
 from scissorcal.package import PackageSummary, build_package, open_package, put_review
-from scissorcal.package.compile import TOLERANCE, compile_model
+from scissorcal.package.average import AverageTorque
+from scissorcal.package.bound import ExactTorque
+from scissorcal.package.compile import TOLERANCE, compile_model, scene_ranges
 from scissorcal.package.exact import FitDraws, central_model
+from scissorcal.package.grid import spread_points
 from scissorcal.package.manifest import content_hash
 from scissorcal.package.smallest_tables import smallest_tables
 from scissorcal.package.stated_bound import stated_bound
@@ -44,6 +47,22 @@ def test_they_fit_their_share_of_the_tolerance(title: str) -> None:
     finer = smallest_tables(model, tight)
     assert stated_bound(model, finer, tight).share <= 7e-5
     assert table_bytes(small) < table_bytes(finer)
+
+
+@pytest.mark.parametrize("title", ["paper-80gsm", "press-only"])
+def test_they_fit_it_of_the_torque_at_each_place(title: str) -> None:
+    """At places of which none was looked at; the largest error alone allows 20 times as much."""
+    chosen = recipe(title)
+    cut = cut_fit(chosen, **({} if chosen.scene.cut else {"energy": None, "force": 5.0}))
+    model = central_model(FitDraws.centre(cut), FitDraws.centre(friction_fit()))
+    small, scene = smallest_tables(model, chosen), scene_ranges(chosen)
+    limit = chosen.limits.torque_Nm
+    friction = small.mechanics.friction
+    points = spread_points(scene, 7_001, friction.rate_eps_rad_per_s if friction else 0.0)
+    largest = float(np.max(np.abs(ExactTorque.at(model, points, limit).torque)))
+    exact = ExactTorque.at(model, points, limit, largest)
+    away = exact.deviation(AverageTorque(small.mechanics, scene, small.arrays))
+    assert np.max(away) / largest <= 0.1 * chosen.scene.tolerance_percent / 100.0
 
 
 def test_a_scene_that_is_not_simplified_keeps_the_finest(tmp_path: Path) -> None:

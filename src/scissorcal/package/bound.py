@@ -9,7 +9,7 @@ from scissorcal.model import edge_height, settled_contact
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import STRONGEST_N
 from scissorcal.package.exact import ExactModel
-from scissorcal.package.grid import Points, nearby_points, spread_points
+from scissorcal.package.grid import FELT_SHARE, Points, nearby_points, spread_points
 from scissorcal.package.manifest import Ranges
 
 Array = NDArray[np.float64]
@@ -55,26 +55,37 @@ class ExactTorque:
     """The exact model's torque at places of a scene, within the limit: what tables are held to.
 
     ``torque`` (n,) is 0 where the model itself jumps, which ``clear`` (n,) says; nothing is
-    compared there.
+    compared there. Differences count times ``weight`` (n,): 1, or more where the torque is weak.
     """
 
     points: Points
     torque: Array
     clear: NDArray[np.bool_]
     limit: float
+    weight: Array
 
     @classmethod
-    def at(cls, model: ExactModel, points: Points, limit: float) -> "ExactTorque":
-        """Evaluate a model at points; ``limit`` in N m is the largest torque that is rendered."""
+    def at(
+        cls, model: ExactModel, points: Points, limit: float, largest: float = 0.0
+    ) -> "ExactTorque":
+        """Evaluate a model at points; ``limit`` in N m is the largest torque that is rendered.
+
+        With ``largest``, the scene's largest torque, differences are weighed as shares of the
+        torque at each place: by how many times weaker it is, :data:`FELT_SHARE` at the weakest.
+        """
         place = model.settled(points.opening, points.contact)
         clear = _clear(model, points, place)
         torque = model.torque_settled(points.opening, points.opening_rate, place)
-        return cls(points, np.where(clear, np.clip(torque, -limit, limit), 0.0), clear, limit)
+        torque = np.where(clear, np.clip(torque, -limit, limit), 0.0)
+        weight = np.ones(len(torque))
+        if largest > 0.0:
+            weight = largest / np.maximum(np.abs(torque), FELT_SHARE * largest)
+        return cls(points, torque, clear, limit, weight)
 
     def away(self, torque: Array) -> Array:
-        """How far another torque (n,) at these places is from the exact one, in N m."""
+        """How far another torque (n,) at these places is from the exact one, in N m, weighed."""
         other = np.where(self.clear, np.clip(torque, -self.limit, self.limit), 0.0)
-        return np.abs(other - self.torque)
+        return np.asarray(np.abs(other - self.torque) * self.weight)
 
     def deviation(self, average: AverageTorque) -> Array:
         """How far a package's tables are from the exact model at each place, in N m."""
@@ -89,13 +100,16 @@ def deviation(
     limit: float,
     count: int,
     slowest: float,
+    *,
+    largest: float = 0.0,
 ) -> Deviation:
     """Compare kernel and exact model as they are rendered: both within the torque limit.
 
     First on the places of `telling_points`; then in shrinking neighbourhoods of the worst.
+    With ``largest``, the scene's largest torque, differences are weighed as `ExactTorque` does.
     """
     points = telling_points(model, scene, count, slowest)
-    exact = ExactTorque.at(model, points, limit)
+    exact = ExactTorque.at(model, points, limit, largest)
     away, torque = exact.deviation(average), exact.torque
     scene_torque, total = float(np.max(np.abs(torque))), len(away)
     reach = count ** (-1.0 / 3.0)
@@ -103,7 +117,7 @@ def deviation(
         worst = np.argsort(-away, kind="stable")[:WORST]
         near = nearby_points(scene, points.at(worst), NEIGHBOURS, reach, slowest)
         points = points.at(worst).joined(near)
-        away = ExactTorque.at(model, points, limit).deviation(average)
+        away = ExactTorque.at(model, points, limit, largest).deviation(average)
         total += len(near.opening)
         reach *= 0.2
     first = int(np.argmax(away))

@@ -75,14 +75,15 @@ def smallest_tables(
 ) -> Compiled:
     """Search tolerance and number format of each table for the fewest bytes that are fine enough.
 
-    Fine enough: the stated bound (twice the largest deviation found between kernel and exact model)
-    is at most a tenth of the scene's tolerance. Each table alone is made at falling tolerances, the
+    Fine enough: twice the largest deviation found between kernel and exact model is at most a tenth
+    of the scene's tolerance, as a share of the torque at its place (of ``FELT_SHARE`` of the
+    largest where it is weaker). Each table alone is made at falling tolerances, the
     others at their finest; the cheapest set whose deviations add up to what is allowed is measured
     as a whole. Where it does not fit, they may add up to less; then tables are made coarser one by
-    one as long as the bound fits. So in the result no table can be one size smaller. 16-bit numbers
-    are tried where ``number_format`` (by default ``scene.number_format``) asks for them, and taken
-    where they save bytes. Where not even the finest tables fit, those are returned: the caller's
-    bound says by how much.
+    one as long as the bound fits. So in the result no table can be one of the sizes tried smaller;
+    other sets of sizes were not tried. 16-bit numbers are tried where ``number_format`` (by default
+    ``scene.number_format``) asks for them, and taken where they save bytes. Where not even the
+    finest tables fit, those are returned: the caller's bound says by how much.
 
     Raises InputError as `compile_model` does.
     """
@@ -111,8 +112,9 @@ class _Search:
         friction = self._mechanics.friction
         self._slowest = friction.rate_eps_rad_per_s if friction else 0.0
         points = telling_points(model, self._scene, SEARCH_POINTS, self._slowest)
-        self._exact = ExactTorque.at(model, points, self._limit)
-        self.scene_torque = float(np.max(np.abs(self._exact.torque)))
+        exact = ExactTorque.at(model, points, self._limit)
+        self.scene_torque = float(np.max(np.abs(exact.torque)))
+        self._exact = ExactTorque.at(model, points, self._limit, self.scene_torque)
         self._finest = {name: self._option(name, TableChoice(TOLERANCES[-1])) for name in self.laws}
         whole = kernel_tables(self._mechanics, self._scene, self._arrays(self._finest))
         self._falls = whole.release_falls
@@ -139,7 +141,13 @@ class _Search:
             return False
         average = AverageTorque(self._mechanics, self._scene, arrays)
         found = deviation(
-            self._model, average, self._scene, self._limit, GRID_POINTS, self._slowest
+            self._model,
+            average,
+            self._scene,
+            self._limit,
+            GRID_POINTS,
+            self._slowest,
+            largest=self.scene_torque,
         )
         return found.largest <= budget
 

@@ -73,9 +73,10 @@ def simplest_model(
 
     ``draws`` are the posterior draws that a package keeps (:func:`~scissorcal.package.build.
     pick_draws`). Everything that is left out together changes the torque by no more than half of
-    the scene's tolerance, with its confidence over these draws, wherever torque can be felt. With
-    ``scene.simplify = false`` the fits come back as they are. Tables of the fitted law and after
-    each omission are those that a package would get, made with ``tolerance`` where it is given.
+    the scene's tolerance, with its confidence over these draws, at the places looked at where
+    torque can be felt. With ``scene.simplify = false`` the fits come back as they are. Tables of
+    the fitted law and after each omission are those that a package would get, made with
+    ``tolerance`` where it is given.
     Raises InputError where the fitted law cannot be compiled.
     """
     scene = recipe.scene

@@ -27,8 +27,8 @@ def simplest_panel(choice: SceneChoice, fits: Sequence[FitResult]) -> Panel:
     notes.append(
         f"The scene's tolerance, {percent(record.tolerance)} of the local torque, is shared: "
         f"{percent(record.allowed_share)} for everything that is left out together, "
-        f"{percent(record.tables_share)} for the tables, the rest ({percent(rest)} of it) for the "
-        "posterior."
+        f"{percent(record.tables_share)} for the tables (twice what was found), the rest "
+        f"({percent(rest)} of it) for the posterior."
     )
     if record.within_before is not None and record.within_after is not None:
         notes.append(
