@@ -54,7 +54,8 @@ class Profile:
         spare = 0.5 * np.where(np.isfinite(size), size, 0.0) * width
         # where f'' has one sign f' is monotone; else it strays from its ends by half a cell's bend
         spare = np.where((least >= 0.0) | (most <= 0.0), 0.0, spare)
-        firsts = cls(ends, np.minimum(first, last) - spare, np.maximum(first, last) + spare)
+        highest = np.where(np.isneginf(least), np.inf, np.maximum(first, last) + spare)
+        firsts = cls(ends, np.minimum(first, last) - spare, highest)
         return firsts, cls(ends, least, most)
 
     def over(self, span: Span) -> Span:

@@ -128,7 +128,12 @@ class _Scene:
             wanted = (wanted & (contact.high >= place.low - away)) | near
             low = np.maximum(contact.low, place.low - away)
             box = self._box(Span(low, np.maximum(contact.high, low)), away)
-            error = box.error + np.where(near, box.change * away, 0.0)
+            # a crack of the tables may stand in another box than the model's, by `away` at most
+            worst, change = (
+                np.max(np.where(near, part, 0.0), axis=1, keepdims=True)
+                for part in (box.error, box.change)
+            )
+            error = np.where(near, worst + change * away, box.error)
         wanted = wanted & (box.station.low < self.cutting.edge.length_m)
         touching = wanted & (box.depth > 0.0)
         beyond = touching & (box.depth > self.deepest) & ~box.saturated
