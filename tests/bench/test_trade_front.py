@@ -94,6 +94,15 @@ def test_a_reference_that_stays_is_named_with_what_it_stands_for() -> None:
     assert said.endswith("its error is 20 %. Errors are counted against the truth.")
 
 
+def test_a_cheaper_setting_is_needed_where_the_present_one_is_beyond_the_limit() -> None:
+    present = point("present", spread(2.11), 0.2, present=True)
+    said = recommended(MIDDLE, present).sentences[0]
+    assert said.startswith(
+        "middle is needed: 2.1 s time in place of 2.11 s with present, which is not within the "
+        "limit."
+    )
+
+
 def test_a_remark_is_said_with_its_setting() -> None:
     draft = replace(MIDDLE, setting=replace(MIDDLE.setting, remark="It compares nothing."))
     assert recommended(draft, FINE).sentences[0].endswith("of 7 %. It compares nothing.")

@@ -133,7 +133,7 @@ def _reason(
         return f"{label} is enough, for {cost.words} {curve.cost}."
     own = present.costs[curve.cost]
     change = f"{cost.words} {curve.cost} in place of {own.words} with {present.setting.label}"
-    if cost.median > own.median:
+    if _objection(curve, present, present, limit):
         return f"{label} is needed: {change}, which is not within the limit."
     return f"{label} is enough: {change}, {_percent(1.0 - cost.median / own.median)} less."
 
