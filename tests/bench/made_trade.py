@@ -29,6 +29,7 @@ class Steps:
     cost = "processor time"
     error = "worst torque error"
     against = "the exact steps"
+    of_torque, stand_in, combined = True, True, True
 
     def missing(self, case: Case) -> str:
         """Every case has it."""

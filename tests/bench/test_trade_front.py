@@ -57,6 +57,59 @@ def test_the_present_setting_stays_where_costs_cannot_be_told_apart() -> None:
     assert choices_of([recommended(COARSE, MIDDLE, close)]) == (("made", "fine"),)
 
 
+def test_a_clear_saving_is_recommended_where_the_cheapest_cannot_be_told_from_the_present() -> None:
+    noisy = point("noisy", spread(1.0, 1.9, 6.0), 0.004)
+    assert choices_of([recommended(noisy, MIDDLE, FINE)]) == (("made", "middle"),)
+    found = recommended(noisy, FINE)
+    assert choices_of([found]) == (("made", "fine"),)
+    assert found.sentences[0].startswith(
+        "fine stays: no measured setting costs less time by more than the repeats differ and by "
+        "10 %. "
+    )
+
+
+def test_a_time_must_be_lower_by_more_than_its_noise_and_another_cost_need_not() -> None:
+    near = point("near", spread(4.6), 0.004)
+    assert choices_of([recommended(near, FINE)]) == (("made", "fine"),)
+
+    def bytes_of(one: Point, value: float) -> Point:
+        return replace(one, costs={"time": Spread.of([Quantity(value, "B")])})
+
+    found = recommended(bytes_of(near, 460.0), bytes_of(FINE, 500.0))
+    assert choices_of([found]) == (("made", "near"),)
+
+
+def test_no_objection_is_a_limit_that_is_kept() -> None:
+    found = recommended(point("near", spread(4.6), 0.002), COARSE, FINE)
+    assert "coarse would save 80 % time, but its error is 20 %." in found.sentences[0]
+    failing = replace(MIDDLE, rejected=("k-hat",))
+    assert recommended(failing).sentences[0] == (
+        "No setting is recommended: middle leaves the lowest error, but it fails the check k-hat."
+    )
+
+
+def test_a_reference_that_stays_is_named_with_what_it_stands_for() -> None:
+    known = replace(FINE, errors={}, reference=True)
+    said = recommended(COARSE, known).sentences[0]
+    assert said.endswith("its error is 20 %. Errors are counted against the truth.")
+
+
+def test_a_cheaper_setting_is_needed_where_the_present_one_is_beyond_the_limit() -> None:
+    present = point("present", spread(2.11), 0.2, present=True)
+    said = recommended(MIDDLE, present).sentences[0]
+    assert said.startswith(
+        "middle is needed: 2.1 s time in place of 2.11 s with present, which is not within the "
+        "limit."
+    )
+
+
+def test_a_remark_is_said_with_its_setting() -> None:
+    draft = replace(MIDDLE, setting=replace(MIDDLE.setting, remark="It compares nothing."))
+    assert recommended(draft, FINE).sentences[0].endswith("of 7 %. It compares nothing.")
+    same = replace(FINE, costs=MIDDLE.costs)
+    assert "compares" not in recommended(draft, same).sentences[0]
+
+
 def test_the_present_setting_stays_where_what_is_cheaper_is_too_far_off() -> None:
     found = recommended(COARSE, FINE)
     assert choices_of([found]) == (("made", "fine"),)
@@ -103,6 +156,10 @@ def test_all_settings_at_once_are_told_with_their_measured_costs() -> None:
     assert together_sentence(both) == (
         "All recommended settings at once, measured: time 2.1 s in place of 5 s; error 0.4 % of "
         "the scene's largest torque in place of 0.1 %."
+    )
+    said = together_sentence(both, ["Loop rate (500 Hz)"])
+    assert said.endswith(
+        " Not part of this measurement, which they do not change: Loop rate (500 Hz)."
     )
     assert "not measured within the budget" in together_sentence(replace(CURVE, points=(FINE,)))
 

@@ -1,16 +1,18 @@
 """Which measurements a run makes, in which order, and within which time."""
 
 import time
+from dataclasses import replace
 
 import pytest
 
+from scissorcal.bench.trade import fits, study
 from scissorcal.bench.trade import knob as knobs
-from scissorcal.bench.trade import study
-from scissorcal.bench.trade.assemble import curve_of, limit_of
+from scissorcal.bench.trade.assemble import curve_of, limit_of, reference_of
 from scissorcal.bench.trade.knob import KNOBS, make_knob
+from scissorcal.bench.trade.knobs.effort import Effort
 from scissorcal.bench.trade.schedule import Schedule
-from scissorcal.bench.trade.study import PRESENT_TASK, Task, run_task, tasks_of
-from tests.bench.made_trade import ERRORS, FAILING, MADE, made_case
+from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, run_task, tasks_of
+from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, made_case
 
 
 @pytest.fixture(autouse=True)
@@ -133,9 +135,51 @@ def test_a_curve_is_made_of_the_records_of_its_knob() -> None:
     assert {label for label, point in by_label.items() if point.front} == {"coarse", "fine"}
 
 
-def test_the_limits_of_all_knobs_add_up_to_the_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+def efforts(*labels: str, **rejected: list[str]) -> list[Record]:
+    """Records of efforts, with the checks that each fails."""
+    return [
+        {"label": label, "repeat": 0, "costs": {}, "outcome": {}, "notes": [], "rejected": checks}
+        for label in labels
+        for checks in [rejected.get(label, [])]
+    ]
+
+
+def test_a_reference_that_stands_for_a_better_one_says_why() -> None:
+    case, knob = made_case(), Effort()
+    every = ("draft", "standard", "thorough")
+    for records, said in (
+        (efforts(*every), "the most thorough effort (thorough)"),
+        (efforts(*every[:2]), "(thorough was not measured)"),
+        (efforts(*every, thorough=["k-hat"]), "(thorough fails the check k-hat)"),
+        (
+            [*efforts(*every[:2]), {"label": "thorough", "failed": "It broke."}],
+            "(thorough gave no result)",
+        ),
+    ):
+        sample, against = reference_of(case, knob, records)
+        assert sample is not None
+        if said.startswith("("):
+            said = f"standard, in place of the most thorough effort {said}"
+        assert against == said
+    assert reference_of(case, knob, []) == (None, "the most thorough effort")
+
+
+def test_draft_effort_says_that_it_compares_no_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    remarks = {one.label: one.remark for one in Effort().settings(made_case())}
+    assert remarks == {"draft": fits.DRAFT_NOTE, "standard": "", "thorough": ""}
+    monkeypatch.setattr(fits, "fit_case", lambda case, repeat: (None, None, {}, ()))
+    monkeypatch.setattr(fits, "fits_outcome", lambda *_: {})
+    assert fits.measure_fits(replace(made_case(), effort="draft"), 0).notes == (fits.DRAFT_NOTE,)
+    assert fits.measure_fits(made_case(), 0).notes == ()
+
+
+def test_the_limit_is_the_tolerance_over_the_knobs_of_torque(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     case = made_case(tolerance_percent=6.0)
     assert limit_of(case) == pytest.approx(0.06 / len(MADE))
+    monkeypatch.setattr(Slow, "of_torque", False)
+    assert limit_of(case) == pytest.approx(0.06 / (len(MADE) - 1))
     monkeypatch.setattr(knobs, "KNOBS", {"steps": MADE["steps"]})
     assert limit_of(case) == pytest.approx(0.06)
 

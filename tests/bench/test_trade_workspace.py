@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import jsonschema
@@ -10,7 +11,12 @@ import pytest
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.point import Curve, Error, Point, Setting, Spread
 from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
+from scissorcal.bench.trade.schedule import Schedule
+from scissorcal.bench.trade.study import Task
+from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
+from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.runs import bench
@@ -145,6 +151,50 @@ def test_time_kept_for_all_settings_at_once_is_used_where_there_is_nothing_to_co
     monkeypatch.setattr(bench._Run, "measure", noted)
     assert run(workspace, budget_s=600.0).trade.measured == 2 * ALL
     assert kept == [True, False]
+
+
+def both_settings(knob: str) -> Curve:
+    """A curve whose recommended setting is another than the present one."""
+    spread, error = Spread(1.0, 1.0, 1.0, "s"), Error(1e-3, "N m", 1e-3)
+    points = tuple(
+        Point(Setting(label, 1.0, present=now), {"time": spread}, {"e": error}, recommended=not now)
+        for label, now in (("as now", True), ("less", False))
+    )
+    return Curve(knob, knob, "time", "e", points)
+
+
+def test_what_changes_nothing_at_once_is_named_and_alone_not_measured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def record(task: Task) -> dict[str, Any]:
+        made = {"knob": task.knob, "label": task.label, "repeat": 0, "seconds": 1.0}
+        made |= {"choices": task.choices, "baseline_s": 0.02, "outcome": {}, "notes": []}
+        return made | {"costs": {"processor time": [2.0, "s"]}, "rejected": []}
+
+    asked: list[Task] = []
+    file = SimpleNamespace(records=[record(Task("effort", "standard"))])
+
+    def work(self: object, pool: object, schedule: Schedule, count: int) -> None:
+        asked.extend(schedule.left)
+        file.records += [record(task) for task in schedule.left]
+
+    def errors(self: object, *_: object) -> dict[str, Error]:
+        return {WORST: Error(1e-3, "N m", 1e-3)}
+
+    monkeypatch.setattr(bench._Run, "_work", work)
+    monkeypatch.setattr(Together, "errors", errors)
+    found = bench._Run(made_case(), file, None, None, lambda *_: None)  # type: ignore[arg-type]
+    assert found.together(None, [both_settings("rate")]) is None  # type: ignore[arg-type]
+    assert asked == []
+    curve = found.together(  # type: ignore[arg-type]
+        None, [both_settings("rate"), both_settings("tables")]
+    )
+    assert asked[-1] == Task(TOGETHER, RECOMMENDED, choices=(("tables", "less"),))
+    assert curve is not None
+    assert curve.sentences[0].endswith(
+        "Not part of this measurement, which they do not change: Loop rate (less)."
+    )
+    assert curve.against.startswith("standard, in place of the most thorough effort")
 
 
 def test_an_unknown_knob_is_refused(workspace: Workspace) -> None:

@@ -148,7 +148,8 @@ def _head(trade: Trade) -> str:
         + (f" of {short(trade.budget_s)} s allowed" if trade.budget_s is not None else "")
         + f", {trade.workers} at a time",
         "Limit of one knob": f"{percent(trade.limit)} of the scene's largest torque: the "
-        f"tolerance of {percent(trade.tolerance)} over the number of knobs",
+        f"tolerance of {percent(trade.tolerance)} over the number of knobs whose main error is one "
+        "of torque; a convention, no guarantee",
     }
     rows = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
     notes = "".join(f'<p class="note">{prose(note)}</p>' for note in trade.notes)

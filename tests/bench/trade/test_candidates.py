@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scissorcal.bench.trade.assemble import curve_of
 from scissorcal.bench.trade.candidate_fit import as_fitted
 from scissorcal.bench.trade.fits import PROCESSOR
 from scissorcal.bench.trade.knob import make_knob
@@ -23,6 +24,7 @@ from scissorcal.bench.trade.knobs.edge import Edge, projected
 from scissorcal.bench.trade.models import central_law, fitted_model, held_law, model_of_law
 from scissorcal.bench.trade.needed_minutes import needed_minutes
 from scissorcal.bench.trade.package_cost import BYTES, STEP
+from scissorcal.bench.trade.recommend import choices_of
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.package.simplest.candidates import fitted_candidate
 from tests.bench.trade.cases import case, linear, pressing
@@ -50,11 +52,13 @@ def test_the_recipe_of_a_refit_compares_nothing():
 
 
 @pytest.mark.parametrize("kind", CUT_KNOBS)
-def test_one_candidate_is_present_and_the_richest_is_the_reference(kind):
+def test_one_candidate_is_present_and_the_fitted_one_is_the_reference(kind):
     one, knob = case(kappa=0.75), pickle.loads(pickle.dumps(kind()))
     settings = knob.settings(one)
     assert sum(setting.present for setting in settings) == 1
-    assert [setting.accuracy for setting in settings] == list(range(1, len(settings) + 1))
+    best = max(settings, key=lambda one: one.accuracy)
+    assert best.value == knob.supported(one)
+    assert {setting.accuracy for setting in settings[settings.index(best) + 1 :]} <= {0}
     (present,) = (setting for setting in settings if setting.present)
     assert knob.recipe(as_fitted(one), present.value) == as_fitted(one)
     for setting in settings:
@@ -62,6 +66,43 @@ def test_one_candidate_is_present_and_the_richest_is_the_reference(kind):
         assert knob.recipe(changed, setting.value) == changed
     assert knob.missing(one) == ""
     assert "linear joint" in knob.missing(linear())
+
+
+def record(label, **failed):
+    """A measurement of a candidate, all of equal torque."""
+    sample = sampled(case(kappa=0.75))
+    return {
+        "knob": "response",
+        "label": label,
+        "repeat": 0,
+        "baseline_s": 0.02,
+        "costs": {name: [cost.value, cost.unit] for name, cost in sample.costs.items()},
+        "outcome": sample.outcome,
+        "notes": [],
+        "rejected": [],
+        **failed,
+    }
+
+
+def test_without_the_candidate_that_the_data_support_none_is_recommended():
+    one = case(response="spline", shape=(1.0, 1.2, 1.3))
+    knob = Response()
+    assert knob.supported(one) == "spline"
+    simple = [record("power"), record("exponential")]
+    found = curve_of(one, knob, simple, 0.01)
+    assert found.against == (
+        "exponential, in place of the candidate that the data support (spline was not measured)"
+    )
+    assert found.sentences[0] == (
+        "No setting is recommended, since spline was not measured: errors are to be counted "
+        "against the candidate that the data support."
+    )
+    assert choices_of([found]) == ()
+    found = curve_of(one, knob, [*simple, record("spline", failed="It broke.")], 0.01)
+    assert "since spline gave no result" in found.sentences[0]
+    found = curve_of(one, knob, [*simple, record("spline")], 0.01)
+    assert found.against == "the candidate that the data support (spline)"
+    assert choices_of([found])
 
 
 def test_a_scene_without_a_choice_says_why():

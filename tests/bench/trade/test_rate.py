@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scissorcal.bench.trade.assemble import curve_of
 from scissorcal.bench.trade.frame_time import frame_time_s
-from scissorcal.bench.trade.knobs.rate import IN_HAND, NO_PORT, NO_RIG, Rate
+from scissorcal.bench.trade.knobs.rate import ALONE, IN_HAND, NO_PORT, NO_RIG, Rate
 from scissorcal.bench.trade.models import compiled
+from scissorcal.bench.trade.recommend import choices_of
 from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
 from scissorcal.bench.trade.stability import known_rig, margin
 from scissorcal.bench.trade.strokes import PEAK_OVER_MEAN, Stroke, hand_strokes
@@ -100,6 +102,37 @@ def test_the_knob_measures_each_rate_against_the_continuous_torque():
     assert found[125.0].notes == (NO_PORT,)
     imported = replace(one, friction=(), cut=())
     assert NO_RIG in knob.measure(imported, settings[125.0], 0).notes
+
+
+def rate_curve(**margins):
+    """The curve of three rates whose torque is right, with margins as a record keeps them."""
+    torque = {"average": 1e-4, "worst": 1e-3, "moments": 1e-3, "largest": 1.0}
+    records = [
+        {
+            "knob": "rate",
+            "label": f"{rate} Hz",
+            "repeat": 0,
+            "baseline_s": 0.02,
+            "costs": {"share of a core": [1e-5 * rate, ""]},
+            "outcome": {**torque, **margins},
+            "notes": [],
+            "rejected": [],
+        }
+        for rate in (500, 1000, 2000)
+    ]
+    return curve_of(pressing(), Rate(), records, 0.01)
+
+
+def test_where_stability_is_infinite_or_unknown_no_slower_loop_is_recommended():
+    allowed = rate_curve(in_hand=0.1, alone=0.2)
+    assert choices_of([allowed]) == (("rate", "500 Hz"),)
+    assert all(point.unbounded == () for point in allowed.points)
+    nothing, unknown = rate_curve(in_hand=0.1, alone=None), rate_curve()
+    for found, why in ((nothing, f"{ALONE} is infinite"), (unknown, f"{IN_HAND} is not known")):
+        assert choices_of([found]) == (("rate", "1000 Hz"),)
+        assert why in found.points[0].unbounded
+        assert f"No setting below 1000 Hz is recommended, since {why}." in found.sentences[0]
+        assert f"500 Hz would save 50 % share of a core, but its {why}." in found.sentences[0]
 
 
 def test_nothing_rendered_has_no_rate():

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from statistics import median
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.knob import Knob, scene_knobs
+from scissorcal.bench.trade.knob import Knob, make_knob, scene_knobs
 from scissorcal.bench.trade.pareto import pareto_front
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
 from scissorcal.bench.trade.recommend import recommend
@@ -16,10 +16,12 @@ from scissorcal.bench.trade.study import Record, sample_of
 def limit_of(case: Case) -> float:
     """The share of the scene's largest torque by which one knob may be wrong.
 
-    The scene's tolerance over the number of knobs that it has: errors of that size in all of them
-    stay within the tolerance even where they add up.
+    The scene's tolerance over the number of its knobs whose main error is one of torque. A cautious
+    convention and no guarantee: knobs judge different errors (worst, average, of the band, of the
+    ripple), whose sum bounds none of them.
     """
-    return case.recipe.scene.tolerance_percent / 100.0 / max(len(scene_knobs(case)), 1)
+    count = sum(make_knob(name).of_torque for name in scene_knobs(case))
+    return case.recipe.scene.tolerance_percent / 100.0 / max(count, 1)
 
 
 def curve_of(case: Case, knob: Knob, records: Sequence[Record], limit: float) -> Curve:
@@ -30,7 +32,14 @@ def curve_of(case: Case, knob: Knob, records: Sequence[Record], limit: float) ->
     curve = measured_curve(case, knob, records)
     if curve.missing:
         return curve
-    return recommend(curve, limit, case.recipe.scene.tolerance_percent / 100.0)
+    found = _reference(case, knob, records)
+    unsure = ""
+    if found.gaps and not knob.stand_in:
+        unsure = (
+            f"No setting is recommended, since {found.gaps}: errors are to be counted against "
+            f"{knob.against}."
+        )
+    return recommend(curve, limit, case.recipe.scene.tolerance_percent / 100.0, unsure)
 
 
 def measured_curve(
@@ -45,50 +54,69 @@ def measured_curve(
         return replace(curve, missing=why)
     own = {setting.label: setting for setting in knob.settings(case)}
     made = {label: [r for r in records if r["label"] == label] for label in own}
-    best = _reference(own, made) if against is None else ""
-    known = sample_of(_first(made[best])) if best else against
+    found = _Reference(knob.against) if against else _reference(case, knob, records)
     points = [
-        _point(case, knob, setting, made[label], known, best == label)
+        _point(case, knob, setting, made[label], against or found.sample, found.label == label)
         for label, setting in own.items()
         if made[label]
     ]
     return replace(
         curve,
         points=_with_front(knob, points),
-        against=f"{knob.against} ({best})" if best else knob.against,
+        against=found.against,
         unmeasured=tuple(label for label in own if not made[label]),
     )
 
 
-def reference_sample(case: Case, knob: Knob, records: Sequence[Record]) -> Sample | None:
-    """The sample that errors of a knob are counted against; None where none was measured."""
-    own = {setting.label: setting for setting in knob.settings(case)}
-    made = {label: [r for r in records if r["label"] == label] for label in own}
-    best = _reference(own, made)
-    return sample_of(_first(made[best])) if best else None
+def reference_of(case: Case, knob: Knob, records: Sequence[Record]) -> tuple[Sample | None, str]:
+    """The sample that errors of a knob are counted against, None where there is none; in words."""
+    found = _reference(case, knob, records)
+    return found.sample, found.against
 
 
-def _first(records: Sequence[Record]) -> Record:
-    """The record of the lowest repeat that did not fail."""
-    return min((r for r in records if "failed" not in r), key=lambda r: r["repeat"])
+@dataclass(frozen=True)
+class _Reference:
+    """What errors are counted against: in words, its label and sample (none where it has neither).
+
+    ``gaps`` say of each more accurate setting why it is not the reference; empty without any.
+    """
+
+    against: str
+    label: str = ""
+    sample: Sample | None = None
+    gaps: str = ""
 
 
-def _reference(own: dict[str, Setting], made: dict[str, list[Record]]) -> str:
-    """The label of the most accurate setting that was measured; empty where there is none.
+def _reference(case: Case, knob: Knob, records: Sequence[Record]) -> _Reference:
+    """The most accurate setting that was measured.
 
     A setting that fails a check which the present one passes is no reference.
     """
-    good = {label: [r for r in made[label] if "failed" not in r] for label in own}
-    present = next((label for label in own if own[label].present and good[label]), "")
+    settings = knob.settings(case)
+    good = {
+        one.label: [r for r in records if r["label"] == one.label and "failed" not in r]
+        for one in settings
+    }
+    tried = {r["label"] for r in records}
+    present = next((one.label for one in settings if one.present and good[one.label]), "")
     passed = _rejected(good[present]) if present else None
-    able = [
-        setting
-        for label, setting in own.items()
-        if setting.accuracy > 0
-        and good[label]
-        and (passed is None or _rejected(good[label]) <= passed)
-    ]
-    return max(able, key=lambda one: one.accuracy).label if able else ""
+    gaps: list[str] = []
+    for one in sorted(settings, key=lambda one: -one.accuracy):
+        if one.accuracy <= 0:
+            break
+        failed = _rejected(good[one.label]) - passed if passed is not None else set()
+        if good[one.label] and not failed:
+            first = min(good[one.label], key=lambda r: r["repeat"])
+            said, label = "; ".join(gaps), one.label
+            whole = f"{knob.against} ({label})"
+            against = f"{label}, in place of {knob.against} ({said})" if gaps else whole
+            return _Reference(against, label, sample_of(first), said)
+        if failed:
+            gaps.append(f"{one.label} fails the check {', '.join(sorted(failed))}")
+        else:
+            why = "gave no result" if one.label in tried else "was not measured"
+            gaps.append(f"{one.label} {why}")
+    return _Reference(knob.against, gaps="; ".join(gaps))
 
 
 def _rejected(records: Sequence[Record]) -> set[str]:
@@ -117,6 +145,12 @@ def _point(
     judged = samples[1:] if is_reference else samples
     every = [knob.errors(case, one, reference) for one in judged]
     found = [{n: e for n, e in own.items() if math.isfinite(e.value)} for own in every]
+    unbounded = [
+        f"{name} is {'infinite' if math.isinf(error.value) else 'not known'}"
+        for own in every
+        for name, error in own.items()
+        if error.guarded and not math.isfinite(error.value)
+    ]
     return Point(
         setting,
         costs,
@@ -124,6 +158,7 @@ def _point(
         reference=is_reference,
         notes=tuple(dict.fromkeys(note for one in samples for note in one.notes)),
         rejected=tuple(dict.fromkeys(check for one in samples for check in one.rejected)),
+        unbounded=tuple(dict.fromkeys(unbounded)),
     )
 
 

@@ -22,6 +22,11 @@ PROCESSOR, EVALUATIONS, MINUTES = "processor time", "evaluations", "capture"
 MEAN, SD = "posterior mean, worst parameter", "posterior sd, worst parameter"
 QUANTILES = "5 and 95 % quantiles, worst parameter"
 
+DRAFT_NOTE = (
+    "Draft effort fits only the law that the workspace's fit chose; standard and thorough effort "
+    "compare all laws that the recipe allows."
+)
+
 SECONDS_A_SAMPLE = {"draft": 2e-5, "standard": 5e-5, "thorough": 1e-3}
 """Processor seconds that both fits take for each sample of the recordings: a first guess for the
 schedule of a run with a budget, of the virtual rig on one machine. Measured times replace it."""
@@ -36,10 +41,12 @@ def expected_fits_s(case: Case) -> float:
 def measure_fits(case: Case, repeat: int) -> Sample:
     """Fit friction, then the cut, as the workspace would, and evaluate what they predict.
 
-    Draft effort fits the law that the workspace's fit chose. Raises what the fits raise.
+    Draft effort fits the law that the workspace's fit chose, which a note says. Raises what the
+    fits raise.
     """
     cut, friction, costs, rejected = fit_case(case, repeat)
-    return Sample(costs, fits_outcome(case, cut, friction), rejected=rejected)
+    notes = (DRAFT_NOTE,) if case.effort == "draft" else ()
+    return Sample(costs, fits_outcome(case, cut, friction), notes, rejected)
 
 
 def fit_case(

@@ -34,6 +34,9 @@ class Knob(Protocol):
 
     ``title`` is its heading; ``cost`` and ``error`` name the main cost and main error, keys of
     what `measure` and `errors` give; ``against`` says in words what errors are counted against.
+    ``of_torque`` says that the main error is one of torque, which the scene's tolerance limits;
+    ``stand_in`` that the next accurate setting may be the reference where the most accurate one
+    gave none; ``combined`` that a setting changes what `Together` measures.
     Instances hold nothing that changes: they are made anew in every process.
     """
 
@@ -42,6 +45,9 @@ class Knob(Protocol):
     cost: str
     error: str
     against: str
+    of_torque: bool
+    stand_in: bool
+    combined: bool
 
     def missing(self, case: Case) -> str:
         """Say in a sentence why this scene does not have the knob; empty where it does."""

@@ -24,6 +24,8 @@ class Error:
     ``share`` is the error as a share of the scene's largest torque (of the largest force for a
     linear joint), None where the error is not one of torque. ``guarded`` errors are needed over
     allowed: no setting is recommended where one is above 1 and above that of the present setting.
+    Settings of larger size need less. The value of a guarded error is infinite where nothing is
+    allowed and NaN where it is not known; `Point.unbounded` then has it in words.
     """
 
     value: float
@@ -41,7 +43,7 @@ class Setting:
     values only, which pickle and JSON hold. ``present`` marks what the workspace uses now.
     ``accuracy`` orders settings by how good a reference they are: the errors of a knob are counted
     against the measured setting of the highest accuracy above 0 that fails no check which the
-    present one passes.
+    present one passes. ``remark`` is said with the recommendation of the setting.
     """
 
     label: str
@@ -50,6 +52,7 @@ class Setting:
     method: str = ""
     present: bool = False
     accuracy: int = 0
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,9 @@ class Point:
 
     ``failed`` says why the setting gave nothing, empty where it did; ``front`` marks the Pareto
     front, ``recommended`` the setting that the recommendation names, ``reference`` the one that
-    errors are counted against, ``rejected`` the checks that failed.
+    errors are counted against, ``rejected`` the checks that failed. ``unbounded`` are the guarded
+    errors that have no number, in words: infinite, or not known. A setting that has one and is of
+    a smaller size than the present one is not recommended.
     """
 
     setting: Setting
@@ -127,6 +132,7 @@ class Point:
     reference: bool = False
     notes: tuple[str, ...] = ()
     rejected: tuple[str, ...] = ()
+    unbounded: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,27 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scissorcal.bench.trade.point import Curve, Point, Spread
+from scissorcal.bench.trade.point import TIMES_S, Curve, Point
+
+LEAST_SAVING = 0.1
+"""Least saving, as a share, for which the present setting is left where the cost is a time.
+
+Processor times of equal work differ: repeats of one fit lie 7 % apart, lowest to highest of three,
+in the median of 24 settings of the virtual rig, and further where other work runs beside them. A
+setting with one repeat does not show that."""
 
 
-def recommend(curve: Curve, limit: float, tolerance: float) -> Curve:
+def recommend(curve: Curve, limit: float, tolerance: float, unsure: str = "") -> Curve:
     """Mark the recommended setting of a curve and say why, as its first sentence.
 
     It is the cheapest one by the main cost whose main error is at most ``limit``, a share of the
     scene's largest torque, that fails no check which the present setting passes, and whose guarded
-    errors are allowed or no larger than the present setting's. Where the range of its cost overlaps
-    that of the present one's, the present setting stays.
+    errors are allowed or no larger than the present setting's. Where the present setting is within
+    the limit, it stays unless the range of the other's cost lies below its own; a cost that is a
+    time must also be lower by `LEAST_SAVING`.
     Nothing is recommended where the error is not one of torque, where nothing but the reference
-    was measured, or where no setting is within the limit. ``tolerance`` is the scene's.
+    was measured, where no setting is within the limit, or where ``unsure`` says why. ``tolerance``
+    is the scene's.
     """
     able = [p for p in curve.points if not p.failed and curve.cost in p.costs]
     further = [f"{p.setting.label} gave no result: {p.failed}" for p in curve.points if p.failed]
@@ -23,17 +32,12 @@ def recommend(curve: Curve, limit: float, tolerance: float) -> Curve:
     judged = [p for p in able if _share(curve, p) is not None]
     if not able and not curve.points:
         return replace(curve, sentences=("No setting was measured within the budget.", *further))
+    if unsure:
+        return replace(curve, sentences=(unsure, *further))
     if not [p for p in judged if not p.reference]:
         return replace(curve, sentences=(_silent(curve, able), *further))
     present = next((p for p in able if p.setting.present), None)
-    passed = set(present.rejected) if present else set()
-    within = [
-        p
-        for p in able
-        if (p.reference or _within(curve, p, limit))
-        and set(p.rejected) <= passed
-        and not _beyond_guard(p, present)
-    ]
+    within = [p for p in able if not _objection(curve, p, present, limit)]
     if not within:
         lowest = min(judged, key=lambda p: _share(curve, p) or 0.0)
         said = (
@@ -41,13 +45,24 @@ def recommend(curve: Curve, limit: float, tolerance: float) -> Curve:
             f"largest torque: {lowest.setting.label} comes nearest with "
             f"{_percent(_share(curve, lowest))}."
         )
+        if (_share(curve, lowest) or 0.0) <= limit:
+            why = _objection(curve, lowest, present, limit)
+            said = (
+                f"No setting is recommended: {lowest.setting.label} leaves the lowest "
+                f"{curve.error}, but {why}."
+            )
         return replace(curve, sentences=(said, *further))
+    if present in within:
+        within = [present, *(p for p in within if _saves(curve, p, present))]
     chosen = min(within, key=lambda p: p.costs[curve.cost].median)
-    if present in within and _overlap(present.costs[curve.cost], chosen.costs[curve.cost]):
-        chosen = present
     points = tuple(replace(p, recommended=p is chosen) for p in curve.points)
-    reason = f"{_reason(curve, able, chosen, present)} {_limit(curve, chosen, limit, tolerance)}"
-    return replace(curve, points=points, sentences=(reason, *further))
+    parts = [
+        _reason(curve, able, chosen, present, limit),
+        _limit(curve, chosen, limit, tolerance),
+        _unguarded(able, present),
+        chosen.setting.remark,
+    ]
+    return replace(curve, points=points, sentences=(" ".join(filter(None, parts)), *further))
 
 
 def choices_of(curves: Sequence[Curve]) -> tuple[tuple[str, str], ...]:
@@ -60,8 +75,11 @@ def choices_of(curves: Sequence[Curve]) -> tuple[tuple[str, str], ...]:
     )
 
 
-def together_sentence(curve: Curve) -> str:
-    """What all recommended settings give at once, beside the present ones."""
+def together_sentence(curve: Curve, apart: Sequence[str] = ()) -> str:
+    """What all recommended settings give at once, beside the present ones.
+
+    ``apart`` names the recommended settings that the measurement does not hold.
+    """
     if failed := [p for p in curve.points if p.failed]:
         return f"{curve.title} could not be measured: {failed[0].failed}"
     present = next((p for p in curve.points if p.setting.present), None)
@@ -73,11 +91,14 @@ def together_sentence(curve: Curve) -> str:
         for name in present.costs
         if name in chosen.costs
     )
-    return (
+    said = (
         f"All recommended settings at once, measured: {costs}; {curve.error} "
         f"{_percent(_share(curve, chosen))} of the scene's largest torque in place of "
         f"{_percent(_share(curve, present))}."
     )
+    if apart:
+        said += f" Not part of this measurement, which they do not change: {'; '.join(apart)}."
+    return said
 
 
 def _silent(curve: Curve, able: Sequence[Point]) -> str:
@@ -87,32 +108,75 @@ def _silent(curve: Curve, able: Sequence[Point]) -> str:
     return "Too few settings were measured to recommend one."
 
 
-def _reason(curve: Curve, able: Sequence[Point], chosen: Point, present: Point | None) -> str:
+def _reason(
+    curve: Curve, able: Sequence[Point], chosen: Point, present: Point | None, limit: float
+) -> str:
     """Whether the present setting stays, and what changes where another is enough."""
     cost, label = chosen.costs[curve.cost], chosen.setting.label
     if chosen.setting.present:
-        cheaper = [p for p in able if p.costs[curve.cost].high < cost.low]
-        best = min(cheaper, key=lambda p: _share(curve, p) or 0.0, default=None)
-        if best is None:
+        cheaper = [p for p in able if p.costs[curve.cost].median < cost.median]
+        if not cheaper:
             return f"{label} stays: no measured setting costs less {curve.cost}."
+        # what saves enough is not chosen, so there is an objection to each of them
+        clear = [p for p in cheaper if _saves(curve, p, chosen)]
+        if not clear:
+            least = f" and by {_percent(LEAST_SAVING)}" if cost.unit in TIMES_S else ""
+            return (
+                f"{label} stays: no measured setting costs less {curve.cost} by more than the "
+                f"repeats differ{least}."
+            )
+        best = min(clear, key=lambda p: _share(curve, p) or 0.0)
         saved = _percent(1.0 - best.costs[curve.cost].median / cost.median)
-        why = f"its {curve.error} is {_percent(_share(curve, best))}"
-        if best.rejected:
-            why = f"it fails the check {', '.join(best.rejected)}"
-        elif guard := _beyond_guard(best, chosen):
-            why = f"its {guard}"
+        why = _objection(curve, best, chosen, limit)
         return f"{label} stays: {best.setting.label} would save {saved} {curve.cost}, but {why}."
     if present is None:
         return f"{label} is enough, for {cost.words} {curve.cost}."
     own = present.costs[curve.cost]
     change = f"{cost.words} {curve.cost} in place of {own.words} with {present.setting.label}"
-    if cost.median > own.median:
+    if _objection(curve, present, present, limit):
         return f"{label} is needed: {change}, which is not within the limit."
     return f"{label} is enough: {change}, {_percent(1.0 - cost.median / own.median)} less."
 
 
+def _objection(curve: Curve, point: Point, present: Point | None, limit: float) -> str:
+    """Why a setting may not be recommended, as the end of a sentence; empty where it may."""
+    if failed := [c for c in point.rejected if present is None or c not in present.rejected]:
+        return f"it fails the check {', '.join(failed)}"
+    if guard := _beyond_guard(point, present):
+        return f"its {guard}"
+    share = _share(curve, point)
+    if point.reference or (share is not None and share <= limit):
+        return ""
+    if share is None:
+        return f"its {curve.error} is not known"
+    return f"its {curve.error} is {_percent(share)}"
+
+
+def _saves(curve: Curve, point: Point, present: Point) -> bool:
+    """Whether a setting costs less than the present one beyond what repeats of both explain."""
+    cost, own = point.costs[curve.cost], present.costs[curve.cost]
+    least = LEAST_SAVING if cost.unit in TIMES_S else 0.0
+    return cost.high < own.low and cost.median <= (1.0 - least) * own.median
+
+
+def _unguarded(able: Sequence[Point], present: Point | None) -> str:
+    """That a guarded error has no number, so that settings of smaller size are left out."""
+    left_out = [p for p in able if _without_guard(p, present)]
+    if present is None or not left_out:
+        return ""
+    why = left_out[0].unbounded[0]
+    return f"No setting below {present.setting.label} is recommended, since {why}."
+
+
+def _without_guard(point: Point, present: Point | None) -> bool:
+    """Whether a guarded error of a setting has no number, and nothing shows that it is no worse."""
+    return bool(point.unbounded) and not (present and point.setting.size >= present.setting.size)
+
+
 def _beyond_guard(point: Point, present: Point | None) -> str:
     """Which guarded error of a setting is beyond 1 and the present one's; empty where none is."""
+    if _without_guard(point, present):
+        return point.unbounded[0]
     for name, error in point.errors.items():
         if error.guarded:
             known = present.errors.get(name) if present else None
@@ -125,7 +189,7 @@ def _beyond_guard(point: Point, present: Point | None) -> str:
 def _limit(curve: Curve, chosen: Point, limit: float, tolerance: float) -> str:
     share = _share(curve, chosen)
     if share is None:
-        return "Errors are counted against it."
+        return f"Errors are counted against {curve.against}."
     return (
         f"Its {curve.error} is {_percent(share)} of the scene's largest torque against "
         f"{curve.against}; the limit of one knob is {_percent(limit)}, its part of the tolerance "
@@ -136,15 +200,6 @@ def _limit(curve: Curve, chosen: Point, limit: float, tolerance: float) -> str:
 def _share(curve: Curve, point: Point) -> float | None:
     error = point.errors.get(curve.error)
     return error.share if error else None
-
-
-def _within(curve: Curve, point: Point, limit: float) -> bool:
-    share = _share(curve, point)
-    return share is not None and share <= limit
-
-
-def _overlap(a: Spread, b: Spread) -> bool:
-    return a.low <= b.high and b.low <= a.high
 
 
 def _percent(share: float | None) -> str:

@@ -21,7 +21,8 @@ class Trade:
     of the scene's largest torque. ``baseline`` is the step that times are compared with.
     ``measured_now`` of ``measured`` samples were made by the run that wrote this, the others by
     earlier runs on the same inputs and machine. ``together`` compares the present settings with all
-    recommended ones at once; None where only some knobs were measured.
+    recommended ones at once; None where one knob alone was asked for, where nothing was recommended
+    that changes this measurement, and where the budget left no present fits to compare with.
     """
 
     format: TradeFormat

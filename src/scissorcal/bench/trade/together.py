@@ -35,15 +35,16 @@ class Together:
 
     Once with the present settings, and once with all recommended ones.
 
-    ``choices`` are the recommended label of each knob. Errors are of what the tables render,
-    against the most accurate fits of the knob ``effort``.
+    ``choices`` are the recommended label of each knob that is `Knob.combined`. Errors are of what
+    the tables render, against the most accurate fits of the knob ``effort``.
     """
 
     name = TOGETHER
     title = "All recommended settings at once"
     cost = PROCESSOR
     error = WORST
-    against = "the most thorough effort that was measured"
+    against = "the most thorough effort"
+    of_torque, stand_in, combined = True, True, True
 
     def __init__(self, choices: tuple[tuple[str, str], ...]) -> None:
         self.choices = choices

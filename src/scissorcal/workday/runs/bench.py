@@ -195,8 +195,11 @@ class _Run:
         return tuple(curve_of(case, make_knob(name), self._of(name), limit) for name in names)
 
     def together(self, pool: Pool, curves: "Sequence[Curve]") -> "Curve | None":
-        """Measure the present and all recommended settings; None where they are the same."""
-        from scissorcal.bench.trade.assemble import measured_curve, reference_sample
+        """Measure the present and all recommended settings.
+
+        None where they are the same, but for settings that this measurement does not hold.
+        """
+        from scissorcal.bench.trade.assemble import measured_curve, reference_of
         from scissorcal.bench.trade.knob import make_knob
         from scissorcal.bench.trade.recommend import choices_of, together_sentence
         from scissorcal.bench.trade.schedule import Schedule
@@ -204,14 +207,20 @@ class _Run:
         from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
 
         effort = make_knob("effort")
-        reference = reference_sample(self._case, effort, self._of("effort"))
+        reference, against = reference_of(self._case, effort, self._of("effort"))
         choices = choices_of(curves)
         if reference is None or not choices:
             return None
         present = {c.knob: p.setting.label for c in curves for p in c.points if p.setting.present}
-        changed = tuple(pair for pair in choices if present.get(pair[0]) != pair[1])
+        differing = [pair for pair in choices if present.get(pair[0]) != pair[1]]
+        changed = tuple(pair for pair in differing if make_knob(pair[0]).combined)
         if not changed:
             return None
+        apart = [
+            f"{make_knob(name).title} ({label})"
+            for name, label in differing
+            if not make_knob(name).combined
+        ]
         tasks = [PRESENT_TASK, Task(TOGETHER, RECOMMENDED, choices=changed)]
         known = {key_of(record) for record in self._file.records}
         left = [task for task in tasks if task.key not in known]
@@ -230,8 +239,7 @@ class _Run:
         keys = {task.key for task in tasks}
         own = [record for record in self._of(TOGETHER) if key_of(record) in keys]
         curve = measured_curve(self._case, knob, own, reference)
-        against = next((one.against for one in curves if one.knob == "effort"), curve.against)
-        told = (together_sentence(curve),)
+        told = (together_sentence(curve, apart),)
         return replace(curve, against=against, sentences=told) if own else None
 
     def result(

@@ -62,6 +62,7 @@ class CandidateKnob(ABC):
     cost = PROCESSOR
     error = WORST
     against = "the candidate that the data support"
+    of_torque, stand_in, combined = True, False, True
     fits = "cut"
     slow: ClassVar[Mapping[str, float]] = {}
     """How many times as long as others some candidates take: a first guess for the schedule."""

@@ -25,6 +25,7 @@ class Edge(CandidateKnob):
     name, title = "edge", "Candidate: edge"
     cost = BYTES
     against = "the edge of the present fit"
+    combined = False  # a fit has the edge that photographs gave it
 
     def candidates(self, case: Case) -> Sequence[str]:
         """Those below the fitted edge, and that one itself."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import get_args
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.fits import PROCESSOR
+from scissorcal.bench.trade.fits import DRAFT_NOTE, PROCESSOR
 from scissorcal.bench.trade.knobs.fit_knob import FitKnob
 from scissorcal.bench.trade.point import Setting
 from scissorcal.calibration import result
@@ -20,7 +20,7 @@ class Effort(FitKnob):
     name = "effort"
     title = "Effort of the fits"
     cost = PROCESSOR
-    against = "the most thorough effort that was measured"
+    against = "the most thorough effort"
 
     def missing(self, case: Case) -> str:
         """Every scene with a fit has it."""
@@ -29,7 +29,15 @@ class Effort(FitKnob):
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Draft, standard and thorough."""
         return tuple(
-            Setting(effort, place, effort, "both fits", effort == case.effort, place)
+            Setting(
+                effort,
+                place,
+                effort,
+                "both fits",
+                present=effort == case.effort,
+                accuracy=place,
+                remark=DRAFT_NOTE if effort == "draft" else "",
+            )
             for place, effort in enumerate(EFFORTS, start=1)
         )
 

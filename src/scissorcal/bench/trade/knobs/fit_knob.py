@@ -13,6 +13,7 @@ class FitKnob(ABC):
     """Both fits are made anew with a setting; errors are those of parameters and of torque."""
 
     error = BAND_WORST
+    of_torque, stand_in, combined = True, True, True
 
     @abstractmethod
     def applied(self, case: Case, setting: Setting) -> Case:

@@ -47,6 +47,7 @@ class Photographs:
     cost = PROCESSOR
     error = WORST
     against = "the edge from all photographs at their full width"
+    of_torque, stand_in, combined = True, False, True
 
     def missing(self, case: Case) -> str:
         """Where the recipe states the edge, or nothing was photographed."""
@@ -116,6 +117,7 @@ class Plate:
     cost = PROCESSOR
     error = PLACE
     against = "the plate's pose from all photographs at their full width"
+    of_torque, stand_in, combined = False, False, False
 
     def missing(self, case: Case) -> str:
         """Where the recipe states the pose, or nothing was photographed."""

@@ -42,6 +42,8 @@ class Rate:
     cost = "share of a core"
     error = AVERAGE
     against = "the continuous torque: the same tables stepped at 64 kHz with the true rate"
+    of_torque, stand_in = True, False
+    combined = False  # that of the tables is the torque of a loop of any rate
 
     def missing(self, case: Case) -> str:
         """Where nothing is rendered no loop runs."""
@@ -108,6 +110,7 @@ class Rate:
             label: Error(found[name], "N m", found[name] / largest) for label, name in names.items()
         }
         for label, name in ((IN_HAND, "in_hand"), (ALONE, "alone")):
-            if found.get(name) is not None:
-                errors[label] = Error(found[name], "", guarded=True)
+            # None is what an infinite number is kept as; without a rig there is none at all
+            margin = math.inf if found.get(name, math.nan) is None else found.get(name, math.nan)
+            errors[label] = Error(margin, "", guarded=True)
         return errors

@@ -48,6 +48,7 @@ class Tables:
     cost = BYTES
     error = WORST
     against = "the exact model in float64, without tables"
+    of_torque, stand_in, combined = True, False, True
 
     def missing(self, case: Case) -> str:
         """Where nothing is rendered there are no tables."""

@@ -20,7 +20,7 @@ class Window(FitKnob):
     name = "window"
     title = "Windows of the friction fit"
     cost = PROCESSOR
-    against = "the shortest windows whose fits pass the checks that the present ones pass"
+    against = "the shortest windows"
 
     def missing(self, case: Case) -> str:
         """Every scene with a fit of friction has it."""
