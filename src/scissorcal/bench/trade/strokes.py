@@ -18,6 +18,10 @@ doi:10.1523/JNEUROSCI.05-07-01688.1985)."""
 SLOWEST_PEAK_rad_per_s = 0.1
 """A scene that begins at rest gets no slower stroke: it would last for minutes."""
 
+SHEET_SHIFT_m = 2e-3
+"""A few teeth of paper. In which phase of a tooth a stroke turns round is chance: a crack one tooth
+ahead there is 20 % of the torque until the blades open, so repeats begin at different edges."""
+
 
 @dataclass(frozen=True)
 class Stroke:
@@ -47,19 +51,20 @@ class Stroke:
         return opening, np.where(closing, way, -way) * grade / self.half_s
 
 
-def hand_strokes(recipe: Recipe) -> tuple[Stroke, ...]:
+def hand_strokes(recipe: Recipe, shift: float = 0.0) -> tuple[Stroke, ...]:
     """Strokes over the scene's openings whose peak rates span its rates.
 
     Where the scene cuts, each starts on a sheet whose near edge is at the scene's nearest contact,
-    and the crack runs through the others; where it only presses, each is at another contact of the
-    scene.
+    or farther by ``shift`` (0 to 1) of :data:`SHEET_SHIFT_m`, and the crack runs through the
+    others; where it only presses, each is at another contact of the scene.
     """
     scene = recipe.scene
     low, high = scene.opening_rad
     slow, fast = scene.opening_rate_rad_per_s
     peaks = np.geomspace(min(max(2.0 * slow, SLOWEST_PEAK_rad_per_s), fast), fast, SPEEDS)
     nearest, farthest = scene.contact_m
-    contacts = np.linspace(nearest, nearest if scene.cut else farthest, SPEEDS)
+    edge = nearest + shift * min(SHEET_SHIFT_m, farthest - nearest)
+    contacts = np.full(SPEEDS, edge) if scene.cut else np.linspace(nearest, farthest, SPEEDS)
     return tuple(
         Stroke(high, low, PEAK_OVER_MEAN * (high - low) / float(peak), float(contact))
         for peak, contact in zip(peaks, contacts, strict=True)

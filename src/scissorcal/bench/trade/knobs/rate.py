@@ -67,13 +67,14 @@ class Rate:
         return 1.5 + 2e-4 * float(setting.value)
 
     def repeats(self, case: Case, setting: Setting) -> int:
-        """Each repeat begins its samples at another part of a tick."""
+        """Each repeat begins at another part of a tick, and on a sheet with another near edge."""
         return 3
 
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Render the strokes at this rate, and time the loop on frames of the middle one."""
         rate, model = float(setting.value), compiled(case)
-        strokes, limits = hand_strokes(case.recipe), case.recipe.limits
+        phase, shift = np.random.default_rng([case.seed, repeat]).uniform(size=2)
+        strokes, limits = hand_strokes(case.recipe, float(shift)), case.recipe.limits
         rig = known_rig(case)
         frame_s = frame_time_s(model.tables, strokes[1], rate, limits)
         found = rendered_error(
@@ -84,7 +85,7 @@ class Rate:
             limit=limits.torque_Nm,
             cutoff_Hz=RATE_CUTOFF_HZ,
             encoder_step=rig.encoder_step_rad if rig else 0.0,
-            phase=float(np.random.default_rng([case.seed, repeat]).uniform()),
+            phase=float(phase),
         )
         outcome: dict[str, Any] = {**vars(found)}
         if rig:
