@@ -265,6 +265,7 @@ def test_a_capture_until_a_tolerance_is_incomplete_for_a_tighter_one(recording, 
     (sentence,) = lacks(tight)
     assert "ended within 7 % at 95 % confidence" in sentence
     assert f"{tight:g} %" in sentence
+    assert "scissorcal capture friction --until-tolerance" in sentence
 
 
 def test_a_capture_of_the_list_beside_one_until_the_tolerance_keeps_its_own_plan(recording):

@@ -184,7 +184,7 @@ def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Complete
     missing = [*_missing_cells(cells), *_missing_strokes(strokes), *_missing_sheets(sheets)]
     until = pairs[0][0].get("until")
     if until:
-        missing = _missing_tolerance(UntilMark.of(until), recipe)
+        missing = _missing_tolerance(UntilMark.of(until), recipe, kind)
     excitation = None
     planned_s = recipe.capture.friction.excitation_s
     if pairs[0][0].get("designed"):
@@ -211,7 +211,7 @@ def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Complete
     )
 
 
-def _missing_tolerance(mark: UntilMark, recipe: Recipe) -> list[str]:
+def _missing_tolerance(mark: UntilMark, recipe: Recipe, kind: CaptureKind) -> list[str]:
     """What a capture until the tolerance lacks, by the recipe's tolerance and confidence now."""
     if not mark.reached:
         return [f"the scene's tolerance: {mark.sentence}"]
@@ -222,7 +222,8 @@ def _missing_tolerance(mark: UntilMark, recipe: Recipe) -> list[str]:
     return [
         f"the scene's tolerance: the capture ended within {100 * mark.tolerance:g} % at "
         f"{100 * mark.confidence:g} % confidence, and the recipe now asks for "
-        f"{100 * tolerance:g} % at {100 * confidence:g} %; capture on with --until-tolerance"
+        f"{100 * tolerance:g} % at {100 * confidence:g} %: run 'scissorcal capture "
+        f"{kind} --until-tolerance' once more"
     ]
 
 
