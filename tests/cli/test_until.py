@@ -57,7 +57,7 @@ def test_a_day_until_the_tolerance_on_the_virtual_rig(workspace: Path, cli: Cli)
     said = cli("capture", "cut", "--device", "sim", "--until-tolerance", "--at-least", "5")
     assert said.code == 0, said.err
     assert "tolerance reached at 95 % confidence" in said.out
-    assert re.search(r"[▁▂▃▄▅▆▇█]+ \d strokes, [\d.]+ min: band within 7 %", said.err)
+    assert re.search(r"[▁▂▃▄▅▆▇█]+ \d strokes, [\d.]+ planned min: band within 7 %", said.err)
     last = read_recording(sorted(workspace.glob("captures/cut-*.mcap"))[-1])
     marks = [json.loads(value) for name, value in last.marks if name == UNTIL_MARK]
     assert [one["strokes"] for one in marks] == list(range(len(marks)))

@@ -237,7 +237,7 @@ def test_a_capture_until_the_tolerance_is_judged_by_whether_it_was_reached(recor
     few = replace(recording, strokes=recording.strokes[:2], marks=((UNTIL_MARK, marked("")),))
     went_on = count_recorded(few, RECIPE, "friction")
     (missing,) = found(went_on, None).missing
-    assert missing.startswith("the scene's tolerance: 4 strokes, 1.0 min")
+    assert missing.startswith("the scene's tolerance: 4 strokes, 1.0 planned min")
     marks = (*few.marks, (UNTIL_MARK, marked("tolerance", 0.96)))
     reached = count_recorded(replace(few, marks=marks), RECIPE, "friction")
     assert found(reached, None).missing == ()
@@ -248,6 +248,24 @@ def test_a_capture_until_the_tolerance_is_judged_by_whether_it_was_reached(recor
     both = completeness([went_on, reached], RECIPE, "friction", None)
     assert both.missing == ()
     assert completeness([reached, went_on], RECIPE, "friction", None).missing
+
+
+@pytest.mark.parametrize("key", ["tolerance_percent", "confidence_percent"])
+def test_a_capture_until_a_tolerance_is_incomplete_for_a_tighter_one(recording, key):
+    marks = ((UNTIL_MARK, marked("tolerance", 0.96)),)
+    count = count_recorded(replace(recording, marks=marks), RECIPE, "friction")
+
+    def lacks(value):
+        scene = RECIPE.scene.model_copy(update={key: value})
+        recipe = RECIPE.model_copy(update={"scene": scene})
+        return completeness([count], recipe, "friction", None).missing
+
+    tight, same, loose = (3.0, 7.0, 9.0) if key == "tolerance_percent" else (99.0, 95.0, 90.0)
+    assert lacks(same) == lacks(loose) == ()
+    (sentence,) = lacks(tight)
+    assert "ended within 7 % at 95 % confidence" in sentence
+    assert f"{tight:g} %" in sentence
+    assert "scissorcal capture friction --until-tolerance" in sentence
 
 
 def test_a_capture_of_the_list_beside_one_until_the_tolerance_keeps_its_own_plan(recording):

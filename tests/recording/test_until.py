@@ -15,7 +15,7 @@ def test_the_last_mark_counts_and_comes_back_as_it_was() -> None:
     assert UntilMark.last_of([("stop", "STUCK")]) is None
 
 
-@pytest.mark.parametrize("ended", ["", "time", "out of reach"])
+@pytest.mark.parametrize("ended", ["", "time", "out of reach", "no fit"])
 def test_only_the_tolerance_counts_as_reached(ended: str) -> None:
     mark = UntilMark(ended, 3, 2, 1.2, 0.4, 0.99, 0.04, 0.07, 0.95, why="Friction is widest.")
     assert not mark.reached

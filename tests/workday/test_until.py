@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.design import expected_band
+from scissorcal.device.parts import Part
+from scissorcal.package.scene_slopes import torque_knowledge
 from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Recording, Stroke
 from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.until import UntilMark
 from scissorcal.workday.stock import EXCITATION_S
-from scissorcal.workday.until import Earlier, Limits, UntilTolerance, largest_cause, shares_used
+from scissorcal.workday.until import (
+    NO_FIT,
+    Earlier,
+    Limits,
+    UntilTolerance,
+    largest_cause,
+    shares_used,
+)
 from tests.calibration.design.test_choice import known, tells
 from tests.device.conftest import IDENTITY
 
@@ -44,6 +55,48 @@ def test_strokes_that_cannot_be_fitted_use_up_their_minutes_and_say_why() -> Non
     assert last.within is None
     assert "cannot be fitted" in last.why
     assert parts < 10
+
+
+def scene(**changed: object) -> Recipe:
+    return RECIPE.model_copy(update={"scene": RECIPE.scene.model_copy(update=changed)})
+
+
+def after_a_failed_fit(recipe: Recipe) -> tuple[UntilMark, Part | None]:
+    """What follows sweeps that were fitted, and one more with which they cannot be."""
+    choose = UntilTolerance("friction", recipe, IDENTITY, Earlier(), Limits(60.0))
+    part = choose(NOTHING, 0.0)
+    assert part is not None
+    told = [offer.told for offer in choose._stock.sweeps.values()]
+    knowledge = choose._friction.knowledge.plus(sum(told[1:], told[0]))
+    choose._friction = replace(choose._friction, knowledge=knowledge)
+    following = choose(replace(NOTHING, strokes=part.strokes), 0.0)
+    return choose.marks[-1], following
+
+
+def test_a_failed_fit_within_the_tolerance_ends_the_capture_and_says_why() -> None:
+    mark, following = after_a_failed_fit(scene(tolerance_percent=50.0))
+    assert following is None
+    assert mark.ended == "no fit"
+    assert not mark.reached
+    assert mark.why.startswith("The strokes so far cannot be fitted")
+    assert len(mark.why) > len(NO_FIT) + 10
+
+
+def test_after_a_failed_fit_nothing_is_said_to_be_out_of_reach() -> None:
+    """Its band is that of fewer strokes; further ones are taken."""
+    mark, following = after_a_failed_fit(scene(tolerance_percent=0.01))
+    assert mark.ended == ""
+    assert following is not None
+
+
+def test_friction_that_is_not_rendered_is_judged_by_what_was_measured() -> None:
+    """The cut's offsets change no torque before a cut is known: friction's own level counts."""
+    recipe = scene(render_friction=False)
+    choose = UntilTolerance("friction", recipe, IDENTITY, Earlier(), Limits(4.0))
+    known = torque_knowledge(recipe, choose._friction, choose._cut)
+    assert not choose._judge(known).reached
+    told = [offer.told for offer in choose._stock.sweeps.values()]
+    assert choose._judge(known.plus(sum(told[1:], told[0]))).reached
 
 
 def test_sweeps_count_by_what_the_fit_used_of_them() -> None:

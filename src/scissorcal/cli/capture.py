@@ -84,8 +84,9 @@ MaxMinutes = Annotated[
         "--max-minutes",
         metavar="MIN",
         callback=positive,
-        help="With --until-tolerance: end after so many minutes at the rig, with the time that the "
-        "recipe gives a person; by default those that the recipe's list takes.",
+        help="With --until-tolerance: take no stroke that ends after so many planned minutes "
+        "(motion, and the time that the recipe gives a person); the first part always runs. By "
+        "default those that the recipe's list takes.",
     ),
 ]
 
@@ -151,7 +152,7 @@ def cut(
       ...
       $ scissorcal capture cut --device sim --until-tolerance
       ...
-      7 strokes, 1.7 min: band within 7 % at 96 % of felt places (median 1.5 %); tolerance
+      7 strokes, 1.7 planned min: band within 7 % at 96 % of felt places (median 1.5 %); tolerance
       reached at 95 % confidence
     """
     rig = _Rig(device, seed, realtime, baud)

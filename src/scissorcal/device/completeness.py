@@ -18,6 +18,9 @@ from scissorcal.recording.until import UntilMark
 EXCITATION_SHARE = 0.95
 """Share of the planned excitation that must be recorded: its ramps are labelled as pauses."""
 
+SAME = 1e-9
+"""Shares that differ by less are one: of percents in a recipe and in a mark."""
+
 NAMED = 3
 """Ranges of opening that a sentence lists before it only counts them."""
 
@@ -181,8 +184,7 @@ def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Complete
     missing = [*_missing_cells(cells), *_missing_strokes(strokes), *_missing_sheets(sheets)]
     until = pairs[0][0].get("until")
     if until:
-        mark = UntilMark.of(until)
-        missing = [] if mark.reached else [f"the scene's tolerance: {mark.sentence}"]
+        missing = _missing_tolerance(UntilMark.of(until), recipe, kind)
     excitation = None
     planned_s = recipe.capture.friction.excitation_s
     if pairs[0][0].get("designed"):
@@ -207,6 +209,22 @@ def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Complete
         tuple(_little_used(cells)),
         excitation,
     )
+
+
+def _missing_tolerance(mark: UntilMark, recipe: Recipe, kind: CaptureKind) -> list[str]:
+    """What a capture until the tolerance lacks, by the recipe's tolerance and confidence now."""
+    if not mark.reached:
+        return [f"the scene's tolerance: {mark.sentence}"]
+    tolerance = 0.01 * recipe.scene.tolerance_percent
+    confidence = 0.01 * recipe.scene.confidence_percent
+    if mark.tolerance <= tolerance + SAME and mark.confidence >= confidence - SAME:
+        return []
+    return [
+        f"the scene's tolerance: the capture ended within {100 * mark.tolerance:g} % at "
+        f"{100 * mark.confidence:g} % confidence, and the recipe now asks for "
+        f"{100 * tolerance:g} % at {100 * confidence:g} %: run 'scissorcal capture "
+        f"{kind} --until-tolerance' once more"
+    ]
 
 
 _Pairs = Sequence[tuple[Counts, Counts | None]]

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.paths import PathBuilder, Reference
@@ -17,7 +18,8 @@ from scissorcal.device.trajectory import (
     friction_plan,
 )
 from scissorcal.kernel import Identity
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe
 from scissorcal.recording import Stroke
 
 
@@ -58,7 +60,7 @@ def sweep_part(
             "excitation_s": excitation_s or recipe.capture.friction.excitation_s,
         }
     )
-    plan = friction_plan(_with(recipe, "friction", wanted), identity, advance)
+    plan = friction_plan(with_capture(recipe, "friction", wanted), identity, advance)
     count = 2 * len(speeds) + (excitation_s > 0.0)
     (whole,) = plan.segments
     return _numbered(plan, whole, range(count), first)
@@ -84,7 +86,7 @@ def stroke_part(
     wanted = recipe.capture.cut.model_copy(
         update={"speeds_rad_per_s": (speed,), "strokes_per_sheet": places, "sheets": 1}
     )
-    plan = cut_plan(_with(recipe, "cut", wanted), identity)
+    plan = cut_plan(with_capture(recipe, "cut", wanted), identity)
     (whole,) = plan.segments
     request = (
         f"Put in a fresh piece of {recipe.material.name} (piece {sheet + 1}), its near edge at the "
@@ -120,13 +122,8 @@ def _from_clear(part: Part, every: Reference, tick_s: float) -> Part:
 def _numbered(plan: Plan, segment: Segment, wanted: Iterable[int], first: int) -> Part:
     """The strokes ``wanted`` of a segment, numbered from ``first``, with the pause before them."""
     labels = segment.reference.stroke
-    marked = np.flatnonzero(labels >= 0)
-    following = np.searchsorted(marked, np.arange(len(labels)))
-    owner = np.where(
-        following < len(marked), labels[marked[np.minimum(following, len(marked) - 1)]], -1
-    )
     kept = tuple(wanted)
-    inside = np.isin(owner, kept)
+    inside = np.isin(stroke_of_tick(labels), kept)
     table = np.full(labels.max() + 2, -1, dtype=np.int32)
     table[list(kept)] = np.arange(first, first + len(kept))
     found = segment.reference
@@ -145,6 +142,14 @@ def _numbered(plan: Plan, segment: Segment, wanted: Iterable[int], first: int) -
     return Part(replace(segment, reference=Reference.joined([cut, rest.reference()])), strokes)
 
 
-def _with(recipe: Recipe, kind: str, wanted: object) -> Recipe:
+def stroke_of_tick(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The stroke of each tick (n,), a pause's being the one after it; -1 after the last one."""
+    marked = np.flatnonzero(labels >= 0)
+    following = np.searchsorted(marked, np.arange(len(labels)))
+    return np.append(labels[marked], np.int32(-1))[following]
+
+
+def with_capture(recipe: Recipe, kind: CaptureKind, wanted: CaptureFriction | CaptureCut) -> Recipe:
+    """The recipe with another list of one kind of capture."""
     capture = recipe.capture.model_copy(update={kind: wanted})
     return recipe.model_copy(update={"capture": capture})

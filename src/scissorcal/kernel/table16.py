@@ -35,7 +35,11 @@ class Row16:
 
     @classmethod
     def spanning(cls, low: float, high: float) -> "Row16":
-        """The finest row that reaches from ``low`` to ``high``; 0 is stored as exactly 0."""
+        """The finest row that reaches from ``low`` to ``high``.
+
+        It begins at exactly 0 where ``low`` is 0, or above 0 and below ``NEAR_ZERO`` of ``high``.
+        Where ``low`` is below 0, a value of 0 is rounded as any other.
+        """
         low = 0.0 if 0.0 <= low < NEAR_ZERO * high else low
         if not high > low:
             return cls(float(np.float32(low)), 0.0)

@@ -21,7 +21,7 @@ from scissorcal.model.curvature import (
 )
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_tables
-from scissorcal.package.grid import Points, spread_points
+from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, fit_table
 from scissorcal.recipe.schema import Recipe
@@ -313,10 +313,7 @@ def _reach(model: ExactModel, points: Points, limit: float) -> _Reach:
     indentation = np.where(ran | (view.station < edge.length_m), cutting.upper_face_m - height, 0.0)
     touching = indentation > 0
     if not np.any(touching):
-        raise InputError(
-            "Nowhere in the scene do the blades touch the material, so nothing can be rendered: "
-            "check scene.opening_deg and scene.contact_mm against rig.edge in the recipe."
-        )
+        raise InputError(NOTHING_TOUCHED)
     lever = np.abs(view.lever)
     if cutting.closure == "eq4":
         lever = np.abs(place) / np.sqrt(1.0 + edge.slope_at(station) ** 2)

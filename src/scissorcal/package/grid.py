@@ -9,6 +9,10 @@ from scissorcal.package.manifest import Ranges
 
 Array = NDArray[np.float64]
 
+NOTHING_TOUCHED = (
+    "Nowhere in the scene do the blades touch the material, so nothing can be rendered: "
+    "check scene.opening_deg and scene.contact_mm against rig.edge in the recipe."
+)
 FELT_SHARE = 0.05
 """Torques below this share of the scene's largest are not held to the tolerance."""
 

@@ -12,7 +12,9 @@ from scissorcal.calibration.design.band import SceneSlopes, TorqueKnowledge
 from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.design.state import CutState, FrictionState, sharing_of
 from scissorcal.calibration.parameters import Layout
+from scissorcal.errors import InputError
 from scissorcal.package.exact import ExactModel, FitDraws, central_model, exact_model
+from scissorcal.package.grid import NOTHING_TOUCHED
 from scissorcal.package.scene_torque import felt_places, scene_grid
 from scissorcal.recipe.schema import Recipe
 
@@ -56,7 +58,7 @@ def scene_slopes(recipe: Recipe, cut: Law, friction: Law) -> SceneSlopes:
 
     Differences reach a standard deviation to either side, at most ``LARGEST_STEP`` of the
     coordinate. Where the torque is at the recipe's limit, the limit is rendered and slopes are
-    zero.
+    zero. Raises InputError where no place of the scene can be felt.
     """
     rendered = recipe.scene.render_friction
     centre = central_model(cut.draws(cut.u[None]), friction.draws(friction.u[None]))
@@ -66,6 +68,8 @@ def scene_slopes(recipe: Recipe, cut: Law, friction: Law) -> SceneSlopes:
     limit = recipe.limits.torque_Nm
     torque = np.clip(np.ravel(centre.torque(*grid)), -limit, limit)
     felt = felt_places(centre, grid, torque)
+    if not felt.any():
+        raise InputError(NOTHING_TOUCHED)
     places = tuple(array[felt] for array in grid)
     torque = torque[felt]
     free = np.abs(torque) < limit

@@ -28,6 +28,7 @@ from scissorcal.package.compile import (
     table_of_law,
 )
 from scissorcal.package.exact import ExactModel
+from scissorcal.package.stated_bound import GRID_POINTS
 from scissorcal.package.table_cost import bytes_of
 from scissorcal.package.tables import NumberFormat, Rows
 from scissorcal.recipe.schema import Recipe
@@ -36,8 +37,6 @@ TOLERANCES = tuple(0.2 * 0.5**step for step in range(18))
 """Of a table, as a share of its value: from 20 % down to 1.5e-6."""
 
 SEARCH_POINTS = 5_000
-GRID_POINTS = 40_000
-"""As many as the stated bound is measured on."""
 BUDGETS = tuple(0.85**step for step in range(24))
 """Shares of what is allowed that the tables' single deviations may add up to: from all to 2 %."""
 

@@ -12,6 +12,7 @@ from scissorcal.package.table_record import Bound, TableBound
 from scissorcal.recipe.schema import Recipe
 
 GRID_POINTS = 40_000
+"""Places at which the deviation is measured; the search for the smallest tables uses as many."""
 
 _UNITS = {"edge": "m", "response": "N", "mean_energy": "J/m", "friction_angle": "1"}
 

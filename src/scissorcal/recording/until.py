@@ -16,9 +16,11 @@ class UntilMark:
     """How far a capture was from the scene's tolerance after so many strokes.
 
     ``ended`` is "tolerance" (it is reached), "time" (the minutes allowed are used up), "out of
-    reach" (further strokes are not expected to reach it), or empty: the capture went on, or was
-    interrupted. ``minutes`` are at the rig with what a person does, ``minutes_left`` those expected
-    still, None where nothing is known. ``within`` is the share of the places that can be felt whose
+    reach" (further strokes are not expected to reach it), "no fit" (the last strokes cannot be
+    fitted, and no stroke is expected to help), or empty: the capture went on, or was interrupted.
+    ``minutes`` are those planned so far, not measured: of motion, of the least pauses for the fit,
+    and of what the recipe gives a person; ``minutes_left`` those expected still, None where nothing
+    is known. ``within`` is the share of the places that can be felt whose
     band is within ``tolerance`` at ``confidence``, ``needed`` the share that counts as reached;
     ``typical`` is half of the band at the median place as a share of the torque. Both are None
     before the first fit. ``friction_alone``: the band is of friction only, which may take half of
@@ -48,7 +50,7 @@ class UntilMark:
         """How far it is, in one line.
 
         >>> UntilMark("", 5, 2, 1.6, 0.8, 0.83, 0.041, 0.07, 0.95).sentence.partition(" (")[0]
-        '5 strokes, 1.6 min: band within 7 % at 83 % of felt places'
+        '5 strokes, 1.6 planned min: band within 7 % at 83 % of felt places'
         """
         band = "no fit yet"
         if self.within is not None and self.typical is not None:
@@ -57,7 +59,7 @@ class UntilMark:
                 f"{whose}within {100 * self.tolerance:g} % at {100 * self.within:.0f} % of felt "
                 f"places (median {100 * self.typical:.1f} %)"
             )
-        head = f"{self.strokes} strokes, {self.minutes:.1f} min: {band}"
+        head = f"{self.strokes} strokes, {self.minutes:.1f} planned min: {band}"
         if self.reached:
             return f"{head}; tolerance reached at {100 * self.confidence:g} % confidence"
         if self.ended:

@@ -21,6 +21,7 @@ from scissorcal.calibration.signals.filtering import rate_floor_of_step
 from scissorcal.calibration.signals.weak_form import RATE_BAND
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import IDLE_S
+from scissorcal.device.parts import stroke_of_tick, with_capture
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
 from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.schema import Recipe
@@ -152,7 +153,7 @@ def _sweeps(
     wanted = recipe.capture.friction.model_copy(
         update={"speeds_rad_per_s": speeds, "repeats": 1, "excitation_s": EXCITATION_S}
     )
-    plan = friction_plan(_with(recipe, "friction", wanted), identity)
+    plan = friction_plan(with_capture(recipe, "friction", wanted), identity)
     told = _told_by_sweeps(recipe, identity, friction, plan)
     none = Information.none(len(friction.knowledge.point))
     seconds = _seconds_by_stroke(plan.segments[0], plan)
@@ -178,7 +179,7 @@ def _strokes(
         wanted = recipe.capture.cut.model_copy(
             update={"speeds_rad_per_s": (speed,), "strokes_per_sheet": MOST_PLACES, "sheets": 1}
         )
-        plan = cut_plan(_with(recipe, "cut", wanted), identity)
+        plan = cut_plan(with_capture(recipe, "cut", wanted), identity)
         (segment,) = plan.segments
         told = _told_by_strokes(recipe, identity, friction, cut, plan, segment)
         seconds = _seconds_by_stroke(segment, plan)
@@ -228,11 +229,6 @@ def _told_by_strokes(
     return cut_information(design, known.point) if design else {}
 
 
-def _with(recipe: Recipe, kind: str, wanted: object) -> Recipe:
-    capture = recipe.capture.model_copy(update={kind: wanted})
-    return recipe.model_copy(update={"capture": capture})
-
-
 def _motion(segment: Segment, plan: Plan, identity: Identity) -> PlannedMotion:
     reference = segment.reference
     return PlannedMotion(
@@ -249,10 +245,8 @@ def _motion(segment: Segment, plan: Plan, identity: Identity) -> PlannedMotion:
 
 def _seconds_by_stroke(segment: Segment, plan: Plan) -> Mapping[int, float]:
     """Seconds of each stroke, with the pause before it; what follows the last one counts to it."""
-    labels = segment.reference.stroke
-    marked = np.flatnonzero(labels >= 0)
-    following = np.searchsorted(marked, np.arange(len(labels)))
-    owner = labels[marked[np.minimum(following, len(marked) - 1)]]
+    owner = stroke_of_tick(segment.reference.stroke)
+    owner[owner < 0] = owner[owner >= 0][-1]
     strokes, counts = np.unique(owner, return_counts=True)
     return {
         int(stroke): plan.tick_s * int(count) for stroke, count in zip(strokes, counts, strict=True)

@@ -48,7 +48,10 @@ deviations."""
 
 @dataclass(frozen=True)
 class Limits:
-    """At least so many strokes (pairs of sweeps), at most so many minutes at the rig."""
+    """At least so many strokes (pairs of sweeps), at most so many planned minutes.
+
+    The first part runs in any case.
+    """
 
     max_minutes: float
     at_least: int = 0
@@ -92,7 +95,6 @@ class UntilTolerance:
         self._earlier, self._limits = earlier, limits
         self._seed = seed
         self._taken = Taken()
-        self._count = 0
         self._seconds = 0.0
         self._why_no_fit = ""
         self._used: dict[float, float] = {}
@@ -244,6 +246,8 @@ class UntilTolerance:
             mark = replace(mark, within=band.within, typical=band.typical)
         if ended == "time":
             return replace(mark, why=self._why_time(known, view, minutes))
+        if ended == "no fit":
+            return replace(mark, why=f"{NO_FIT} {self._why_no_fit}")
         return replace(mark, why=self._largest(known)) if ended == "out of reach" else mark
 
     def _state(self, ended: str, minutes_left: float | None) -> UntilMark:
@@ -274,7 +278,7 @@ class UntilTolerance:
 
     def _why_time(self, known: TorqueKnowledge, view: Outlook, minutes: float) -> str:
         """Why the minutes were too few, and what would help."""
-        used = f"The {self._limits.max_minutes:.1f} min allowed are used up"
+        used = f"The {self._limits.max_minutes:.1f} planned min allowed are used up"
         if self._why_no_fit:
             return f"{used}, and the strokes so far cannot be fitted: {self._why_no_fit}"
         if not view.reaches:
@@ -288,11 +292,14 @@ class UntilTolerance:
         return FRICTION_BOUNDS if self._friction_alone else largest_cause(known)
 
     def _ended(self, band: Band, view: Outlook, least: int, minutes: float) -> str:
-        if self._taken.strokes and not least and begun(self._stock, self._kind, self._taken):
-            if self._fitted and not self._why_no_fit and band.reached:
+        enough = not least and begun(self._stock, self._kind, self._taken)
+        if enough and self._fitted and not self._why_no_fit:
+            if band.reached:
                 return "tolerance"
-            if self._fitted and not view.reaches:
+            if not view.reaches:
                 return "out of reach"
+        if self._why_no_fit and view.following is None:
+            return "no fit"
         next_s = view.following.seconds if view.following else 0.0
         if self._taken.strokes and minutes + next_s / 60.0 > self._limits.max_minutes:
             return "time"
@@ -326,6 +333,10 @@ def _differ(now: FrictionState | CutState, then: FrictionState | CutState) -> bo
 
 NOTABLE = 0.2
 """Share by which the excess over the tolerance falls where a cause is named as the largest."""
+NO_FIT = (
+    "The strokes so far cannot be fitted, and no further stroke is expected to help; capture again "
+    "once what the fit says is mended:"
+)
 FRICTION_BOUNDS = (
     "What differs between strokes of friction bounds it: clean and oil the pivot, let the rig run "
     "for some minutes and capture friction again, or raise scene.tolerance_percent."

@@ -61,6 +61,24 @@ def test_the_outlook_counts_strokes_until_the_band_is_within_the_tolerance() -> 
     assert view.seconds == pytest.approx(4.0 + 3 * 34.0 - 2 * 30.0)
 
 
+def test_a_single_speed_on_offer_goes_on_in_the_piece_that_was_begun() -> None:
+    """Another speed is asked for only where there is one."""
+    offers = stock()
+    slow = {key: offer for key, offer in offers.strokes.items() if key[0] == 0.1}
+    offers = replace(offers, strokes=slow)
+    start = known(tolerance=0.99).plus(tells(1e6), tells(1e6, 3))
+    view = outlook(start, offers, "cut", Taken(((0.1, 0),)), expected_band)
+    assert view.following is not None
+    assert (view.following.speed, view.following.place) == (0.1, 1)
+    assert view.strokes == 3
+
+
+def test_nothing_on_offer_is_no_next_stroke() -> None:
+    view = outlook(known(), replace(stock(), sweeps={}), "friction", Taken(), friction_alone)
+    assert view.following is None
+    assert not view.reaches
+
+
 def test_strokes_that_are_asked_for_come_also_within_the_tolerance() -> None:
     start = known(tolerance=0.9).plus(tells(1e6), tells(1e4, 3))
     assert outlook(start, stock(), "cut", BEGUN, expected_band).following is None
@@ -101,3 +119,17 @@ def test_friction_alone_may_take_half_of_the_tolerance() -> None:
     assert view.following is not None
     assert view.following.speed == 1.0
     assert view.reaches
+
+
+def test_friction_that_is_not_rendered_counts_by_the_level_that_the_cut_takes_off() -> None:
+    """The level has slope 1e-3 N m, which is 1 % of a torque of 0.1 N m."""
+    before = known(tolerance=0.03)
+    before = replace(
+        before, scene=replace(before.scene, by_friction=np.zeros_like(before.scene.by_friction))
+    )
+    own = friction_alone(before)
+    np.testing.assert_allclose(own.share, 2.0 * 0.01 / FRICTION_SHARE, rtol=1e-6)
+    assert not own.reached
+    after = friction_alone(before.plus(tells(3.0)))
+    np.testing.assert_allclose(after.share, own.share / 2.0, rtol=1e-6)
+    assert after.reached

@@ -8,9 +8,11 @@ import pytest
 from scissorcal.cli.root import run
 from scissorcal.device.completeness import completeness
 from scissorcal.errors import InputError
-from scissorcal.recording import read_recording
+from scissorcal.recording import Recording, read_recording
+from scissorcal.recording.layout import empty_samples
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
+from scissorcal.workday.runs import design
 from scissorcal.workday.runs.design import design_captures, stored_design
 from scissorcal.workday.workspace import Workspace, create_workspace
 
@@ -115,3 +117,23 @@ def test_on_a_virtual_day_the_designed_list_is_shorter_and_its_band_as_predicted
     assert row.designed_min < row.listed_min
     assert 0.7 < row.from_posterior < 1.4
     assert summary([row])["days"] == 1
+
+
+def test_the_last_rig_is_that_of_the_latest_stamp(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not of the last name: friction sorts after cut whenever it was recorded."""
+    workspace = create_workspace(tmp_path / "day", "press-only")
+    for name in ("friction-20260101T080000Z", "cut-20260102T080000Z"):
+        path = workspace.root / "captures" / f"{name}.mcap"
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    asked: list[str] = []
+
+    def header(path: Path) -> Recording:
+        asked.append(path.stem)
+        return Recording("cut", empty_samples(1))
+
+    monkeypatch.setattr("scissorcal.recording.read_header", header)
+    assert design._last_identity(workspace) is None
+    assert asked == ["cut-20260102T080000Z", "friction-20260101T080000Z"]

@@ -115,9 +115,7 @@ class TorqueKnowledge:
     def cut_given_friction(self) -> Knowledge:
         """Knowledge of the cut, its offsets' priors as wide as friction is known."""
         sharing = self.sharing
-        variance = np.einsum(
-            "ij,jk,ik->i", sharing.slopes, self.friction.covariance, sharing.slopes
-        )
+        variance = quadratic_form(sharing.slopes, self.friction.covariance)
         variance = np.maximum(variance, sharing.floor_sd**2) + sharing.zero_sd**2
         prior = self.cut.prior.copy()
         prior[sharing.places, sharing.places] = 1.0 / variance
@@ -133,12 +131,13 @@ def expected_band(known: TorqueKnowledge) -> Band:
     doi:10.1214/ss/1177009939): of predictions, not of parameters.
     """
     scene = known.scene
-    variance = _form(scene.by_cut, known.cut_given_friction.covariance)
+    variance = quadratic_form(scene.by_cut, known.cut_given_friction.covariance)
     if scene.by_friction.any():
-        variance = variance + _form(scene.by_friction, known.friction.covariance)
+        variance = variance + quadratic_form(scene.by_friction, known.friction.covariance)
     half = scene.reach * np.sqrt(np.maximum(variance, 0.0))
     return Band(half / np.abs(scene.torque), scene.tolerance)
 
 
-def _form(slopes: Array, covariance: Array) -> Array:
+def quadratic_form(slopes: Array, covariance: Array) -> Array:
+    """Variances (n,) of values with slopes (n, p) by parameters of a covariance (p, p)."""
     return np.asarray(np.einsum("ni,ij,nj->n", slopes, covariance, slopes))

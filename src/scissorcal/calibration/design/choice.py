@@ -7,8 +7,8 @@ from typing import Literal
 from scissorcal.calibration.design.band import Band, TorqueKnowledge, expected_band
 from scissorcal.calibration.design.information import Information
 
-WORTH_S = 1e-9
-"""Least gain per second that counts as one."""
+WORTH = 1e-9
+"""Least gain, in e-folds of the excess per minute, that counts as one."""
 MOST_STEPS = 60
 """Strokes added after the first list until the search gives up."""
 FEWEST_SPEEDS = 3
@@ -101,8 +101,9 @@ class CaptureList:
 class Step:
     """One addition to the list, with the band expected before and after it.
 
-    ``gain`` is the fall of the band's excess per minute; ``minutes`` are those of this step,
-    negative where something is left out, ``total_minutes`` those of the list so far.
+    ``gain`` is the fall of the excess per minute of both bands widened by :data:`SPARE`;
+    ``minutes`` are those of this step, negative where something is left out: ``gain`` is then what
+    the excess rises by per minute spared. ``total_minutes`` are those of the list so far.
     """
 
     capture: Capture
@@ -169,7 +170,7 @@ def choose_captures(known: TorqueKnowledge, stock: Stock) -> Design:
         options = list(_options(known, stock, captures))
         judged = [(_judged(known, stock, captures, band, option), option) for option in options]
         if complete:
-            judged = [one for one in judged if one[0].gain > WORTH_S]
+            judged = [one for one in judged if one[0].gain > WORTH]
         if not judged:
             break
         best, (_, _, captures) = max(judged, key=lambda one: one[0].gain)

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.design.band import Band, TorqueKnowledge, expected_band
+from scissorcal.calibration.design.band import Band, TorqueKnowledge, expected_band, quadratic_form
 from scissorcal.calibration.design.choice import (
     FEWEST_PIECES,
     FEWEST_STROKES,
     MOST_STEPS,
-    WORTH_S,
+    WORTH,
     Capture,
     Stock,
 )
@@ -106,8 +106,10 @@ def outlook(
         options = [
             _judged(known, band, capture, offer, judge) for offer in _offers(stock, capture, now)
         ]
+        if not options:
+            break
         best = max(options, key=lambda one: one.gain)
-        if best.gain <= WORTH_S and not needed:
+        if best.gain <= WORTH and not needed:
             break
         chosen.append(best)
         known, band, now = best.known, best.after, now.plus(best.speed, best.place)
@@ -134,11 +136,18 @@ def friction_alone(known: TorqueKnowledge) -> Band:
     """The band that friction's uncertainty alone makes, as if the material were known.
 
     It is twice as wide as its part of the torque's, so that friction counts as reached where it
-    takes ``FRICTION_SHARE`` of the tolerance.
+    takes ``FRICTION_SHARE`` of the tolerance. Where friction is not rendered, it enters the torque
+    by the cut's offsets: the material's torque is what was measured less friction, so that an
+    error of friction counts as one of the torque, as if the cut told nothing of its offsets.
     """
-    material = np.zeros_like(known.scene.by_cut)
-    band = expected_band(replace(known, scene=replace(known.scene, by_cut=material)))
-    return Band(band.share / FRICTION_SHARE, band.tolerance)
+    scene, sharing = known.scene, known.sharing
+    if scene.by_friction.any():
+        material = np.zeros_like(scene.by_cut)
+        share = expected_band(replace(known, scene=replace(scene, by_cut=material))).share
+    else:
+        variance = quadratic_form(sharing.slopes, known.friction.covariance).max()
+        share = scene.reach * np.sqrt(variance) / np.abs(scene.torque)
+    return Band(share / FRICTION_SHARE, scene.tolerance)
 
 
 def bounds(known: TorqueKnowledge) -> dict[str, Band]:
@@ -176,10 +185,11 @@ def _offers(stock: Stock, capture: Capture, taken: Taken) -> Iterator[_Offer]:
     here = taken.next_place
     wanted = min(FEWEST_STROKES, stock.places)
     begins = 0 < here < wanted and taken.pieces <= FEWEST_PIECES
+    other = begins and len(stock.cut_speeds) > 1
     enough = here >= wanted and taken.pieces < FEWEST_PIECES
     last = taken.strokes[-1][0] if taken.strokes else float("nan")
     for speed in stock.cut_speeds:
-        if 0 < here < stock.places and not enough and not (begins and speed == last):
+        if 0 < here < stock.places and not enough and not (other and speed == last):
             offer = stock.strokes[speed, here]
             yield speed, here, offer.told, offer.seconds
         if not begins:

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 class Until:
     """What bounds a capture until the tolerance, and who follows it.
 
-    At least ``at_least`` strokes (pairs of sweeps), at most ``max_minutes`` at the rig: None for
-    those that the recipe's list takes. ``tell`` is called after each update of the fit.
+    At least ``at_least`` strokes (pairs of sweeps), at most ``max_minutes`` planned minutes after
+    the first part, which always runs: None for those that the recipe's list takes. ``tell`` is
+    called after each update of the fit.
     """
 
     at_least: int = 0

@@ -37,7 +37,9 @@ class DesignRow:
 
     ``within`` are shares of the places that can be felt whose band is within the tolerance,
     ``band`` half-widths at the median place, as shares of the torque; before and after.
-    ``gain_per_min`` is by how many e-folds a minute the mean excess over the tolerance falls.
+    ``gain_per_min`` is by how many e-folds a minute the mean excess over the tolerance falls, both
+    bands widened by 10 %. What is left out has negative ``minutes``: what the excess rises by per
+    minute spared.
     """
 
     capture: str
@@ -229,7 +231,8 @@ def _last_identity(workspace: Workspace) -> "Identity | None":
     from scissorcal.recording import read_header
 
     paths = [path for kind in ("friction", "cut") for path in workspace.recordings(kind)]
-    for path in sorted(paths, key=lambda one: one.name, reverse=True):
+    # a name is its kind and its stamp: by the whole name every friction sorts after every cut
+    for path in sorted(paths, key=lambda one: one.stem.partition("-")[2], reverse=True):
         device = read_header(path).device
         if device:
             return identity_of(device)
