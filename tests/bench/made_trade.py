@@ -86,4 +86,19 @@ class Broken(Steps):
         return Sample({self.cost: Quantity(1.0, "s")}, {"error": float("nan")})
 
 
-MADE = {name: f"tests.bench.made_trade:{name.title()}" for name in ("steps", "slow", "broken")}
+class Other(Steps):
+    """Another knob of the same kind."""
+
+    name = "other"
+
+
+class Plate(Steps):
+    """A knob that is named like the one of photographs of the plate."""
+
+    name = "plate"
+
+
+MADE = {
+    name: f"tests.bench.made_trade:{name.title()}"
+    for name in ("steps", "slow", "broken", "other", "plate")
+}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scissorcal.bench.trade.knob import scene_knobs
+from scissorcal.bench.trade.knob import make_knob, scene_knobs
 from scissorcal.bench.trade.study import tasks_of
 from scissorcal.workday.demo.day import make_day
 from scissorcal.workday.engine import Engine
@@ -20,8 +20,6 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 @pytest.mark.slow
 def test_every_knob_of_a_scene_has_one_present_setting(day: Workspace) -> None:
-    from scissorcal.bench.trade.knob import make_knob
-
     case = load_case(Engine.of(day))
     names = scene_knobs(case)
     assert {"effort", "window", "capture", "tables", "rate"} <= set(names)
@@ -34,11 +32,17 @@ def test_every_knob_of_a_scene_has_one_present_setting(day: Workspace) -> None:
 
 @pytest.mark.slow
 def test_a_day_is_measured_within_a_budget_and_goes_on(day: Workspace) -> None:
-    chosen = TradeSettings(knobs=("effort", "tables"), budget_s=60.0)
+    chosen = TradeSettings(knobs=("effort", "tables"), budget_s=30.0)
     first = trade_workspace(day, chosen, workers=2).trade
-    print(f"{first.seconds:.1f} s of {first.budget_s} s allowed")
-    assert first.measured_now == first.measured > 0
+    case = load_case(Engine.of(day))
+    planned = tasks_of(case, chosen.knobs)
+    assert 0 < first.measured == first.measured_now < len(planned)
+    for curve in first.curves:
+        named = [*(point.setting.label for point in curve.points), *curve.unmeasured]
+        assert sorted(named) == sorted(s.label for s in make_knob(curve.knob).settings(case))
+    assert any(curve.unmeasured for curve in first.curves)
     tables = next(curve for curve in first.curves if curve.knob == "tables")
+    assert tables.points
     for point in tables.points:
         assert point.errors[tables.error].value > 0.0
         assert point.costs[tables.cost].median > 0.0

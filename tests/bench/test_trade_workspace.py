@@ -1,6 +1,7 @@
 """`bench trade` in a workspace: measurements kept, runs that go on, files and refusals."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,21 +12,30 @@ import pytest
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
+<<<<<<< HEAD
 from scissorcal.bench.trade.point import Curve, Error, Point, Setting, Spread
 from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
+=======
+from scissorcal.bench.trade.point import Sample, Setting
+from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
+from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER
+>>>>>>> trun
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.runs import bench
 from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace
+from scissorcal.workday.runs.bench_case import ON_A_CLUSTER
 from scissorcal.workday.workspace import Workspace
-from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, made_case
+from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
 from tests.workday.made import quick_workspace
 
 ALL = 2 * (len(ERRORS) + 1)
+FAILED = 2
+"""Measurements of the setting that fails."""
 
 
 @pytest.fixture
@@ -59,9 +69,86 @@ def test_a_run_writes_a_page_and_a_twin_that_keeps_its_schema(workspace: Workspa
 def test_a_second_run_measures_nothing_again(workspace: Workspace) -> None:
     first = run(workspace)
     again = run(workspace)
-    assert (again.trade.measured, again.trade.measured_now) == (ALL, 0)
+    assert (again.trade.measured, again.trade.measured_now) == (ALL, FAILED)
     assert again.trade.curves == first.trade.curves
     assert run(workspace, force=True).trade.measured_now == ALL
+
+
+def test_what_failed_is_tried_again_and_the_newest_counts(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert [p.failed for p in run(workspace).trade.curves[0].points if p.failed]
+    measure = Steps.measure
+
+    def able(self: Steps, case: Case, setting: Setting, repeat: int) -> Sample:
+        return measure(self, case, replace(setting, label="fine"), repeat)
+
+    monkeypatch.setattr(Steps, "measure", able)
+    found = run(workspace).trade
+    assert (found.measured, found.measured_now) == (ALL, FAILED)
+    (point,) = [p for p in found.curves[0].points if p.setting.label == FAILING]
+    assert point.failed == ""
+    assert point.costs["processor time"].repeats == 2
+    assert run(workspace).trade.measured_now == 0
+
+
+def test_force_measures_only_the_knobs_that_are_named(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(knobs, "KNOBS", {name: MADE[name] for name in ("steps", "other")})
+    monkeypatch.setattr(bench._Run, "together", lambda *_: None)
+    assert run(workspace).trade.measured == 2 * ALL
+    found = run(workspace, knobs=("other",), force=True).trade
+    assert (found.measured, found.measured_now) == (2 * ALL, ALL)
+    assert run(workspace).trade.measured_now == 2 * FAILED
+    assert run(workspace, force=True).trade.measured_now == 2 * ALL
+
+
+def test_force_measures_the_present_settings_of_a_knob_again(workspace: Workspace) -> None:
+    present = {"knob": TOGETHER, "label": PRESENT, "repeat": 0, "choices": []}
+    recommended = {**present, "label": RECOMMENDED, "choices": [["effort", "draft"]]}
+    tables = {**present, "knob": "tables", "label": "coarse"}
+    kept = {
+        names: [one for one in (present, recommended, tables) if not bench._forced(one, names)]
+        for names in ((), ("effort",), ("tables",))
+    }
+    assert kept == {
+        (): [],
+        ("effort",): [recommended, tables],
+        ("tables",): [present, recommended],
+    }
+
+
+def test_each_measurement_names_the_computer_that_made_it(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench, "machine", lambda: "one computer")
+    run(workspace)
+    monkeypatch.setattr(bench, "machine", lambda: "another computer")
+    found = run(workspace)
+    assert found.trade.machine == "one computer; another computer"
+    page = found.html.read_text(encoding="utf-8")
+    assert "<dt>Computer</dt><dd>one computer; another computer</dd>" in page
+
+
+def test_a_cluster_measures_no_photographs_and_says_why(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(knobs, "KNOBS", {"steps": MADE["steps"], "plate": MADE["plate"]})
+    monkeypatch.setattr(bench._Run, "together", lambda *_: None)
+    whole = bench.open_pool
+    monkeypatch.setattr(bench, "open_pool", lambda workers, cluster: whole(1))
+    run(workspace, knobs=("plate",))
+    found = trade_workspace(workspace, TradeSettings(), cluster="tcp://host:1")
+    assert found.trade.measured_now == ALL
+    steps, plate = found.trade.curves
+    assert len(steps.points) == len(ERRORS) + 1
+    assert (plate.points, plate.missing) == ((), ON_A_CLUSTER)
+    assert f"{plate.title}: {ON_A_CLUSTER}" in found.trade.notes
+    page = found.html.read_text(encoding="utf-8")
+    assert "photographs are read from files of this computer" in page
+    with pytest.raises(InputError, match="--knob plate: It is left out with --cluster"):
+        trade_workspace(workspace, TradeSettings(("plate",)), cluster="tcp://host:1")
 
 
 def test_an_interrupted_run_goes_on_where_it_was(
@@ -71,8 +158,9 @@ def test_an_interrupted_run_goes_on_where_it_was(
     path = workspace.trade_partial_path
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     path.write_text("".join(lines[:4]) + lines[4][:30], encoding="utf-8")
+    lost = sum('"failed"' in line for line in lines[:4])
     found = run(workspace)
-    assert (found.trade.measured, found.trade.measured_now) == (ALL, ALL - 3)
+    assert (found.trade.measured, found.trade.measured_now) == (ALL, ALL - 3 + lost)
     assert found.notes == ()
     labels = [[point.setting.label for point in one.points] for one in found.trade.curves]
     assert labels == [[point.setting.label for point in one.points] for one in whole.curves]
@@ -205,8 +293,6 @@ def test_an_unknown_knob_is_refused(workspace: Workspace) -> None:
 def test_a_knob_that_the_scene_does_not_have_is_refused(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tests.bench.made_trade import Steps
-
     monkeypatch.setattr(Steps, "missing", lambda self, case: "Nothing has steps here.")
     with pytest.raises(InputError, match="does not have it"):
         run(workspace, knobs=("steps",))

@@ -45,12 +45,16 @@ def extremes(
     inputs must be refused in a sentence. Needs no workspace. A number that is neither right to its
     stated error nor refused fails the run (exit code 3). Writes extremes.html and extremes.json.
 
-    The same seed and size try the same states. A run with a budget tries some of everything.
+    A full run tries 3,480 states and 203 cells, and takes about 3 minutes on 2 cores. The same seed
+    and size try the same states. A run with a budget tries some of everything; a run below a tenth
+    of the usual size leaves slow cells out. What was left out is named.
 
     \b
     Example:
-      $ scissorcal bench extremes --budget "2 min"
-      4620 states and 25 cells were tried: of 13885 answers 9021 are right to their stated ...
+      $ scissorcal bench extremes --size 0.02
+      160 of 160 states and 178 of 203 cells were tried: of 658 answers 455 are right to their
+      stated error, 158 refused in a sentence, 38 marked as not to be used, 7 not compared, and 0
+      wrong.
       ...
     """
     from scissorcal.bench.extremes.study import Extent
@@ -79,6 +83,7 @@ def extremes(
         "seed": result.seed,
         "totals": result.totals,
         "cells": result.cells,
+        "left_out": result.left_out,
         "wrong": result.wrong,
     }
     return Answer(facts, "\n\n".join(parts), result.verdicts, (found.html, found.json))

@@ -48,7 +48,12 @@ Workers = Annotated[
     typer.Option(min=1, help="Processes to measure in; one for each core if not given."),
 ]
 Force = Annotated[
-    bool, typer.Option("--force", help="Measure again what was measured on the same inputs.")
+    bool,
+    typer.Option(
+        "--force",
+        help="Measure again what was measured on the same inputs: the knobs named by --knob alone, "
+        "all where none is named.",
+    ),
 ]
 Show = Annotated[bool, typer.Option("--show", help="Print what the last run found; measure none.")]
 
@@ -73,7 +78,8 @@ def trade(
     once. Writes bench/trade.html and bench/trade.json.
 
     Each measurement is stored when it is made: the command can be interrupted and repeated to
-    continue.
+    continue, and what failed is then tried again. With --cluster photographs are not measured: they
+    are files of this computer.
 
     \b
     Example:

@@ -36,7 +36,14 @@ LOOKS: dict[str, Look] = {"model": "blue", "kernel": "vermillion", "tables": "gr
 LEAST_ERROR = 1e-17
 """Errors below are drawn here: no float64 number is closer."""
 
-NOT_RIGHT: tuple[Outcome, ...] = ("refused", "flagged", "not compared", "wrong")
+WRONG: Look = "purple"
+"""How states are drawn at which something is wrong."""
+
+MARKED: tuple[tuple[str, tuple[Outcome, ...], float], ...] = (
+    ("some refused or marked", ("refused", "flagged", "not compared"), 0.5),
+    ("some wrong", ("wrong",), 2.5),
+)
+"""Marks at the foot of a sweep: name, outcomes, and decades above `LEAST_ERROR`."""
 
 
 def extremes_page(result: Extremes) -> str:
@@ -66,7 +73,7 @@ def extremes_panels(result: Extremes) -> list[Panel]:
     return [
         panel
         for panel in (*panels, _refusals(result), _ranges(result))
-        if panel.rows or panel.charts
+        if panel.rows or panel.charts or panel.notes
     ]
 
 
@@ -79,19 +86,20 @@ def sweep_chart(sweep: Sweep) -> Chart:
         y = tuple(_drawn(p.largest) for p in points)
         series.append(Series(subject, "line", x, y, look=look))
         series.append(Series(subject, "points", x, y, look=look))
-        refused = [p for p in points if any(p.outcomes[o] for o in NOT_RIGHT)]
-        series.append(
-            Series(
-                "some refused or marked",
-                "points",
-                tuple(_place(sweep, p.value) for p in refused),
-                tuple(
-                    LEAST_ERROR * 10.0 ** (0.5 + 0.5 * list(LOOKS).index(subject)) for _ in refused
-                ),
-                look=look,
-                style="open",
+        for name, outcomes, decades in MARKED:
+            marked = [p for p in points if any(p.outcomes[o] for o in outcomes)]
+            height = LEAST_ERROR * 10.0 ** (decades + 0.5 * list(LOOKS).index(subject))
+            is_wrong = outcomes == ("wrong",)
+            series.append(
+                Series(
+                    f"{subject}, {name}" if is_wrong else name,
+                    "points",
+                    tuple(_place(sweep, p.value) for p in marked),
+                    tuple(height for _ in marked),
+                    look=WRONG if is_wrong else look,
+                    style="full" if is_wrong else "open",
+                )
             )
-        )
     return Chart(
         f"sweep-{sweep.quantity}",
         _words(sweep.quantity),
@@ -102,9 +110,9 @@ def sweep_chart(sweep: Sweep) -> Chart:
 
 
 def map_chart(found: ErrorMap) -> Chart:
-    """Decimal logarithm of the torque's relative error over a pair; empty where it is refused."""
+    """Decimal logarithm of the torque's relative error over a pair; dots where it has none."""
     cells = [c for c in found.cells if c.error is not None]
-    refused = [c for c in found.cells if c.outcome == "refused"]
+    marks: tuple[tuple[Outcome, Look], ...] = (("refused", "muted"), ("wrong", WRONG))
     places = [sorted({getattr(c, name) for c in found.cells}) for name in ("first", "second")]
     series = [
         Series(
@@ -115,12 +123,15 @@ def map_chart(found: ErrorMap) -> Chart:
             value=tuple(math.log10(max(c.error or 0.0, LEAST_ERROR)) for c in cells),
             look=LOOKS[found.subject],
         ),
-        Series(
-            "refused",
-            "points",
-            tuple(float(places[0].index(c.first)) for c in refused),
-            tuple(float(places[1].index(c.second)) for c in refused),
-            look="muted",
+        *(
+            Series(
+                name,
+                "points",
+                tuple(float(places[0].index(c.first)) for c in found.cells if c.outcome == name),
+                tuple(float(places[1].index(c.second)) for c in found.cells if c.outcome == name),
+                look=look,
+            )
+            for name, look in marks
         ),
     ]
     ends = [f"{short(p[0])} to {short(p[-1])}" if p else "" for p in places]
@@ -183,7 +194,10 @@ def _wrong(result: Extremes) -> Panel:
         )
         for place, one in enumerate(result.wrong)
     ]
-    return Panel("wrong", PART, "Wrong", "Numbers that are neither right nor refused.", tuple(rows))
+    said = "Numbers that are neither right nor refused."
+    if len(rows) < result.wrong_states:
+        said += f" The first {len(rows)} of {result.wrong_states} are listed."
+    return Panel("wrong", PART, "Wrong", said, tuple(rows))
 
 
 def _choices(state: State) -> str:
@@ -212,7 +226,9 @@ def _cells(result: Extremes) -> Panel:
         )
         for cell in result.cells
     ]
-    return Panel("cells", PART, "Cells", "Regions with a stated behaviour each.", tuple(rows))
+    notes = (f"Not run: {'; '.join(result.left_out)}.",) if result.left_out else ()
+    said = "Regions with a stated behaviour each."
+    return Panel("cells", PART, "Cells", said, tuple(rows), notes=notes)
 
 
 def _sweeps(result: Extremes) -> Panel:
@@ -221,7 +237,8 @@ def _sweeps(result: Extremes) -> Panel:
         PART,
         "One quantity at a time",
         "Each quantity over its extreme range, all others everyday. Open marks at the foot: some "
-        "states at that value were refused, or marked as not to be used.",
+        "states at that value were refused, marked as not to be used, or not compared. Purple "
+        "diamonds above them: some were wrong.",
         charts=tuple(sweep_chart(sweep) for sweep in result.sweeps),
     )
 
@@ -231,7 +248,8 @@ def _maps(result: Extremes, subject: str) -> Panel:
         f"maps-{subject}",
         PART,
         f"Pairs: {TITLES[subject]}",
-        "Numbers are decimal logarithms of the torque's relative error; dots are refused states. "
+        "Numbers are decimal logarithms of the torque's relative error; dots are refused states, "
+        "purple diamonds wrong ones; a blank place has no torque to compare, or was not tried. "
         "Values are spaced evenly in number, from one end of the extreme range to the other.",
         charts=tuple(map_chart(one) for one in result.maps if one.subject == subject and one.cells),
     )

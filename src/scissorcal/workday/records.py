@@ -2,12 +2,13 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from scissorcal.errors import InputError
+from scissorcal.files import replacing
 from scissorcal.recording.partfile import try_lock
 
 FORMAT = "scissorcal-records/1"
@@ -52,7 +53,7 @@ class RecordFile:
             self.records = []
             self._open()
         if self._stream.seek(0, os.SEEK_END) == 0:
-            self._write({"format": FORMAT, "inputs": self.inputs})
+            self._write(self._head)
         return self
 
     def __exit__(
@@ -67,6 +68,18 @@ class RecordFile:
         """Add one record, and hand it to the operating system before returning."""
         self._write(record)
         self.records.append(record)
+
+    def keep(self, records: Sequence[Record]) -> None:
+        """Hold these records alone. A run that is killed meanwhile leaves all that were there."""
+        with replacing(self.path) as part:
+            part.write_bytes(b"".join(_line(one) for one in (self._head, *records)))
+            self._stream.close()  # Windows replaces no file that is open
+        self._open()
+        self.records = list(records)
+
+    @property
+    def _head(self) -> Record:
+        return {"format": FORMAT, "inputs": self.inputs}
 
     def _open(self) -> None:
         self._stream = self.path.open("a+b")
@@ -86,9 +99,12 @@ class RecordFile:
         return aside
 
     def _write(self, record: Record) -> None:
-        text = json.dumps(record, allow_nan=False, separators=(",", ":"))
-        self._stream.write(text.encode() + b"\n")
+        self._stream.write(_line(record))
         self._stream.flush()
+
+
+def _line(record: Record) -> bytes:
+    return json.dumps(record, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
 def _read(path: Path) -> tuple[str, list[Record], int]:

@@ -61,6 +61,10 @@ def test_everyday_errors_of_a_fresh_run_are_those_that_it_states():
         assert fresh < 10.0 * stated[f"{subject}, everyday"]
 
 
+def test_it_names_every_cell():
+    assert {row[0] for row in table("EXTREMES_CELLS")} == {cell.name for cell in all_cells()}
+
+
 @pytest.mark.parametrize("row", table("EXTREMES_CELLS"), ids=lambda row: row[0])
 def test_a_cell_is_found_as_it_states(row):
     cells = {cell.name: cell for cell in all_cells()}

@@ -2,7 +2,11 @@
 
 import dataclasses
 import json
+import time
+from contextlib import nullcontext
+from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +14,25 @@ import pytest
 from scissorcal.bench.extremes import cells as cells_module
 from scissorcal.bench.extremes import compare
 from scissorcal.bench.extremes.cells import Cell, Found, all_cells, judged, try_cell, worst_of
-from scissorcal.bench.extremes.compare import compare_kernel, compare_model
+from scissorcal.bench.extremes.compare import Compared, compare_kernel, compare_model
 from scissorcal.bench.extremes.quantities import QUANTITIES
+from scissorcal.bench.extremes.result import (
+    MOST_WRONG,
+    OUTCOMES,
+    SUBJECTS,
+    ErrorMap,
+    MapCell,
+    Run,
+    Sweep,
+    SweepPoint,
+    summarise,
+)
 from scissorcal.bench.extremes.states import SWEPT, everyday_state, random_state
-from scissorcal.bench.extremes.study import Extent, jobs, planned, try_state
+from scissorcal.bench.extremes.study import Done, Extent, Job, Tried, do, jobs, planned, try_state
 from scissorcal.errors import InputError
 from scissorcal.package.exact import ExactModel
+from scissorcal.report.extremes import LOOKS, WRONG, extremes_page, map_chart, sweep_chart
+from scissorcal.workday.runs import bench_extremes
 from scissorcal.workday.runs.bench_extremes import run_extremes
 
 
@@ -145,8 +162,13 @@ def test_a_run_with_a_budget_writes_its_page_and_twin(tmp_path: Path, monkeypatc
     result = found.result
     assert 0 < result.states < result.planned
     assert [one.name for one in result.cells] == ["model, power response"]
+    every = [one.name for one in all_cells()]
+    tried = f"{result.states} of {result.planned} states and 1 of {len(every)} cells were tried"
+    assert result.sentence.startswith(tried)
+    assert set(result.left_out) == set(every) - {"model, power response"}
     page = found.html.read_text(encoding="utf-8")
     assert result.sentence in page
+    assert f"Not run: {result.left_out[0]}; " in page
     assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
     twin = json.loads(found.json.read_text(encoding="utf-8"))
     assert twin["format"] == "scissorcal-extremes/1"
@@ -164,3 +186,89 @@ def test_a_wrong_answer_fails_the_run(tmp_path: Path, monkeypatch):
     (verdict,) = result.verdicts
     assert verdict.status == "fail"
     assert "1 wrong" in result.sentence
+
+
+def test_a_whole_run_says_nothing_of_parts():
+    result = summarise(_facts(planned=1), [_done("right")], ())
+    assert result.sentence.startswith("1 states and 0 cells were tried")
+    assert result.left_out == ()
+    assert "Not run" not in extremes_page(result)
+
+
+def test_wrong_states_are_counted_and_the_first_are_listed():
+    few = summarise(_facts(planned=2), [_done("wrong")] * 2, ())
+    assert "Each is listed in the page" in few.verdicts[0].why
+    many = summarise(_facts(planned=60), [_done("wrong")] * 60, ())
+    said = f"The first {MOST_WRONG} of 60 wrong answers of states are listed in the page: report"
+    assert said in many.verdicts[0].why
+    assert f"The first {MOST_WRONG} of 60 are listed." in extremes_page(many)
+
+
+def test_wrong_states_have_marks_of_their_own():
+    counts = dict.fromkeys(OUTCOMES, 0)
+    points = tuple(
+        SweepPoint(value, "model", None, None, counts | {outcome: 1})
+        for value, outcome in ((1.0, "refused"), (2.0, "wrong"))
+    )
+    drawn = {one.name: one for one in sweep_chart(Sweep("force", "N", True, points)).series}
+    assert drawn["some refused or marked"].x == (1.0,)
+    assert drawn["model, some wrong"].x == (2.0,)
+    assert drawn["model, some wrong"].look not in (*LOOKS.values(), "muted")
+    places = tuple(MapCell(1.0, x, None, o) for x, o in ((1.0, "refused"), (2.0, "wrong")))
+    drawn = {one.name: one for one in map_chart(ErrorMap("force", "kappa", "model", places)).series}
+    assert (drawn["refused"].y, drawn["wrong"].y) == ((0.0,), (1.0,))
+    assert drawn["wrong"].look == WRONG != drawn["refused"].look
+
+
+def test_a_job_tells_its_own_seconds(monkeypatch):
+    only = (cell(lambda _: time.sleep(0.02) or Found("right", "slept for a while")),)
+    monkeypatch.setattr("scissorcal.bench.extremes.study.all_cells", lambda: only)
+    assert do(Job(cell="a cell")).seconds >= 0.02
+
+
+@dataclasses.dataclass(frozen=True)
+class MadePool:
+    """As `Pool`, on a made-up clock: each worker takes ``job_s`` for a job, one at a time."""
+
+    clock: list[float]
+    workers: int
+    job_s: float
+    ahead: int = 2
+
+    def work(self, job, items, finished):
+        todo, free, ends = iter(items), [0.0] * self.workers, []
+        while True:
+            while len(ends) < self.workers * self.ahead and next(todo, None):
+                free.sort()
+                free[0] = max(free[0], self.clock[0]) + self.job_s
+                ends.append((free[0], Done(seconds=self.job_s)))
+            if not ends:
+                return
+            ends.sort(key=lambda end: end[0])
+            self.clock[0], done = ends.pop(0)
+            finished(done)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_a_budget_is_kept_with_several_workers(tmp_path: Path, monkeypatch, workers):
+    clock, finished = [0.0], []
+    pool = MadePool(clock, workers, 7.0)
+    made = SimpleNamespace(monotonic=lambda: clock[0])
+    monkeypatch.setattr(bench_extremes, "time", made)
+    monkeypatch.setattr(bench_extremes, "open_pool", lambda *_: nullcontext(pool))
+    run_extremes(
+        Extent(), tmp_path, budget_s=60.0, progress=lambda done, sentence: finished.append(done)
+    )
+    assert clock[0] == 56.0
+    assert len(finished) == 8 * workers
+
+
+def _facts(planned: int) -> Run:
+    return Run(datetime(2026, 1, 2, tzinfo=UTC), "1.0", "none", 1, 0, 1.0, None, planned)
+
+
+def _done(outcome: str) -> Done:
+    """One state of which all three answers are alike, as far as they are counted."""
+    state = everyday_state(np.random.default_rng(5))
+    found = [Compared(subject, "right", "") for subject in SUBJECTS[1:]]
+    return Done((Tried(state, (Compared("model", outcome, "a sentence"), *found)),))

@@ -305,6 +305,21 @@ def _divide(by: int) -> float:
     return 1 / by
 
 
+def test_records_that_are_not_kept_are_gone(tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    with RecordFile(path, "one") as file:
+        for value in range(3):
+            file.append({"value": value})
+        file.keep(file.records[1:2])
+        with pytest.raises(InputError, match="another run"), RecordFile(path, "one"):
+            pass
+        file.append({"value": 7})
+        assert file.records == [{"value": 1}, {"value": 7}]
+    with RecordFile(path, "one") as file:
+        assert file.records == [{"value": 1}, {"value": 7}]
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_records_survive_a_torn_header(tmp_path: Path) -> None:
     path = tmp_path / "a.jsonl"
     path.write_bytes(b'{"format": "scissor')

@@ -137,7 +137,12 @@ class CellRow:
 
 @dataclass(frozen=True)
 class Extremes:
-    """A whole run. ``planned`` states were to be tried; a run with a time limit tries fewer."""
+    """A whole run. ``planned`` states were to be tried; a run with a time limit tries fewer.
+
+    ``left_out`` names the cells that were not run: a reduced run leaves slow ones out, and one
+    with a time limit those that did not fit. ``wrong`` are the first states at which something was
+    wrong, at most `MOST_WRONG`.
+    """
 
     format: ExtremesFormat
     created: datetime
@@ -157,6 +162,12 @@ class Extremes:
     refusals: tuple[Refusal, ...]
     wrong: tuple[Wrong, ...]
     cells: tuple[CellRow, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def wrong_states(self) -> int:
+        """How many wrong answers states have; ``wrong`` lists the first."""
+        return sum(total.outcomes["wrong"] for total in self.totals)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -164,9 +175,13 @@ class Extremes:
         if not self.states and not self.cells:
             why = "No state was tried within the budget: allow more with --budget."
             return (not_evaluated("bench", "wrong", why, 0.0),)
-        count = sum(total.outcomes["wrong"] for total in self.totals)
-        count += sum(cell.outcome == "wrong" for cell in self.cells)
-        remedy = f"{self.sentence} Each is listed in the page: report them."
+        cells = sum(cell.outcome == "wrong" for cell in self.cells)
+        count = self.wrong_states + cells
+        listed = "Each is listed in the page"
+        if self.wrong_states > len(self.wrong):
+            first = f"The first {len(self.wrong)} of {self.wrong_states} wrong answers of states"
+            listed = f"{first} are listed in the page" + (", and each wrong cell" if cells else "")
+        remedy = f"{self.sentence} {listed}: report them."
         return (judge("bench", "wrong", count, 0.0, self.sentence, remedy),)
 
 
@@ -189,6 +204,7 @@ def summarise(run: Run, done: Iterable[Done], cells: Sequence[Cell]) -> Extremes
     finished = list(done)
     tried = [one for part in finished for one in part.tried]
     rows = _cell_rows(finished, cells)
+    ran = {row.name for row in rows}
     totals = tuple(
         _total(subject, band, tried) for subject in SUBJECTS for band in ("everyday", "extreme")
     )
@@ -203,7 +219,7 @@ def summarise(run: Run, done: Iterable[Done], cells: Sequence[Cell]) -> Extremes
         run.budget_s,
         run.planned,
         len(tried),
-        _sentence(totals, rows, len(tried)),
+        _sentence(totals, rows, (len(tried), run.planned), len(cells)),
         tuple(QUANTITIES.values()),
         totals,
         tuple(_sweep(name, tried) for name in dict.fromkeys(_swept(tried))),
@@ -211,6 +227,7 @@ def summarise(run: Run, done: Iterable[Done], cells: Sequence[Cell]) -> Extremes
         _refusals(tried),
         _wrong(tried),
         rows,
+        tuple(cell.name for cell in cells if cell.name not in ran),
     )
 
 
@@ -358,7 +375,10 @@ def _finite(value: float) -> Number:
     return float(value) if math.isfinite(value) else None
 
 
-def _sentence(totals: Sequence[Total], cells: Sequence[CellRow], states: int) -> str:
+def _sentence(
+    totals: Sequence[Total], cells: Sequence[CellRow], states: tuple[int, int], every_cell: int
+) -> str:
+    """The run in a sentence; ``states`` are those tried and those planned."""
     counts = Counter(
         {
             o: sum(t.outcomes[o] for t in totals) + sum(c.outcome == o for c in cells)
@@ -366,9 +386,11 @@ def _sentence(totals: Sequence[Total], cells: Sequence[CellRow], states: int) ->
         }
     )
     sum_of = sum(counts.values())
+    tried = f"{states[0]} states and {len(cells)} cells"
+    if states[0] < states[1] or len(cells) < every_cell:
+        tried = f"{states[0]} of {states[1]} states and {len(cells)} of {every_cell} cells"
     return (
-        f"{states} states and {len(cells)} cells were tried: of {sum_of} answers {counts['right']} "
-        f"are right to their stated error, {counts['refused']} refused in a sentence, "
-        f"{counts['flagged']} marked as not to be used, {counts['not compared']} not compared, and "
-        f"{counts['wrong']} wrong."
+        f"{tried} were tried: of {sum_of} answers {counts['right']} are right to their stated "
+        f"error, {counts['refused']} refused in a sentence, {counts['flagged']} marked as not to "
+        f"be used, {counts['not compared']} not compared, and {counts['wrong']} wrong."
     )

@@ -1,8 +1,9 @@
 """Which states a run tries, in which order, and what one job of it does."""
 
 import math
+import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
 import numpy as np
@@ -94,11 +95,12 @@ class Tried:
 
 @dataclass(frozen=True)
 class Done:
-    """What a job found."""
+    """What a job found, and the seconds that it took where it ran."""
 
     tried: tuple[Tried, ...] = ()
     cell: str = ""
     found: Found | None = field(default=None)
+    seconds: float = 0.0
 
 
 def jobs(extent: Extent, seed: int) -> Iterator[Job]:
@@ -134,10 +136,13 @@ def planned(extent: Extent, seed: int) -> list[State]:
 
 def do(job: Job) -> Done:
     """Do one job."""
+    began = time.monotonic()
     if job.cell:
         cell = next(one for one in all_cells() if one.name == job.cell)
-        return Done(cell=cell.name, found=try_cell(cell, job.seed))
-    return Done(tuple(try_state(state) for state in job.states))
+        done = Done(cell=cell.name, found=try_cell(cell, job.seed))
+    else:
+        done = Done(tuple(try_state(state) for state in job.states))
+    return replace(done, seconds=time.monotonic() - began)
 
 
 def try_state(state: State) -> Tried:

@@ -3,7 +3,7 @@
 import math
 import pickle
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -17,6 +17,8 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.bench_case import (
+    LOCAL_KNOBS,
+    ON_A_CLUSTER,
     coverage_notes,
     inputs_hash,
     load_case,
@@ -46,7 +48,10 @@ STRETCH = 2.0
 
 @dataclass(frozen=True)
 class TradeSettings:
-    """Which knobs, all if none is named; seconds for the whole run, without limit if None."""
+    """Which knobs, all if none is named; seconds for the whole run, without limit if None.
+
+    ``force`` measures these knobs again; measurements of others are kept.
+    """
 
     knobs: tuple[str, ...] = ()
     budget_s: float | None = None
@@ -77,7 +82,8 @@ def trade_workspace(
 
     Each measurement is kept in bench/trade.partial.jsonl as soon as it is made, so that a killed
     run goes on where it was and nothing is measured twice on the same inputs and computer, unless
-    ``force``. ``began`` is the time (of `time.time`) from which the budget counts. The page is
+    ``force``; what failed is tried again by the next run. Knobs that read photographs are left out
+    on a cluster. ``began`` is the time (of `time.time`) from which the budget counts. The page is
     written to bench/trade.html, its JSON twin to bench/trade.json.
 
     Raises MissingError where a fit that the scene needs is missing or stale, InputError where a
@@ -94,22 +100,23 @@ def trade_workspace(
     tell(0.0, "reading recordings and fits")
     engine = Engine.of(workspace)
     case = load_case(engine, chosen.seed)
-    names = wanted_knobs(case, chosen.knobs)
+    names = wanted_knobs(case, chosen.knobs, on_cluster=cluster is not None)
+    shown = names if chosen.knobs else tuple(KNOBS)
     deadline = None if chosen.budget_s is None else start + chosen.budget_s - FINISH_S
     inputs = inputs_hash(engine, case)
-    if chosen.force:
-        with RecordFile(workspace.trade_partial_path, inputs):  # refused where another run holds it
-            workspace.trade_partial_path.unlink()
     with RecordFile(workspace.trade_partial_path, inputs) as file:
-        run = _Run(case, file, chosen.budget_s, deadline, tell)
+        if chosen.force:
+            file.keep([one for one in file.records if not _forced(one, chosen.knobs)])
+        left_out = {} if cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
+        run = _Run(case, file, chosen.budget_s, deadline, tell, left_out)
         with open_pool(workers, cluster) as pool:
             run.measure(pool, names, keep_time=len(names) > 1)
-            curves = run.curves(names if chosen.knobs else tuple(KNOBS))
+            curves = run.curves(shown)
             made = run.made
             together = run.together(pool, curves) if len(names) > 1 else None
             # time that was kept, and that nothing new was compared in, goes to the knobs
             if run.made == made and run.measure(pool, names, keep_time=False):
-                curves = run.curves(names if chosen.knobs else tuple(KNOBS))
+                curves = run.curves(shown)
                 together = run.together(pool, curves) if len(names) > 1 else None
         trade = run.result(engine, curves, together, time.time() - start, pool.workers)
         notes = (file.note,) if file.note else ()
@@ -123,7 +130,10 @@ def trade_workspace(
 
 
 class _Run:
-    """One run over a record file: what it measures, how long it may, and what comes of it."""
+    """One run over a record file: what it measures, how long it may, and what comes of it.
+
+    ``left_out`` says of knobs why this run measures none of them.
+    """
 
     def __init__(
         self,
@@ -132,11 +142,30 @@ class _Run:
         budget_s: float | None,
         deadline: float | None,
         tell: Progress,
+        left_out: Mapping[str, str],
     ) -> None:
+        from scissorcal.bench.trade.study import key_of
+
         self._case, self._file, self._tell = case, file, tell
         self._budget_s, self._deadline = budget_s, deadline
         self._blob = pickle.dumps(case)
         self._began, self.made = time.time(), 0
+        self._left_out = left_out
+        # a missing tool may be installed by now: what failed before is tried again
+        self._failed = {key_of(one) for one in self._records if "failed" in one}
+
+    @property
+    def _records(self) -> list[Record]:
+        """The newest record of each task."""
+        from scissorcal.bench.trade.study import key_of
+
+        return list({key_of(record): record for record in self._file.records}.values())
+
+    def _known(self) -> list[Record]:
+        """Records of the tasks that are not measured again."""
+        from scissorcal.bench.trade.study import key_of
+
+        return [record for record in self._records if key_of(record) not in self._failed]
 
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
         """Measure the tasks of the knobs named that have no record yet; whether any was.
@@ -156,7 +185,7 @@ class _Run:
         together = Together(())
         present = together.settings(self._case)[0]
         tasks = tasks_of(self._case, names)
-        known = {key_of(record) for record in self._file.records}
+        known = {key_of(record) for record in self._known()}
         left = [task for task in tasks if task.key not in known]
         expected = {}
         for task in tasks:
@@ -164,7 +193,7 @@ class _Run:
             setting = setting_of(knob, self._case, task.label)
             expected[task] = knob.expected_s(self._case, setting)
         schedule = Schedule(left, expected, self._deadline)
-        for record in self._file.records:
+        for record in self._known():
             schedule.learn(record)
 
         def reserve() -> float:
@@ -187,12 +216,19 @@ class _Run:
         return self.made > before
 
     def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
-        """The curves of the knobs named, from all records."""
+        """The curves of the knobs named, from all records; of those left out, why."""
         from scissorcal.bench.trade.assemble import curve_of, limit_of
         from scissorcal.bench.trade.knob import make_knob
 
         case, limit = self._case, limit_of(self._case)
-        return tuple(curve_of(case, make_knob(name), self._of(name), limit) for name in names)
+        found = []
+        for name in names:
+            curve = curve_of(case, make_knob(name), self._of(name), limit)
+            if name in self._left_out and not curve.missing:
+                why = self._left_out[name]
+                curve = replace(curve, points=(), unmeasured=(), sentences=(), missing=why)
+            found.append(curve)
+        return tuple(found)
 
     def together(self, pool: Pool, curves: "Sequence[Curve]") -> "Curve | None":
         """Measure the present and all recommended settings.
@@ -222,7 +258,7 @@ class _Run:
             if not make_knob(name).combined
         ]
         tasks = [PRESENT_TASK, Task(TOGETHER, RECOMMENDED, choices=changed)]
-        known = {key_of(record) for record in self._file.records}
+        known = {key_of(record) for record in self._known()}
         left = [task for task in tasks if task.key not in known]
         knob = Together(changed)
         expected = {
@@ -233,7 +269,7 @@ class _Run:
         }
         # nothing else waits for the time that is left, so it is used even where it may not do
         schedule = Schedule(left, expected, self._deadline, share=STRETCH, stretch=STRETCH)
-        for record in self._file.records:
+        for record in self._known():
             schedule.learn(record)
         self._work(pool, schedule, len(left))
         keys = {task.key for task in tasks}
@@ -255,7 +291,7 @@ class _Run:
         from scissorcal.bench.trade.point import Quantity, Spread
         from scissorcal.bench.trade.result import FORMAT, Trade
 
-        records = self._file.records
+        records = self._records
         sentences = [
             f"{curve.title}: {curve.sentences[0]}"
             for curve in curves
@@ -279,7 +315,7 @@ class _Run:
             recipe_name=engine.recipe.name,
             material=engine.recipe.material.name,
             simulated=self._case.simulated,
-            machine=machine(),
+            machine="; ".join(dict.fromkeys(record["machine"] for record in records)),
             workers=workers,
             seconds=round(seconds, 1),
             budget_s=self._budget_s,
@@ -297,10 +333,12 @@ class _Run:
     def _of(self, name: str) -> list[Record]:
         from scissorcal.bench.trade.study import records_of
 
-        return records_of(self._case, name, self._file.records)
+        return records_of(self._case, name, self._records)
 
     def _work(self, pool: Pool, schedule: "Schedule", count: int) -> None:
         """Make measurements, and keep each; within a budget no worker is handed a second one."""
+        from scissorcal.bench.trade.study import key_of
+
         jobs = (
             (self._blob, task, self._deadline and self._deadline - schedule.reserve())
             for task in schedule
@@ -313,6 +351,7 @@ class _Run:
             if record is None:
                 return
             self._file.append(record)
+            self._failed.discard(key_of(record))
             schedule.learn(record)
             self.made += 1
             share = done / max(count, done)
@@ -335,7 +374,17 @@ def _do(job: "tuple[bytes, Task, float | None]") -> Record | None:
     from scissorcal.bench.trade.study import run_task
 
     blob, task, end = job
-    return run_task(_unpacked(blob), task, end)
+    record = run_task(_unpacked(blob), task, end)
+    return record and {**record, "machine": machine()}
+
+
+def _forced(record: Record, names: Sequence[str]) -> bool:
+    """Whether a record is of one of the knobs named, or of the settings that they have now."""
+    from scissorcal.bench.trade.knob import PRESENT_ALIKE
+    from scissorcal.bench.trade.study import PRESENT_TASK, key_of
+
+    alike = key_of(record) == PRESENT_TASK.key and any(name in PRESENT_ALIKE for name in names)
+    return not names or record["knob"] in names or alike
 
 
 @lru_cache(maxsize=2)

@@ -3,7 +3,7 @@
 import os
 import platform
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import scissorcal
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.envelope import plain
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.bench_photographs import with_photographs
 from scissorcal.workday.runs.cut import edge_of_photographs
@@ -18,11 +19,19 @@ from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.workspace import FitKind
 
 if TYPE_CHECKING:
-    from scissorcal.bench.trade.case import Case
+    from scissorcal.bench.trade.case import Case, Photographed
     from scissorcal.recording import Recording
 
-ALGORITHM = 2
+ALGORITHM = 3
 """Raised whenever a measurement of the same inputs would mean something else."""
+
+LOCAL_KNOBS = ("photographs", "plate")
+"""Knobs whose measurements read files of this computer."""
+
+ON_A_CLUSTER = (
+    "It is left out with --cluster: photographs are read from files of this computer, which the "
+    "cluster's workers may not have. Run 'scissorcal bench trade' without --cluster to measure it."
+)
 
 
 def load_case(engine: Engine, seed: int = 0) -> "Case":
@@ -64,8 +73,13 @@ def load_case(engine: Engine, seed: int = 0) -> "Case":
     return with_photographs(case, engine)
 
 
-def wanted_knobs(case: "Case", wanted: Sequence[str]) -> tuple[str, ...]:
-    """The knobs to measure; InputError for one that is unknown or that the scene does not have."""
+def wanted_knobs(
+    case: "Case", wanted: Sequence[str], *, on_cluster: bool = False
+) -> tuple[str, ...]:
+    """The knobs to measure, less `LOCAL_KNOBS` on a cluster.
+
+    InputError for one that is unknown, that the scene does not have, or that no cluster measures.
+    """
     from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
 
     for name in wanted:
@@ -73,7 +87,9 @@ def wanted_knobs(case: "Case", wanted: Sequence[str]) -> tuple[str, ...]:
             raise InputError(f"--knob {name} is no knob; choose from {', '.join(KNOBS)}.")
         if why := make_knob(name).missing(case):
             raise InputError(f"--knob {name}: this scene does not have it. {why}")
-    there = scene_knobs(case)
+        if on_cluster and name in LOCAL_KNOBS:
+            raise InputError(f"--knob {name}: {ON_A_CLUSTER}")
+    there = [one for one in scene_knobs(case) if not (on_cluster and one in LOCAL_KNOBS)]
     return tuple(name for name in there if not wanted or name in wanted)
 
 
@@ -110,20 +126,32 @@ def machine() -> str:
 
 
 def inputs_hash(engine: Engine, case: "Case") -> str:
-    """Identity of all that a measurement depends on, the computer among it."""
-    fits = {
-        fit.what: engine.index.digest(engine.file(f"fit {fit.what}"))
-        for fit in (case.friction_fit, case.cut_fit)
-        if fit is not None
+    """Identity of all that a measurement depends on, this computer among it.
+
+    Recordings, fits and photographs count by their content, wherever their files stand.
+    """
+
+    def taken(one: "Photographed") -> object:
+        return plain(replace(one, paths=())), [engine.index.digest(path) for path in one.paths]
+
+    by_content = {
+        "recipe": case.recipe.model_dump(mode="json"),
+        "friction": [one.content_hash for one in case.friction],
+        "cut": [one.content_hash for one in case.cut],
+        **{
+            f"{kind}_fit": fit and engine.index.digest(engine.file(f"fit {kind}"))
+            for kind, fit in (("friction", case.friction_fit), ("cut", case.cut_fit))
+        },
+        "held": None,  # follows from the fits, the recipe and the seed
+        "photographs": [taken(one) for one in case.photographs],
+        "plate": case.plate and taken(case.plate),
     }
+    others = [one.name for one in fields(case) if one.name not in by_content]
     return digest(
         {
             "algorithm": ALGORITHM,
             "version": scissorcal.__version__,
-            "fits": fits,
-            "recordings": [one.content_hash for one in (*case.friction, *case.cut)],
-            "recipe": engine.recipe.model_dump(mode="json"),
-            "seed": case.seed,
+            "case": {**by_content, **{name: plain(getattr(case, name)) for name in others}},
             "machine": machine(),
         }
     )

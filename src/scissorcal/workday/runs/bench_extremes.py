@@ -3,7 +3,7 @@
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,12 +14,12 @@ from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
     from scissorcal.bench.extremes.result import Extremes
-    from scissorcal.bench.extremes.study import Extent, Job
+    from scissorcal.bench.extremes.study import Done, Extent, Job
 
 Progress = Callable[[float, str], None]
 
 FINISH_S = 2.0
-"""Time within a budget for writing the results, and for the jobs that are under way."""
+"""Time within a budget for writing the results."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,9 @@ def run_extremes(
         tell(len(done) / len(every), f"{len(done)} of {len(every)} jobs")
 
     with open_pool(workers, cluster) as pool:
-        pool.work(do, _in_time(every, deadline), keep)
+        # within a budget no worker is handed a second job: each begins when it is handed out
+        handed = pool if deadline is None else replace(pool, ahead=1)
+        handed.work(do, _in_time(every, done, deadline), keep)
         count = pool.workers
     run = Run(
         created=datetime.now(UTC),
@@ -87,12 +89,10 @@ def run_extremes(
     return outcome
 
 
-def _in_time(every: "list[Job]", deadline: float | None) -> "Iterator[Job]":
-    """The jobs that may begin: none that would, at the longest so far, end after the deadline."""
-    longest, before = 0.0, time.monotonic()
+def _in_time(every: "list[Job]", done: "list[Done]", deadline: float | None) -> "Iterator[Job]":
+    """The jobs that may begin: none that would, at the longest done, end after the deadline."""
     for job in every:
-        now = time.monotonic()
-        longest, before = max(longest, now - before), now
-        if deadline is not None and now + longest > deadline:
+        longest = max((one.seconds for one in done), default=0.0)
+        if deadline is not None and time.monotonic() + longest > deadline:
             return
         yield job
