@@ -12,18 +12,12 @@ import pytest
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
-<<<<<<< HEAD
-from scissorcal.bench.trade.point import Curve, Error, Point, Setting, Spread
+from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
 from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import Task
-from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
+from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
-=======
-from scissorcal.bench.trade.point import Sample, Setting
-from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
-from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER
->>>>>>> trun
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.runs import bench
