@@ -70,5 +70,10 @@ def test_a_cell_is_found_as_it_states(row):
     cells = {cell.name: cell for cell in all_cells()}
     cell = cells[row[0]]
     assert row[1:3] == [cell.extreme, cell.stated]
+    allowed = {row[3]}
+    if "or flagged" in cell.stated:  # then which of them it is depends on the seed
+        allowed |= {"right", "flagged"}
+    if "or refused" in cell.stated:
+        allowed |= {"right", "refused"}
     if not cell.slow:
-        assert try_cell(cell, 7).outcome == row[3]
+        assert try_cell(cell, 7).outcome in allowed
