@@ -265,7 +265,7 @@ def test_what_changes_nothing_at_once_is_named_and_alone_not_measured(
 
     monkeypatch.setattr(bench._Run, "_work", work)
     monkeypatch.setattr(Together, "errors", errors)
-    found = bench._Run(made_case(), file, None, None, lambda *_: None)  # type: ignore[arg-type]
+    found = bench._Run(made_case(), file, None, None, lambda *_: None, {})  # type: ignore[arg-type]
     assert found.together(None, [both_settings("rate")]) is None  # type: ignore[arg-type]
     assert asked == []
     curve = found.together(  # type: ignore[arg-type]
