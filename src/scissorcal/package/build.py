@@ -95,7 +95,7 @@ def build_package(
     ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
     the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
-    # whoever reads a package's parts, as the report does, builds none
+    # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.check import check_package
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound

@@ -334,8 +334,8 @@ def _differ(now: FrictionState | CutState, then: FrictionState | CutState) -> bo
 NOTABLE = 0.2
 """Share by which the excess over the tolerance falls where a cause is named as the largest."""
 NO_FIT = (
-    "The strokes so far cannot be fitted, and no further stroke is expected to help; capture again "
-    "once what the fit says is mended:"
+    "The strokes so far cannot be fitted, and no further stroke is expected to help. Remove the "
+    "cause that the fit gives, then capture again:"
 )
 FRICTION_BOUNDS = (
     "What differs between strokes of friction bounds it: clean and oil the pivot, let the rig run "

@@ -21,6 +21,7 @@ from scissorcal.calibration.design.state import (
     expected_cut,
     expected_friction,
 )
+from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -152,9 +153,9 @@ def test_a_scatter_that_nothing_tells_has_its_usual_size() -> None:
         assert Knowledge(layout, np.zeros(1), np.eye(1)).between_sd[0] == pytest.approx(size)
 
 
-def test_sweeps_have_the_curvature_of_the_fits_own_likelihood(friction: FrictionState) -> None:
+def two_sweeps(friction: FrictionState) -> FrictionExperiment:
     known = friction.knowledge
-    design = planned_friction(
+    return planned_friction(
         planned(sweeps((0.2, 0.8))),
         RECIPE.fit.friction,
         friction.structure,
@@ -162,6 +163,11 @@ def test_sweeps_have_the_curvature_of_the_fits_own_likelihood(friction: Friction
         known.point,
         friction.zero_sd,
     )
+
+
+def test_sweeps_have_the_curvature_of_the_fits_own_likelihood(friction: FrictionState) -> None:
+    known = friction.knowledge
+    design = two_sweeps(friction)
     by_stroke = friction_information(design, known.point, friction.noise, 0.0)
     assert sorted(by_stroke) == [0, 1, 2, 3, 4]
     law = design.candidate(design.observed).reduced
@@ -176,14 +182,7 @@ def test_sweeps_have_the_curvature_of_the_fits_own_likelihood(friction: Friction
 def test_white_noise_of_windows_counts_once_and_slow_noise_more(friction: FrictionState) -> None:
     """White noise by sample: windows overlap, so a mean has the variance of the samples' mean."""
     known = friction.knowledge
-    design = planned_friction(
-        planned(sweeps((0.2, 0.8))),
-        RECIPE.fit.friction,
-        friction.structure,
-        known.layout,
-        known.point,
-        friction.zero_sd,
-    )
+    design = two_sweeps(friction)
     place = known.layout.names.index("coulomb_neg")
     size = float(np.exp(known.point[-1]))
 

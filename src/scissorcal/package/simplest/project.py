@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reference:
-    """The law that projections are compared with: the fit as it stands.
+    """The law that projections are compared with: that of the fit.
 
     ``near`` is what it renders at the places over which laws are projected, ``felt`` at those where
     the result is judged, which are others.
