@@ -8,9 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scissorcal.cli.root import run
+from scissorcal.recording import read_telemetry
+from scissorcal.recording.telemetry import CONTROL
 from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
@@ -191,7 +194,7 @@ def test_the_make_targets_of_the_readme_exist():
 
 
 def test_the_other_blocks_of_the_readme_hold_commands_alone():
-    assert len(readme_blocks("sh")) == 4
+    assert len(readme_blocks("sh")) == 5
     blocks = [line for block in readme_blocks("sh")[1:] for line in block]
     assert sum("capture plate" in line and "--stances" in line for line in blocks) == 1
     assert all(shlex.split(line, comments=True)[0] in ("scissorcal", "cd") for line in blocks)
@@ -199,7 +202,7 @@ def test_the_other_blocks_of_the_readme_hold_commands_alone():
 
 @pytest.mark.slow
 def test_the_day_of_the_readme_ends_in_a_torque_that_cuts(tmp_path, monkeypatch):
-    (_, day, _, _), (code,) = readme_blocks("sh"), readme_blocks("python")
+    (_, day, *_), (code,) = readme_blocks("sh"), readme_blocks("python")
     run_block(day, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
@@ -223,9 +226,20 @@ def test_the_photographed_day_of_the_readme(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_the_plate_of_the_readme_is_pressed_on(tmp_path, monkeypatch):
+    (tmp_path / "path.csv").write_text("x_mm\n20\n60\n", encoding="utf-8")
+    run_block(readme_blocks("sh")[3], tmp_path, monkeypatch)
+    (recorded,) = (tmp_path / "my-plate" / "captures").glob("control-*.mcap")
+    force = read_telemetry(recorded, CONTROL)
+    settled = force["force_aim"] >= 0.99 * force["force_wanted"]
+    assert np.count_nonzero(settled) > 3_000
+    assert np.abs(force["force"][settled] - 2.0).mean() < 0.05
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS data set is not beside the project")
 def test_the_import_of_the_readme(tmp_path, monkeypatch):
-    run_block(readme_blocks("sh")[3], tmp_path, monkeypatch)
+    run_block(readme_blocks("sh")[4], tmp_path, monkeypatch)
     assert (tmp_path / "emps" / "fits" / "friction.nc").is_file()
 
 

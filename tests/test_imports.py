@@ -16,7 +16,7 @@ import scissorcal
 PACKAGE = Path(scissorcal.__file__).parent
 LEAVES = {"errors", "verdicts", "identity", "files", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
-MIDDLE = {"device", "vision", "calibration", "package", "render", "report"}
+MIDDLE = {"device", "vision", "calibration", "package", "render", "report", "tracking", "control"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "verdicts": set(),
@@ -31,9 +31,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "vision": {"recipe", "model"},
     "calibration": {"kernel", "model", "inference", "recipe", "recording", "vision"},
     "package": {"kernel", "model", "calibration", "recipe", "recording"},
-    "render": {"kernel", "device", "package", "recipe", "recording"},
+    "render": {"kernel", "device", "package", "recipe", "recording", "tracking"},
     "report": {"model", "vision", "calibration", "package", "recipe", "recording", "bench"},
-    "bench": LOWEST | {"vision", "device", "calibration", "package", "render"},
+    "tracking": {"model", "recipe"},
+    "control": {"kernel", "model", "recipe", "recording", "device", "tracking"},
+    "bench": LOWEST
+    | {"vision", "device", "calibration", "package", "render", "tracking", "control"},
     "workday": LOWEST | MIDDLE | {"bench"},
     "cli": LOWEST | MIDDLE | {"workday", "bench"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},
@@ -164,12 +167,12 @@ LOADS = {
         "try:\n    run(['plan', '--json'])\n"
         "except SystemExit as end:\n    assert end.code == 0, end.code\n",
         {"numpy", "h5py", "mcap", "scissorcal.device", "scissorcal.calibration"},
-        310,
+        325,
     ),
     "package": (
         "import scissorcal.package.build, scissorcal.workday.runs.package\n",
         {"scipy", "cv2", "h5py", "mcap", "scissorcal.inference", "scissorcal.vision.blade"},
-        420,
+        440,
     ),
     "report": (
         "import scissorcal.report, scissorcal.workday.runs.report\n"
@@ -177,7 +180,7 @@ LOADS = {
         "here = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))\n"
         "assert not difference(here, here).any() and not here.rotation_vector.any()\n",
         {"scipy", "cv2", "h5py", "mcap", "scissorcal.calibration.verify.check"},
-        520,
+        530,
     ),
 }
 """A program, modules that it does without, and how many it may load in all."""

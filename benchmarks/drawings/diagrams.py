@@ -155,7 +155,12 @@ def loop() -> Drawing:
     boxes = {
         "idle": ((40.0, 60.0), "IDLE", ["motors off", "zero commands, no ENABLE"], GREY),
         "track": ((330.0, 60.0), "TRACK", ["PID on a reference", "of opening and advance"], BLUE),
-        "render": ((620.0, 60.0), "RENDER", ["torque of the model,", "ramped up from 0"], GREEN),
+        "render": (
+            (620.0, 60.0),
+            "RENDER, CONTROL",
+            ["torque of the model; force on", "a surface; both from 0"],
+            GREEN,
+        ),
         "damp": ((475.0, 270.0), "DAMP", ["torque = -b · rate,", "no force"], PURPLE),
         "fault": ((40.0, 270.0), "FAULT", ["zero torque, CLEAR_FAULT;", "integrals reset"], ORANGE),
         "stop": (

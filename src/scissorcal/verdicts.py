@@ -14,6 +14,7 @@ _INTERVALS = "whether intervals hold what they promise"
 _SEARCH = "whether the estimate is an optimum at all"
 _DATA = "whether the recording can tell the parameters"
 _POSE = "where the plate is drawn; no torque depends on it"
+_TRACK = "the tracked pose and its stated uncertainty"
 _EDGE = "shape of the edge, which torque follows"
 _CAMERA = "lengths measured in photographs"
 _LOOP = "whether commands reach the motors in time"
@@ -25,6 +26,39 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "bench wrong": (
         "at most",
         "whether each answer of model and kernel is right or refused: how many are neither",
+    ),
+    "bench.control consistency": (
+        "at most",
+        "the pose's stated uncertainty: rows whose mean NEES no consistent filter has",
+    ),
+    "bench.control normal error, fixed": (
+        "at most",
+        "what contact adds to the camera: error along the normal over that of vision alone",
+    ),
+    "bench.control normal error, moving": (
+        "at most",
+        "what contact adds to the camera: error along the normal over that of vision alone",
+    ),
+    "bench.control normal error, 1 s without pictures": (
+        "at most",
+        "what contact adds to the camera: error along the normal over that of vision alone",
+    ),
+    "bench.control traps": (
+        "at most",
+        "each part of the filter: crippled filters that stay consistent",
+    ),
+    "bench.control hybrid force": ("at most", "the pressing force: its rms error, N"),
+    "bench.control stiff position": (
+        "at least",
+        "what contact adds to control by place: force error with vision over that with contact",
+    ),
+    "bench.control path on a disc": (
+        "at least",
+        "what contact adds to the path: its error with vision over that with contact",
+    ),
+    "bench.control touch": (
+        "at most",
+        "the first touch: its peak over approach speed times sqrt(k m)",
     ),
     "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
     "fit optimum": ("at least", f"{_SEARCH}: starts that ended there"),
@@ -123,11 +157,32 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),
     "render supervision": ("at most", f"{_LOOP}: frames with damping only"),
+    "render plate pose": (
+        "at most",
+        TORQUE + "share of the time without the full force, for want of the plate's pose",
+    ),
     "render motor sense": (
         "at most",
         "sense of motor and force sensor: energy that the rig would have given, J",
     ),
     "render passivity": ("at most", "energy beyond the model's, which is felt as buzzing: J"),
+    "track clock jumps": ("at most", f"{_TRACK}: how often a clock of camera or rig jumped"),
+    "track refused pictures": ("at most", f"{_TRACK}: share of pictures beyond the gate"),
+    "track refused contacts": ("at most", f"{_TRACK}: share of contacts beyond the gate"),
+    "track picture consistency": ("at most", f"{_TRACK}: mean NIS of pictures over its 6"),
+    "track contact consistency": ("at most", f"{_TRACK}: mean NIS of contacts over its 1"),
+    "control deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
+    "control misses": ("at most", f"{_LOOP}: share of lost frames"),
+    "control faults": ("at most", f"{_LOOP}: faults that the device latched"),
+    "control supervision": ("at most", f"{_LOOP}: frames with damping only"),
+    "control force": ("at most", "force on a surface: rms of its error while the path goes on, N"),
+    "control path": ("at most", "path on a surface: 95 % of its errors while it goes on, mm"),
+    "control touch": ("at most", "what is pressed on: largest force of a touch, N"),
+    "control contact": ("at most", "path on a surface: how often contact was lost or let go of"),
+    "control no force": (
+        "at most",
+        "force on a surface: what the balance made of none before the touch, N",
+    ),
     "device round trip": ("at most", f"{_LOOP}: 99 % of the answers, ms"),
     "device frame intervals": ("at most", f"{_LOOP}: 99 % of the intervals, ms"),
     "device lost frames": ("at most", f"{_LOOP}: frames lost, %"),

@@ -103,6 +103,41 @@ static void check_mailbox(sc_block *block)
     CHECK(wrong == 0, "mailbox");
 }
 
+/* Estimates of the plate at full speed: all five numbers of a section are of one estimate. */
+static void *write_estimates(void *shared)
+{
+    for (uint32_t k = 1; k <= REQUESTS; k++) {
+        const float number = (float)k;
+        const sc_placing placing = {{number, number, number, number, number}, k, k};
+        sc_block_place(shared, &placing);
+    }
+    return NULL;
+}
+
+static void check_estimates(sc_block *block)
+{
+    pthread_t supervisor;
+    uint32_t turn = 0, last = 0, taken = 0, mixed = 0, back = 0;
+    sc_placing placing = {{0.0f, 0.0f, 0.0f, 0.0f, 0.0f}, 0, 0};
+    CHECK(sc_block_placed(block, &turn, &placing) == 0, "estimates");
+    CHECK(pthread_create(&supervisor, NULL, write_estimates, block) == 0, "estimates");
+    while (last < REQUESTS) {
+        if (!sc_block_placed(block, &turn, &placing)) {
+            continue;
+        }
+        const sc_section *s = &placing.section;
+        const float number = (float)placing.usable;
+        mixed += placing.age_us != placing.usable || s->edge_x != number || s->edge_y != number ||
+                 s->pitch != number || s->stretch != number || s->thickening != number;
+        back += placing.usable <= last;
+        last = placing.usable;
+        taken++;
+    }
+    pthread_join(supervisor, NULL);
+    CHECK(mixed == 0 && back == 0 && taken > 0, "estimates");
+    CHECK(sc_block_placed(block, &turn, &placing) == 0, "estimates");
+}
+
 int main(void)
 {
     sc_block *block = malloc((size_t)sc_block_size(0));
@@ -110,6 +145,7 @@ int main(void)
     CHECK(sc_block_is_sound(block, sc_block_size(0)), "block");
     check_ring(block);
     check_mailbox(block);
+    check_estimates(block);
     free(block);
     return checks_done("block");
 }

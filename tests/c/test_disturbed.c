@@ -2,6 +2,7 @@
  *   test_disturbed GOLDEN [TICKS] [SEED]
  * What must hold whatever comes is checked at each command that is sent; the figures are printed. */
 #include "check.h"
+#include "controls.h"
 #include "json.h"
 #include "models.h"
 #include "sc_servo.h"
@@ -20,6 +21,7 @@ static const char *const TITLE = "disturbed";
 static const float ROUNDING = 1e-4f;
 
 typedef struct {
+    unsigned long long plate_out; /* frames with less than their force for want of a pose */
     double torque_over, force_over; /* share of the limit */
     double slew_over;               /* share of a tick's slew */
     double end_s;                   /* from the start of an end to the stop */
@@ -35,6 +37,8 @@ typedef struct {
     sc_servo servo;
     sc_orders orders;
     sc_reference reference;
+    sc_control_config control;
+    sc_control_task task;
     const sc_model *model;
     float opening, rate, advance, speed;
     float torque, force; /* held by the device */
@@ -51,6 +55,8 @@ typedef struct {
 
 static float path_opening[PATH_TICKS], path_rate[PATH_TICKS], path_advance[PATH_TICKS];
 static int32_t path_stroke[PATH_TICKS];
+
+static float along_place[PATH_TICKS], along_rate[PATH_TICKS], along_force[PATH_TICKS];
 
 static uint32_t drawn(trial *t)
 {
@@ -78,6 +84,9 @@ static void make_path(void)
         path_rate[i] = -0.15f * 6.2831853f / 1.024f * sinf(phase);
         path_advance[i] = -0.02f;
         path_stroke[i] = 0;
+        along_place[i] = 1e-3f * sinf(phase);
+        along_rate[i] = 1e-3f * 6.2831853f / 1.024f * cosf(phase);
+        along_force[i] = 2.0f;
     }
 }
 
@@ -135,14 +144,23 @@ static void begin(trial *t, const sc_model *model)
     if (chance(t, 0.7f)) {
         c->watch = watches(c);
     }
+    if (chance(t, 0.4f)) {
+        c->plate = (sc_plate_config){1, 50000, 0.015f, 0.1f, -1.0f, 1.0f};
+    }
     t->model = model;
-    t->reference = (sc_reference){path_opening, path_rate, path_advance, path_stroke, PATH_TICKS};
+    t->reference = (sc_reference){path_opening, path_rate, path_advance, path_stroke, PATH_TICKS,
+                                  &t->task};
+    t->control = sound_control();
+    t->control.tick_s = 1e-6f * (float)c->tick_us;
+    t->control.end_s = 10.0f;
+    t->task.config = &t->control;
+    t->task.path = (sc_path){along_place, along_rate, along_force, path_stroke, PATH_TICKS};
     t->opening = uniform(t, 0.4f, 0.7f);
     t->advance = -0.02f;
     t->measured_gain = chance(t, 0.8f) ? 1.0f : uniform(t, -1.0f, 2.0f);
     t->sequence = drawn(t);
     t->device_us = drawn(t);
-    t->orders.mode = 1 + drawn(t) % 3;
+    t->orders.mode = 1 + drawn(t) % 4;
     t->orders.order = 1;
 }
 
@@ -201,6 +219,24 @@ static void measure(trial *t)
     }
 }
 
+/* A surface near where the tip is, or somewhere else, or none. */
+static void send_contour(trial *t)
+{
+    const float slant = uniform(t, -0.2f, 0.2f), beta = 0.5f * t->opening;
+    const float off = chance(t, 0.9f) ? uniform(t, -2e-3f, 2e-3f) : uniform(t, -0.1f, 0.1f);
+    sc_contour *to = &t->task.contour;
+    to->point[0] = t->advance + 0.075f * cosf(beta);
+    to->point[1] = 0.075f * sinf(beta) - 5e-3f + off;
+    to->normal[0] = -sinf(slant);
+    to->normal[1] = chance(t, 1e-3f) ? NAN : cosf(slant);
+    to->curvature = uniform(t, -20.0f, 20.0f);
+    to->place = uniform(t, -1e-3f, 1e-3f);
+    to->velocity[1] = uniform(t, -0.01f, 0.01f);
+    to->turn_rate = uniform(t, -0.1f, 0.1f);
+    to->lift = chance(t, 0.05f) ? 1u : 0u;
+    to->number++;
+}
+
 static void disturb_host(trial *t)
 {
     if (t->quiet_ticks == 0 && chance(t, 1e-4f)) {
@@ -212,14 +248,29 @@ static void disturb_host(trial *t)
         t->orders.heartbeat++;
     }
     if (chance(t, 2e-4f)) {
-        t->orders.mode = drawn(t) % 4;
+        t->orders.mode = drawn(t) % 5;
         t->orders.order++;
+    }
+    if (chance(t, 0.02f)) {
+        send_contour(t);
     }
     if (chance(t, 1e-4f)) {
         t->orders.sheet++;
     }
     if (chance(t, 2e-6f)) {
         t->orders.stop = 1;
+    }
+}
+
+/* A plate that is somewhere, or nowhere, and now and then without any news for long. */
+static void disturb_plate(trial *t)
+{
+    const float pitch = t->model->moving_blades == 1 ? uniform(t, -0.2f, 0.2f) : 0.0f;
+    const sc_placing p = {{uniform(t, -0.06f, 0.0f), uniform(t, -2e-3f, 2e-3f), pitch,
+                           uniform(t, 0.98f, 1.02f), chance(t, 0.01f) ? NAN : 1.02f},
+                          !chance(t, 0.02f), drawn(t) % 30000};
+    if (t->quiet_ticks == 0 && chance(t, 0.1f)) {
+        sc_servo_place(&t->config, t->model, &t->servo, &p);
     }
 }
 
@@ -245,11 +296,8 @@ static void check_sent(trial *t, const sc_command *command, figures *f)
     const double torque = (double)command->torque, force = (double)command->force;
     f->sent++;
     most(&f->torque_over, fabs(torque) / (double)c->torque_limit - 1.0);
-    if (c->force_limit > 0.0f) {
-        most(&f->force_over, fabs(force) / (double)c->force_limit - 1.0);
-    } else {
-        most(&f->force_over, fabs(force));
-    }
+    const double most_force = (double)c->force_limit;
+    most(&f->force_over, most_force > 0.0 ? fabs(force) / most_force - 1.0 : fabs(force));
     if (torque != 0.0) {
         const double slew = (double)c->torque_slew * tick_s;
         most(&f->slew_over, fabs(torque - t->sent_torque) / slew - 1.0);
@@ -260,10 +308,8 @@ static void check_sent(trial *t, const sc_command *command, figures *f)
     }
     const double fall = (double)c->torque_limit / ((double)c->torque_slew * tick_s);
     f->late_news += t->stale_passes > (uint32_t)fall + 2 && torque != 0.0;
-    t->sent_torque = torque;
-    t->sent_force = force;
-    t->torque = command->torque;
-    t->force = command->force;
+    t->sent_torque = t->torque = command->torque;
+    t->sent_force = t->force = command->force;
     t->enabled = (command->flags & SC_COMMAND_ENABLE) != 0;
     if ((command->flags & SC_COMMAND_CLEAR_FAULT) && t->fault_ticks == 0) {
         t->faulty = 0;
@@ -310,6 +356,7 @@ static void turn(trial *t, figures *f)
     }
     sc_command command;
     disturb_host(t);
+    disturb_plate(t);
     pass_time(t, elapsed_us, f);
     for (uint32_t i = 0; i < queued; i++) {
         move(t);
@@ -348,6 +395,7 @@ static uint32_t run_episode(trial *t, const sc_model *model, figures *f)
     }
     most(&f->energy_error, fabs(t->servo.ledger.delivered_J - t->booked_J));
     f->energy_moved += fabs(t->booked_J);
+    f->plate_out += t->servo.plate_out_frames;
     return ticks;
 }
 
@@ -373,16 +421,15 @@ int main(int argc, char **argv)
            ticks, episodes, f.sent, f.stops, f.ends);
     printf("over its limit: torque %.1e, force %.1e; over a tick's slew: %.1e (shares; below 0: "
            "within)\n", f.torque_over, f.force_over, f.slew_over);
-    printf("longest end %.4f s; stop after silence, beyond the promise: %.4f s\n", f.end_s,
-           f.silence_over_s);
-    printf("energy booked less energy sent: %.1e J at most, of %.1f J in all\n", f.energy_error,
-           f.energy_moved);
+    printf("longest end %.4f s; stop after silence, beyond the promise: %.4f s; energy booked less "
+           "energy sent: %.1e J at most, of %.1f J in all\n", f.end_s, f.silence_over_s,
+           f.energy_error, f.energy_moved);
     CHECK(f.torque_over <= 0.0 && f.force_over <= 0.0, TITLE);
     CHECK(f.slew_over <= (double)ROUNDING, TITLE);
     CHECK(f.unlatched == 0, TITLE);
     CHECK(f.late_news == 0, TITLE);
     CHECK(f.stops > 0 && f.ends > 0, TITLE);
-    CHECK(f.end_s <= 0.105, TITLE);
+    CHECK(f.end_s <= 0.105 && f.plate_out > 1000, TITLE);
     CHECK(f.silence_over_s <= 0.006, TITLE);
     CHECK(f.energy_error <= 1e-9 && f.energy_moved > 0.0, TITLE);
     json_free(&vectors);

@@ -100,7 +100,7 @@ int main(int argc, char **argv)
     static path room;
     json vectors = json_load(argc > 1 ? argv[1] : "../golden", "servo.json");
     const json *from = json_get(&vectors, "reference"), *cases = json_get(&vectors, "cases");
-    sc_reference reference = {room.opening, room.opening_rate, room.advance, room.stroke, 0};
+    sc_reference reference = {room.opening, room.opening_rate, room.advance, room.stroke, 0, NULL};
     reference.size = (uint32_t)json_floats(json_get(from, "opening"), room.opening, MOST);
     json_floats(json_get(from, "opening_rate"), room.opening_rate, MOST);
     json_floats(json_get(from, "advance"), room.advance, MOST);

@@ -6,14 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import jsonschema
+import numpy as np
 import pytest
 import typer
 
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.root import run
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.library import builtin_recipe, schemas_dir
+from scissorcal.recipe.schema import Recipe
+from scissorcal.vision.sim.sim_camera import (
+    SIM_LENS,
+    render_card_photographs,
+    render_plate_photographs,
+)
 
 
 @dataclass(frozen=True)
@@ -67,3 +75,27 @@ def run_instead(function: Callable[[], Answer], patch: pytest.MonkeyPatch) -> No
     app = typer.Typer(rich_markup_mode=None)
     app.command("plan")(command(function))
     patch.setattr(LazyGroup, "load", lambda *_: typer.main.get_command(app))
+
+
+@pytest.fixture(scope="session")
+def recipe() -> Recipe:
+    return builtin_recipe("paper-80gsm")
+
+
+@pytest.fixture(scope="session")
+def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three photographs of a plate, nine of the card with stances.csv, and camera.yml."""
+    folder = tmp_path_factory.mktemp("plates")
+    render_plate_photographs(recipe, folder, 0, count=3)
+    stances = render_card_photographs(recipe, folder, 0)
+    rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
+    (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
+    lens = SIM_LENS
+    store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
+    store.write("image_width", lens.width)
+    store.write("image_height", lens.height)
+    (u, v), f = lens.centre_px, lens.focal_px
+    store.write("camera_matrix", np.array([[f, 0.0, u], [0.0, f, v], [0.0, 0.0, 1.0]]))
+    store.write("distortion_coefficients", np.array([lens.distortion]))
+    store.release()
+    return folder

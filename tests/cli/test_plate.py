@@ -1,69 +1,19 @@
-"""Photographs of the plate and of the rig's card, the plate's fit, and its track."""
+"""Photographs of the plate and of the rig's card, and the plate's fit."""
 
-import json
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from scissorcal.calibration.plate.track import TrackHead, TrackRow
-from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.pose import Pose as Found
 from scissorcal.vision.geometry.pose import difference
-from scissorcal.vision.sim import Pose, chained
+from scissorcal.vision.sim import Pose
 from scissorcal.vision.sim.sim_camera import (
-    SIM_LENS,
-    render_card_photographs,
-    render_frames,
-    render_plate_photographs,
     sim_plate_scene,
 )
 from tests.cli.conftest import Cli
-
-
-@pytest.fixture(scope="module")
-def recipe() -> Recipe:
-    return builtin_recipe("paper-80gsm")
-
-
-@pytest.fixture(scope="module")
-def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three photographs of a plate, nine of the card with stances.csv, and camera.yml."""
-    folder = tmp_path_factory.mktemp("plates")
-    render_plate_photographs(recipe, folder, 0, count=3)
-    stances = render_card_photographs(recipe, folder, 0)
-    rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
-    (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
-    lens = SIM_LENS
-    store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
-    store.write("image_width", lens.width)
-    store.write("image_height", lens.height)
-    (u, v), f = lens.centre_px, lens.focal_px
-    store.write("camera_matrix", np.array([[f, 0.0, u], [0.0, f, v], [0.0, 0.0, 1.0]]))
-    store.write("distortion_coefficients", np.array([lens.distortion]))
-    store.release()
-    return folder
-
-
-@pytest.fixture(scope="module")
-def video(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten pictures at 10 Hz of a plate that slides; the fourth is empty, the eighth black."""
-    path = tmp_path_factory.mktemp("video") / "plate.avi"
-    lens = SIM_LENS
-    writer = cv2.VideoWriter(
-        str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (lens.width, lens.height)
-    )
-    for frame in render_frames(recipe, 0, 10):
-        image = frame.image
-        if frame.number == 3:
-            image = np.repeat(
-                np.linspace(60, 180, lens.width, dtype=np.uint8)[None, :, None], lens.height, 0
-            ).repeat(3, 2)
-        writer.write(image)
-    writer.release()
-    return path
 
 
 def plates(album: Path) -> list[Path]:
@@ -173,7 +123,7 @@ def test_what_must_come_first_is_said(cli: Cli, workspace: Path, album: Path) ->
     said = cli("fit", "plate", "--json")
     assert said.code == 5
     assert "scissorcal capture plate" in said.envelope["result"]["error"]
-    assert cli("capture", "track", "--camera", "sim").code == 5
+    assert cli("track", "--camera", "sim").code == 5
     cli("import", album / "camera.yml")
     said = cli("fit", "plate")
     assert said.code == 5
@@ -192,43 +142,6 @@ def test_photographs_of_another_size_are_refused(
     assert "has 1000 x 750 pixels, and the camera was fitted at 2000 x 1500" in said.err
 
 
-def test_a_video_is_tracked_and_its_drop_outs_named(
-    cli: Cli, workspace: Path, album: Path, video: Path, recipe: Recipe
-) -> None:
-    cli("import", album / "camera.yml")
-    said = cli("capture", "track", "--camera", video, "--json")
-    assert said.code == 0
-    result = said.envelope["result"]
-    assert (result["pictures"], result["poses"], result["drop_outs"]) == (10, 8, 2)
-    assert result["states"] == {
-        "seen": 8, "ambiguous": 0, "blank": 1, "no target": 1, "no pose": 0
-    }  # fmt: skip
-    assert result["longest_gap_s"] == pytest.approx(0.2)
-    assert result["travel_mm"] == pytest.approx(2.7, abs=0.1)
-
-    (path,) = (Path(name) for name in said.envelope["files"])
-    first, *lines = path.read_text("utf-8").splitlines()
-    head = TrackHead.model_validate_json(first)
-    rows = [TrackRow.model_validate_json(line) for line in lines]
-    assert (head.source, head.frame) == ("plate.avi", "camera")
-    assert [row.state for row in rows].index("no target") == 3
-    assert [row.state for row in rows].index("blank") == 7
-    scene = sim_plate_scene(recipe, 0)
-    for row in rows:
-        if row.pose is None:
-            continue
-        slid = Pose(np.eye(3), np.array([3e-4 * row.number, 0.0, 0.0]))
-        truth = chained(scene.camera_plate, slid)
-        degrees, millimetres = off(row.pose.model_dump(), truth)
-        assert degrees < 0.15
-        assert millimetres < 0.4
-
-    said = cli("capture", "track", "--camera", video, "--seconds", "0.35")
-    assert said.code == 0
-    assert "3 poses in 4 pictures" in said.out
-    assert "no target" in said.out
-
-
 def test_photographs_are_taken_from_a_video(
     cli: Cli, workspace: Path, album: Path, tmp_path: Path
 ) -> None:
@@ -243,39 +156,20 @@ def test_photographs_are_taken_from_a_video(
     assert "2 photographs of the plate board" in said.out
 
 
-@pytest.mark.parametrize("what", ["plate", "track"])
+@pytest.mark.parametrize("words", [("capture", "plate"), ("track",)])
 def test_no_such_camera_or_video(
-    cli: Cli, workspace: Path, album: Path, what: str, tmp_path: Path
+    cli: Cli, workspace: Path, album: Path, words: tuple[str, ...], tmp_path: Path
 ) -> None:
     cli("import", album / "camera.yml")
-    said = cli("capture", what, "--camera", "97", "--json")
+    said = cli(*words, "--camera", "97", "--json")
     assert said.code == 4
     assert "Camera 97 gives no picture" in said.envelope["result"]["error"]
-    said = cli("capture", what, "--camera", "gone.mp4")
+    said = cli(*words, "--camera", "gone.mp4")
     assert said.code == 2
     assert "gone.mp4 does not exist" in said.err
-    said = cli("capture", what, "--camera", album / "stances.csv")
+    said = cli(*words, "--camera", album / "stances.csv")
     assert said.code == 2
     assert "is not a readable video" in said.err
-    assert captured(workspace) == []
-
-
-def test_a_video_without_the_target_leaves_nothing(
-    cli: Cli, workspace: Path, album: Path, tmp_path: Path
-) -> None:
-    cli("import", album / "camera.yml")
-    for size, words in (
-        ((2000, 1500), "in 3 the picture is uniform"),
-        ((640, 480), "The pictures are 640 x 480 pixels"),
-    ):
-        path = tmp_path / f"{size[0]}.avi"
-        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, size)
-        for _ in range(3):
-            writer.write(np.full((size[1], size[0], 3), 40, np.uint8))
-        writer.release()
-        said = cli("capture", "track", "--camera", path, "--json")
-        assert said.code == 2
-        assert words in said.envelope["result"]["error"]
     assert captured(workspace) == []
 
 
@@ -285,11 +179,3 @@ def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> N
     said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
     assert said.code == 2
     assert "The rig's stances are not known" in said.err
-
-
-def test_a_track_is_json_line_by_line(cli: Cli, workspace: Path, album: Path, video: Path) -> None:
-    cli("import", album / "camera.yml")
-    (name,) = cli("capture", "track", "--camera", video, "--json").envelope["files"]
-    lines = [json.loads(line) for line in Path(name).read_text().splitlines()]
-    assert lines[0]["format"] == "scissorcal-track/1"
-    assert [line["number"] for line in lines[1:]] == list(range(10))

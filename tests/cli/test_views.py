@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from scissorcal.cli import progress as progress_module
-from scissorcal.cli.live_view import LiveView, torque_plot
+from scissorcal.cli.live_view import LiveView, effort_plot
 from scissorcal.cli.output import table
 from scissorcal.cli.progress import progress
-from scissorcal.device.coverage import CoverageGrid
+from scissorcal.device.coverage import OPENING, CoverageGrid
 from scissorcal.device.recorder import Recorder
 from scissorcal.errors import InputError, VerdictError
 from scissorcal.recording import SAMPLE_DTYPE, RecordingWriter
@@ -95,7 +95,7 @@ def test_a_terminal_shows_torque_over_opening_with_units(
 
 
 def test_the_newest_point_of_the_plot_is_marked() -> None:
-    plot = torque_plot(deque([(10.0, -5.0), (30.0, 5.0), (20.0, 0.0)])).splitlines()
+    plot = effort_plot(deque([(10.0, -5.0), (30.0, 5.0), (20.0, 0.0)]), OPENING).splitlines()
     assert plot[0] == "motor torque (mN m)"
     assert plot[1].startswith("      5.0 |")
     assert plot[1].endswith(".")

@@ -72,10 +72,12 @@ def test_felt_lag_adds_the_round_trip_to_the_ticks() -> None:
 
 
 def test_ticks_with_the_motors_on_go_before_those_with_the_motors_off() -> None:
-    counts = np.zeros((4, 64), dtype=np.int64)
+    counts = np.zeros((len(Mode), 64), dtype=np.int64)
     counts[int(Mode.IDLE), 9] = 1000
     counts[int(Mode.RENDER), 0] = 10
-    lag = LagCounts(counts, np.zeros(4, dtype=np.int64), np.array([10, 0, 1, 0]))
+    worst = np.zeros(len(Mode), dtype=np.int64)
+    worst[int(Mode.IDLE)], worst[int(Mode.RENDER)] = 10, 1
+    lag = LagCounts(counts, np.zeros(len(Mode), dtype=np.int64), worst)
     assert FeltLag.of(lag, 1e-3, 0.0).ticks.worst == 1
     counts[int(Mode.RENDER), 0] = 0
     assert FeltLag.of(lag, 1e-3, 0.0).ticks.worst == 10

@@ -261,7 +261,7 @@ def model_vectors() -> dict[str, Any]:
             {
                 "title": title,
                 "tolerance": tolerance,
-                "model": _model(tables),
+                "model": model_of(tables),
                 "opening": opening,
                 "rate": rate,
                 "advance": advance,
@@ -274,7 +274,7 @@ def model_vectors() -> dict[str, Any]:
     return {"format": "scissorcal-golden-model/1", "cases": cases}
 
 
-def _model(tables: ModelTables) -> dict[str, Any]:
+def model_of(tables: ModelTables) -> dict[str, Any]:
     """Everything in a set of tables; numbers rounded to float32, an endless blade as 1e30 m."""
     model: dict[str, Any] = {}
     for field in fields(tables):
@@ -342,7 +342,7 @@ def servo_vectors() -> dict[str, Any]:
         single_config = {
             f.name: getattr(config, f.name)
             for f in fields(config)
-            if f.name not in ("watch", "passivity", "motor_sign")
+            if f.name not in ("watch", "passivity", "plate", "motor_sign")
         }
         single_config = {
             name: single(v) if isinstance(v, float) else v for name, v in single_config.items()

@@ -12,6 +12,12 @@ C_TESTS = Path(__file__).parent.parent / "c"
 MOST_INSTRUCTIONS = 6000
 """Of any step at 64 knots on a Cortex-M4F, where the release falls along the blade."""
 
+MOST_HYBRID_INSTRUCTIONS = 6000
+"""Of any step of the hybrid law on a Cortex-M4F."""
+
+MOST_CONTROL_INSTRUCTIONS = 7000
+"""Of any tick of the mode CONTROL on a Cortex-M4F."""
+
 MOST_TIMES_BY_HAND = 3.0
 """Of a slow stroke's mean step."""
 
@@ -61,7 +67,8 @@ def test_what_two_threads_share(tmp_path: Path) -> None:
 )
 def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
     """The portable core compiles without a warning, and its step's instructions are bounded."""
-    rows = [line for line in make("cortex-m", tmp_path).splitlines() if ", " in line]
+    lines = make("cortex-m", tmp_path).splitlines()
+    rows = [line for line in lines if ", " in line]
     assert len(rows) == 10
     for row in rows:
         by_hand, stroke, ratio, _, worst = (float(word) for word in row.split()[-5:])
@@ -69,6 +76,12 @@ def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
         if "scanned" not in row:
             assert ratio <= MOST_TIMES_BY_HAND, row
             assert worst <= MOST_INSTRUCTIONS, row
+    hybrid = [line for line in lines if line.startswith("hybrid law")]
+    assert len(hybrid) == 4
+    assert all(0 < int(row.split()[-1]) <= MOST_HYBRID_INSTRUCTIONS for row in hybrid), hybrid
+    control = [line for line in lines if line.startswith("CONTROL")]
+    assert len(control) == 3
+    assert all(0 < int(row.split()[-1]) <= MOST_CONTROL_INSTRUCTIONS for row in control), control
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from scissorcal.kernel import (
     encode_frame,
 )
 from tests.kernel.reference_model import Reference
-from tests.kernel.zoo import arc_edge, make_tables, power_response
+from tests.kernel.zoo import CONTOUR, CONTROL, arc_edge, make_tables, power_response
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)
@@ -136,8 +136,11 @@ def test_commands_are_always_finite_and_within_limits(
         ramp_s=0.0,
     )
     for mode in Mode:
-        servo = Servo(make_tables(render_friction=True), config)
+        servo = Servo(make_tables(render_friction=True), config, CONTROL)
         servo.set_reference([0.5] * 9, [0.0] * 9, [0.0] * 9, [0] * 9)
+        assert servo.control is not None
+        servo.control.set_path([0.0] * 9, [0.0] * 9, [2.0] * 9, [0] * 9)
+        servo.control.send(CONTOUR)
         servo.engage(mode)
         for row in rows:
             command = servo.step(State(*row))

@@ -5,12 +5,33 @@ from typing import Any
 
 import numpy as np
 
-from scissorcal.kernel import ModelTables, Table
+from scissorcal.kernel import (
+    AxisFriction,
+    Contour,
+    ControlConfig,
+    HybridConfig,
+    ModelTables,
+    Table,
+)
+from scissorcal.kernel.control import FRICTION_POINTS
 
 EDGE_OFFSET = -0.008
 EDGE_TAPER = math.tan(math.radians(2.0))
 BLADE_LENGTH = 0.075
 REFERENCE = 3e-4
+LAW = HybridConfig(
+    axes=2, contact_kd=60.0, force_ki=12.0, normal_kp=2500.0, normal_kd=100.0, path_kp=2500.0,
+    path_kd=100.0, force_most=5.0, approach_force=1.5, touch_force=0.3, leave_force=0.15,
+    friction_rate=(1.0, 0.02), effort_limit=(0.5, 20.0),
+)  # fmt: skip
+FLAT = AxisFriction(
+    fastest=2.0, positive=(0.015,) * FRICTION_POINTS, negative=(0.015,) * FRICTION_POINTS
+)
+CONTROL = ControlConfig(
+    law=LAW, station=0.075, edge_offset=-0.0054, moving_blades=2, inertia=2e-4, mass=0.8,
+    offset=0.0, opening=FLAT, advance=FLAT, tick_s=1e-3, presliding=2e-4, stiffness=1e4,
+)  # fmt: skip
+CONTOUR = Contour(point=(0.07, 0.008), normal=(0.0, 1.0), curvature=0.0, place=0.0)
 
 
 def straight(y0: float, y1: float, x0: float = 0.0, x1: float = 1.0) -> Table:

@@ -47,3 +47,22 @@ def pad(tmp_path_factory: pytest.TempPathFactory) -> ModelPackage:
     """A pad that is pressed."""
     chosen = recipe("press-only")
     return package_for(tmp_path_factory.mktemp("pad"), chosen, energy=None, force=5.0)
+
+
+def on_estimated_plate(moving: str, **scene: Any) -> Recipe:
+    """Paper without friction whose plate's pose is estimated."""
+    chosen = recipe(plate_pose="estimated", render_friction=False, **scene)
+    rig = chosen.rig.model_copy(update={"moving": moving})
+    return chosen.model_copy(update={"rig": rig})
+
+
+@pytest.fixture(scope="session")
+def upper_paper(tmp_path_factory: pytest.TempPathFactory) -> ModelPackage:
+    """Paper on a plate that is tracked, cut smoothly by one moving blade."""
+    return package_for(tmp_path_factory.mktemp("upper"), on_estimated_plate("upper"), energy=0.52)
+
+
+@pytest.fixture(scope="session")
+def both_paper(tmp_path_factory: pytest.TempPathFactory) -> ModelPackage:
+    """Paper on a plate that is tracked, cut smoothly by two moving blades."""
+    return package_for(tmp_path_factory.mktemp("both"), on_estimated_plate("both"), energy=0.52)

@@ -11,6 +11,7 @@ from scissorcal.kernel import ConfigKey
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording
 from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
+from tests.render.plate_motion import Move, Tracker
 
 
 def test_a_port_is_served_by_a_separate_process(paper: ModelPackage, tmp_path: Path) -> None:
@@ -49,3 +50,19 @@ def test_a_supervisor_that_is_slow_for_a_moment_changes_nothing(paper: ModelPack
     assert slept
     assert result.fallback_frames == 0
     assert result.overrun == 0
+
+
+def test_an_estimated_plate_is_followed_through_a_port(upper_paper: ModelPackage) -> None:
+    """The source is asked with the host's clock, some hundred times a second."""
+    face = upper_paper.tables.upper_face
+    tracker = Tracker(Move((0.0, face, 0.0)), np.random.default_rng(1))
+    with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
+        link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
+        before_s = time.monotonic()
+        strokes = VirtualStrokes(1, 0.6)
+        result = render(link, upper_paper, seconds=3.0, strokes=strokes, plate=tracker)
+    assert before_s < tracker.asked_s < time.monotonic()
+    assert result.plate is not None
+    assert result.plate.estimates > 100
+    assert tracker.samples > 2000
+    assert result.largest_torque_Nm > 0.01

@@ -11,7 +11,14 @@ Only plans, labels and recordings are the product's, because any rig is asked by
     truth = true_parameters(rig, reference_indentation_m=1.5e-4, angle_center=0.5)
 """
 
-from .capture import Interruption, capture_cut, capture_friction, driven_timeline, identity_of
+from .capture import (
+    Interruption,
+    capture_cut,
+    capture_friction,
+    capture_friction_advance,
+    driven_timeline,
+    identity_of,
+)
 from .parameters import (
     Blades,
     Friction,
@@ -43,6 +50,7 @@ __all__ = [
     "Timeline",
     "capture_cut",
     "capture_friction",
+    "capture_friction_advance",
     "coarse",
     "cotton",
     "draw_truth",

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.advance_trajectory import advance_plan
 from scissorcal.device.capture import identity_facts
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_travel
 from scissorcal.device.trajectory import Plan, friction_plan
-from scissorcal.kernel import Capability, Identity
+from scissorcal.kernel import Capability, Identity, StateFlag
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import SAMPLE_DTYPE, Joint, Kind, Recording, Stroke, label_strokes
 
@@ -75,6 +76,16 @@ def capture_friction(
     timeline = driven_timeline(plan, zero_s=ZERO_S)
     books = run(rig, timeline, rng)
     return _recording(rig, "friction", plan.strokes, timeline, books, rng), books
+
+
+def capture_friction_advance(
+    rig: Rig, recipe: Recipe, rng: np.random.Generator
+) -> tuple[Recording, Books]:
+    """Drive the sledge over the recipe's empty sweeps and record them."""
+    plan = advance_plan(recipe, identity_of(rig))
+    timeline = driven_timeline(plan, zero_s=ZERO_S)
+    books = run(rig, timeline, rng)
+    return _recording(rig, "friction-advance", plan.strokes, timeline, books, rng), books
 
 
 def capture_cut(
@@ -194,6 +205,7 @@ def _recording(
     samples["sequence"] = (FIRST_SEQUENCE + sequence).astype(np.uint32)
     samples["device_time_us"] = FIRST_US + np.rint(1e6 * drifting).astype(np.int64)
     samples["host_time_ns"] = np.rint(1e9 * books.time_s).astype(np.int64) + 400_000
+    samples["flags"] = np.where(timeline.mode == SERVO, int(StateFlag.MOTOR_ENABLED), 0)
     samples["opening"] = rows["measured_opening"]
     samples["advance"] = rows["measured_advance"]
     samples["motor_torque"] = (

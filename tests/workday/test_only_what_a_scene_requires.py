@@ -24,6 +24,7 @@ from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.plan import make_plan
+from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace
 from tests.device.conftest import IDENTITY
 from tests.package.fits import cut_fit, friction_fit
@@ -198,6 +199,19 @@ def test_a_scene_with_one_moving_blade_has_the_same_parts(tmp_path: Path) -> Non
     both = open_both(tmp_path)
     assert set(package.arrays) == set(both.arrays)
     assert planned("one blade", tmp_path / "day") == planned("no friction", tmp_path / "other")
+
+
+def test_a_plates_surface_does_not_make_the_fit_of_its_pose_stale() -> None:
+    text = recipe_path("paper-photographed").read_text(encoding="utf-8")
+    settings = BY_NAME["fit plate"].settings
+    flat, bent = (
+        parse_recipe(text.replace('kind = "plane"', kind))
+        for kind in ('kind = "plane"', 'kind = "sphere"\nradius_mm = 50.0')
+    )
+    assert flat.plate.surface != bent.plate.surface
+    assert settings(flat) == settings(bent)
+    turned = parse_recipe(text.replace("turn_deg = 0.0", "turn_deg = 1.0"))
+    assert settings(flat) != settings(turned)
 
 
 def open_both(folder: Path) -> ModelPackage:

@@ -82,7 +82,7 @@ def _coarse_words(fit: FitResult) -> str:
 
 
 def _long_windows(fit: FitResult) -> bool:
-    return fit.what == "friction" and (_number(fit, "window_lengthening") or 1.0) >= LONG_WINDOWS
+    return fit.what != "cut" and (_number(fit, "window_lengthening") or 1.0) >= LONG_WINDOWS
 
 
 def _long_windows_words(fit: FitResult) -> str:

@@ -36,16 +36,18 @@ MOST_MORE = 20
 """Times the recorded motion beyond which nobody records more to distinguish two candidates."""
 
 
-def choose(fitted: Sequence[FittedCandidate], signal_rms: float = 0.0) -> FittedCandidate:
+def choose(
+    fitted: Sequence[FittedCandidate], signal_rms: float = 0.0, negligible: float = NEGLIGIBLE
+) -> FittedCandidate:
     """Take the simplest candidate that is not distinguishable from the best.
 
     ``fitted`` stands simplest first. Hold-out strokes are judged twice (see
     :func:`~.candidates.compare`): by fits without them, and by the posterior without them (PSIS-LOO
     over whole strokes, as far as its k-hats are good). Candidates whose error is larger by less
-    than `NEGLIGIBLE` of ``signal_rms`` are equivalent too. That needs a ``signal_rms``, and suits
-    candidates that differ in their mean only. The result has ``equivalent`` filled in.
+    than the share ``negligible`` of ``signal_rms`` are equivalent too. That needs a ``signal_rms``,
+    and suits candidates that differ in their mean only. The result has ``equivalent`` filled in.
     """
-    rows = _rows(fitted, signal_rms)
+    rows = _rows(fitted, signal_rms, negligible)
     (index,) = (index for index, row in enumerate(rows) if row.chosen)
     return replace(fitted[index], equivalent=tuple(row.name for row in rows if row.equivalent))
 
@@ -58,13 +60,15 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
     return max(fitted, key=lambda one: float(one.scores.sum()))
 
 
-def _rows(fitted: Sequence[FittedCandidate], signal_rms: float) -> tuple[CandidateRow, ...]:
+def _rows(
+    fitted: Sequence[FittedCandidate], signal_rms: float, negligible: float = NEGLIGIBLE
+) -> tuple[CandidateRow, ...]:
     best = best_of(fitted)
     accounts = [Account(np.stack([one.scores for one in fitted]) * best.share)]
     if len(fitted) > 1:
         scores = np.stack([one.left_out.scores for one in fitted]) * best.share
         accounts.append(Account(scores, np.stack([one.left_out.reliable for one in fitted])))
-    limit = (NEGLIGIBLE * signal_rms) ** 2
+    limit = (negligible * signal_rms) ** 2
     return compare(
         [one.name for one in fitted],
         [len(one.optimum.point) for one in fitted],

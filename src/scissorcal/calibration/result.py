@@ -35,6 +35,11 @@ def by_name(group: str, columns: str) -> Stored:
     return Stored(("chain", "draw"), group, columns=columns)
 
 
+def command_words(what: str) -> str:
+    """What commands call a fit of this name."""
+    return {"friction-advance": "friction --axis advance"}.get(what, what)
+
+
 class Result:
     """What every stored result has, and a short ``repr``.
 
@@ -55,6 +60,15 @@ class Result:
     def model(self) -> str:
         """The chosen candidate model in words; empty where there is only one model."""
         return str(getattr(self, "rung", ""))
+
+    @property
+    def words(self) -> str:
+        """What commands call the result: 'scissorcal fit <words>', 'scissorcal verify <words>'.
+
+        >>> command_words("friction-advance")
+        'friction --axis advance'
+        """
+        return command_words(self.what)
 
     @property
     def rejected(self) -> tuple[Verdict, ...]:
@@ -243,25 +257,25 @@ class Predictive:
 class FitResult(Result):
     """The result of one fit: the same type for friction and for a cut.
 
-    ``what`` is "friction" or "cut". ``rung`` names the chosen candidate model in words ("coulomb +
-    viscous, asymmetric"); ``structure`` holds the discrete choices that, with a draw, define the
-    model (the package compiler reads them). ``draws`` (draws, parameters) are in SI, columns in the
-    order of ``parameters``; ``map_point`` has shape (parameters,). ``rungs`` lists the candidates
-    that were compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``,
-    ``held_out_score``, ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and
-    ``equivalent`` (not distinguishable from the best); ``selection`` is the same in words.
-    ``critic`` holds the terms that the critic proposes, ``replay`` the comparison with
-    record-and-replay. ``prior_draws`` (k, parameters) are the prior's, in SI. ``nuisance`` and
-    ``nuisance_draws`` (draws, nuisance) are parameters that are inferred and not reported, row by
-    row with ``draws``. ``derived`` follow from parameters and the recipe, with ``derived_draws``
-    (draws, derived) row by row; no model needs them. ``diagnostics`` are plain numbers and strings
-    (k_hat, ess, evaluations, whiteness_p, ...). ``sources`` names the
+    ``what`` is "friction" (of the opening), "friction-advance" (of the sledge) or "cut". ``rung``
+    names the chosen candidate model in words ("coulomb + viscous, asymmetric"); ``structure`` holds
+    the discrete choices that, with a draw, define the model (the package compiler reads them).
+    ``draws`` (draws, parameters) are in SI, columns in the order of ``parameters``; ``map_point``
+    has shape (parameters,). ``rungs`` lists the candidates that were compared, cheapest first, each
+    with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``, ``loo``, ``loo_se``,
+    ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not distinguishable from the
+    best); ``selection`` is the same in words. ``critic`` holds the terms that the critic proposes,
+    ``replay`` the comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
+    prior's, in SI. ``nuisance`` and ``nuisance_draws`` (draws, nuisance) are parameters that are
+    inferred and not reported, row by row with ``draws``. ``derived`` follow from parameters and the
+    recipe, with ``derived_draws`` (draws, derived) row by row; no model needs them. ``diagnostics``
+    are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...). ``sources`` names the
     recordings, and ``used`` has an array (k, 2) for each: first and one past the last sample of
-    each part that the fit uses. ``inputs_hash`` identifies recordings, recipe and
-    settings: equal hashes need no second fit.
+    each part that the fit uses. ``inputs_hash`` identifies recordings, recipe and settings: equal
+    hashes need no second fit.
     """
 
-    what: Literal["friction", "cut"]
+    what: Literal["friction", "friction-advance", "cut"]
     effort: Effort
     rung: str
     structure: Mapping[str, Any]

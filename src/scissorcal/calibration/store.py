@@ -32,7 +32,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, Result, Stored
+from scissorcal.calibration.result import FitResult, Result, Stored, command_words
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.identity import bytes_digest
@@ -125,7 +125,7 @@ def _again(path: Path, kind: type[Result]) -> str:
     """How to make a result again; the name of a fit's file is that of its command."""
     if kind.command != Result.command or path.suffix != ".nc":
         return f"remove it and run '{kind.command}' again"
-    return f"run '{kind.command} {path.stem} --force'"
+    return f"run '{kind.command} {command_words(path.stem)} --force'"
 
 
 @contextmanager

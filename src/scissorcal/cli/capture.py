@@ -8,7 +8,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.options import Axis, Baud, Device, Folder, Realtime, Seed, Yes, positive
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.verdicts import Verdict
@@ -33,7 +33,6 @@ _COMMANDS = {
         "Photographs of a blade on the printed mat.",
     ),
     "plate": (f"{_PHOTOGRAPHS}:plate", "Photographs of the plate's target."),
-    "track": ("scissorcal.cli.capture_track:track", "The plate's pose, picture by picture."),
 }
 
 
@@ -94,6 +93,7 @@ MaxMinutes = Annotated[
 @command
 def friction(
     device: Device,
+    axis: Axis = "opening",
     designed: Designed = None,
     until_tolerance: UntilTolerance = False,
     at_least: AtLeast = 0,
@@ -106,7 +106,8 @@ def friction(
 ) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
-    Keep the space between the blades empty: the motors move them. With --until-tolerance, friction
+    Keep the space between the blades empty: the motors move them. --axis advance moves the sledge
+    instead, forward and backward, the blades open. With --until-tolerance, friction
     ends where it takes half of the scene's tolerance, or, where the material is fitted already,
     where both together are within it.
 
@@ -116,8 +117,19 @@ def friction(
       captures/friction-20261121T132036Z.mcap: 109195 samples from scissorcal-sim office-paper
       80 of 80 cells filled
       ...
+      $ scissorcal capture friction --axis advance --device sim
+      captures/friction-advance-20261121T132136Z.mcap: 92951 samples from scissorcal-sim ...
+      64 of 64 cells filled
+      ...
     """
     rig = _Rig(device, seed, realtime, baud)
+    if axis == "advance":
+        if designed is not None or until_tolerance or at_least or max_minutes is not None:
+            raise InputError(
+                "The sledge's capture takes the speeds that capture.friction_advance lists: leave "
+                "out --designed, --as-in-recipe, --until-tolerance and its options."
+            )
+        return _capture("friction-advance", rig, _How(False, None, None), yes=yes, folder=folder)
     how = _How(False, designed, _until(until_tolerance, at_least, max_minutes, designed))
     return _capture("friction", rig, how, yes=yes, folder=folder)
 
@@ -205,26 +217,38 @@ def _capture(
     folder: Path | None,
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
-    from scissorcal.workday.runs.capture import capture_into
+    from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 
     workspace = open_workspace(folder)
     before = set(workspace.recordings(kind))
     try:
         with LiveView(ask=not yes, listed=how.until is None) as view:
-            captured = capture_into(
-                workspace,
-                kind,
-                rig.device,
-                hand=how.hand,
-                designed=how.designed,
-                until=replace(how.until, tell=view.approach) if how.until else None,
-                seed=rig.seed,
-                baud=rig.baud,
-                realtime=rig.realtime,
-                progress=view.show,
-                confirm=view.confirm,
-                say=note,
-            )
+            if kind == "friction-advance":
+                captured = capture_advance_into(
+                    workspace,
+                    rig.device,
+                    seed=rig.seed,
+                    baud=rig.baud,
+                    realtime=rig.realtime,
+                    progress=view.show,
+                    confirm=view.confirm,
+                    say=note,
+                )
+            else:
+                captured = capture_into(
+                    workspace,
+                    kind,
+                    rig.device,
+                    hand=how.hand,
+                    designed=how.designed,
+                    until=replace(how.until, tell=view.approach) if how.until else None,
+                    seed=rig.seed,
+                    baud=rig.baud,
+                    realtime=rig.realtime,
+                    progress=view.show,
+                    confirm=view.confirm,
+                    say=note,
+                )
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:
@@ -284,6 +308,7 @@ def _text(workspace: "Workspace", captured: "Captured") -> str:
 def _facts(captured: "Captured") -> dict[str, Any]:
     report = captured.report
     grid = report.coverage
+    per_s, unit = ("rad_per_s", "rad") if grid.axis.channel == "opening" else ("m_per_s", "m")
     return {
         "recording": captured.path,
         "rig": captured.rig,
@@ -291,8 +316,8 @@ def _facts(captured: "Captured") -> dict[str, Any]:
         "coverage": {
             "share": grid.share,
             "directions": grid.directions,
-            "speeds_rad_per_s": grid.speeds,
-            "opening_cells_rad": grid.cells,
+            f"speeds_{per_s}": grid.speeds,
+            f"{grid.axis.channel}_cells_{unit}": grid.cells,
             "seconds": grid.seconds,
             "needed_s": grid.needed_s,
             "sentence": grid.sentence(),

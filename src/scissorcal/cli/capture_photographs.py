@@ -192,7 +192,7 @@ def plate(
       plate-01.jpg: 24 of 24 corners of the plate board, 62 px a side
       ...
     """
-    from scissorcal.vision.sim.sim_camera import render_card_photographs
+    from scissorcal.vision.sim.sim_camera import render_card_photographs, standing_plate
     from scissorcal.vision.stances import read_stances
     from scissorcal.workday.runs.plate import capture_plate
 
@@ -208,7 +208,8 @@ def plate(
         nonlocal known
         if not stances:
             return _plate_pictures(str(source), seed, views, workspace, scratch)
-        made = render_card_photographs(workspace.recipe(), scratch, seed)
+        recipe = workspace.recipe()
+        made = render_card_photographs(recipe, scratch, seed, standing_plate(recipe))
         known = {path.name: stance for path, stance in made.items()}
         return list(made)
 
@@ -275,11 +276,13 @@ def _plate_pictures(
     source: str, seed: int, views: int, workspace: "Workspace", scratch: Path
 ) -> Iterable[Path]:
     from scissorcal.vision.live import pick_at_rest
-    from scissorcal.vision.sim.sim_camera import render_plate_photographs
+    from scissorcal.vision.sim.sim_camera import render_plate_photographs, standing_plate
     from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 
     if source == "sim":
-        return render_plate_photographs(workspace.recipe(), scratch, seed, count=views)
+        recipe = workspace.recipe()
+        stands = standing_plate(recipe)
+        return render_plate_photographs(recipe, scratch, seed, count=views, rig_plate=stands)
     return pick_at_rest(source, (PLATE_BOARD, PLATE_STRIP), scratch, views)
 
 

@@ -10,7 +10,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, Seed, positive
+from scissorcal.cli.options import Axis, Folder, Seed, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
@@ -31,12 +31,15 @@ _COMMANDS = {
     "restore": ("scissorcal.cli.fit_history:restore", "Put an earlier version back in use."),
 }
 
+_LAW = "scissorcal.cli.fit_law"
+
 _SHOWN = {
     "camera": "scissorcal.cli.fit_camera",
     "blade": "scissorcal.cli.fit_blade",
     "plate": "scissorcal.cli.fit_plate",
-    "friction": "scissorcal.cli.fit_law",
-    "cut": "scissorcal.cli.fit_law",
+    "friction": _LAW,
+    "friction-advance": _LAW,
+    "cut": _LAW,
 }
 """Which module says what a fit found: its ``text`` for people, its ``facts`` for ``--json``."""
 
@@ -44,7 +47,6 @@ _EXAMPLES = {
     "camera": "camera: 2000 x 1500, 15 photographs of the camera board, k1, k2, p1, p2",
     "blade": "blade: arc, 74.92 mm long, 3 photographs",
     "plate": "plate: 5 photographs of the plate board, rms 0.03 px",
-    "friction": "friction: stribeck + angle, symmetric (standard)",
     "cut": "cut: power response, rippled fracture (standard)",
     "all": "friction: stribeck + angle, symmetric (standard)",
 }
@@ -121,10 +123,36 @@ def _command_of(*wanted: str) -> Callable[..., None]:
     return command(fit_one)
 
 
+@command
+def friction(
+    axis: Axis = "opening",
+    effort: Effort = None,
+    force: Force = False,
+    max_minutes: MaxMinutes = 10.0,
+    seed: Seed = 0,
+    folder: Folder = None,
+) -> Answer:
+    """Friction, to recordings of empty motion. See 'scissorcal fit --help'.
+
+    With --axis advance, mass and friction of the sledge, to captures with the same option. They
+    rest on the commanded force: no sensor measures one along the cut.
+
+    \b
+    Example:
+      $ scissorcal fit friction
+      friction: stribeck + angle, symmetric (standard)
+      ...
+      $ scissorcal fit friction --axis advance
+      friction-advance: coulomb + viscous, symmetric (standard)
+      ...
+    """
+    what = "friction" if axis == "opening" else "friction-advance"
+    return _run((what,), folder, effort, force, max_minutes, seed)
+
+
 camera = _command_of("camera")
 blade = _command_of("blade")
 plate = _command_of("plate")
-friction = _command_of("friction")
 cut = _command_of("cut")
 all_ = _command_of()
 
@@ -163,7 +191,7 @@ def _answer(outcomes: "Sequence[FitOutcome]") -> Answer:
     """One answer of all fits: laws with their parameters, what photographs gave by its name."""
     from scissorcal.cli.fit_law import parameter_facts
 
-    laws = [outcome for outcome in outcomes if outcome.what in ("friction", "cut")]
+    laws = [outcome for outcome in outcomes if _SHOWN[outcome.what] == _LAW]
     seen = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
     result: dict[str, object] = {}
     if laws:

@@ -8,7 +8,7 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
 
-What = Literal["camera", "blade", "plate", "friction", "cut"]
+What = Literal["camera", "blade", "plate", "friction", "friction-advance", "cut"]
 
 
 @command

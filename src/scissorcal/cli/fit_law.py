@@ -1,4 +1,4 @@
-"""What ``scissorcal fit friction`` and ``scissorcal fit cut`` say."""
+"""What ``scissorcal fit friction`` (of either axis) and ``scissorcal fit cut`` say."""
 
 from typing import TYPE_CHECKING
 
@@ -52,7 +52,7 @@ def text(outcome: "FitOutcome") -> str:
     said += outcome.state.notes
     if outcome.state.state == "unverified":
         said.append(
-            f"unverified: 'scissorcal verify {outcome.what}' checks whether these intervals hold."
+            f"unverified: 'scissorcal verify {fitted.words}' checks whether these intervals hold."
         )
     return "\n".join(line for line in said if line)
 

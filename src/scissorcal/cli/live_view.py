@@ -1,6 +1,5 @@
 """What a person at the rig sees: progress, opening and torque, coverage, and what to load."""
 
-import math
 import sys
 import time
 from collections import deque
@@ -16,6 +15,7 @@ from scissorcal.errors import InputError
 if TYPE_CHECKING:
     from rich.live import Live
 
+    from scissorcal.device.coverage import CoveredAxis
     from scissorcal.device.recorder import Recorder
     from scissorcal.recording.until import UntilMark
 
@@ -43,6 +43,7 @@ class LiveView:
         self._finished = False
         self._unloaded = 0
         self._trace: deque[tuple[float, float]] = deque(maxlen=_TRACE_POINTS)
+        self._axis: CoveredAxis | None = None
         self._approach: list[UntilMark] = []
 
     def __enter__(self) -> Self:
@@ -58,8 +59,9 @@ class LiveView:
         if recorder is not None:
             self._tell_unloaded(recorder)
         if recorder is not None and recorder.last is not None:
-            last = recorder.last[0]
-            self._trace.append((math.degrees(last["opening"]), 1e3 * last["motor_torque"]))
+            last, self._axis = recorder.last[0], recorder.axis
+            place, effort = last[self._axis.channel], last[self._axis.effort]
+            self._trace.append((self._axis.places * place, self._axis.efforts * effort))
         every = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
         finished = done >= 1.0 and not self._finished
         if now - self._drawn_s < every and not finished:
@@ -67,9 +69,10 @@ class LiveView:
         self._drawn_s, self._finished = now, done >= 1.0
         share = min(max(done, 0.0), 1.0)
         head = f"{100 * share:3.0f} %  {sentence} ({pace(share, now - self._began_s)})"
-        if self._trace:
-            opening_deg, torque_mNm = self._trace[-1]
-            head += f"; opening {opening_deg:.1f} deg, motor torque {torque_mNm:.1f} mN m"
+        if self._trace and self._axis:
+            (place, effort), axis = self._trace[-1], self._axis
+            head += f"; {axis.channel} {place:.1f} {axis.unit}, "
+            head += f"{axis.effort_name} {effort:.1f} {axis.effort_unit}"
         if self._live is None:
             coverage = f"; {recorder.coverage.sentence()}" if recorder and self._listed else ""
             typer.echo(head + coverage, err=True)
@@ -130,8 +133,8 @@ class LiveView:
         from rich.text import Text
 
         drawn: list[Any] = [Text(head), ProgressBar(total=1.0, completed=share, width=40)]
-        if self._trace:
-            drawn.append(Text(torque_plot(self._trace)))
+        if self._trace and self._axis:
+            drawn.append(Text(effort_plot(self._trace, self._axis)))
         if self._approach:
             drawn.append(Text(band_line(self._approach)))
         elif recorder and self._listed:
@@ -153,20 +156,20 @@ def band_line(marks: "Sequence[UntilMark]") -> str:
     return f"{bars} {marks[-1].sentence}".strip()
 
 
-def torque_plot(points: "deque[tuple[float, float]]") -> str:
-    """Plot motor torque (mN m) over opening (deg) with characters; the newest point is an o."""
+def effort_plot(points: "deque[tuple[float, float]]", of: "CoveredAxis") -> str:
+    """Plot an axis's effort over its place with characters; the newest point is an o."""
     columns, rows = _TRACE_SIZE
     left, right = _range([point[0] for point in points])
     low, high = _range([point[1] for point in points])
     grid = [[" "] * columns for _ in range(rows)]
-    for index, (opening_deg, torque_mNm) in enumerate(points, start=1):
-        column = round((columns - 1) * (opening_deg - left) / (right - left))
-        row = round((rows - 1) * (high - torque_mNm) / (high - low))
+    for index, (place, effort) in enumerate(points, start=1):
+        column = round((columns - 1) * (place - left) / (right - left))
+        row = round((rows - 1) * (high - effort) / (high - low))
         grid[row][column] = "o" if index == len(points) else "."
     marks = [f"{high:9.1f}", *[" " * 9] * (rows - 2), f"{low:9.1f}"]
     lines = [f"{mark} |{''.join(cells)}".rstrip() for mark, cells in zip(marks, grid, strict=True)]
-    axis = f"{left:<10.1f}{'opening (deg)':^{columns - 20}}{right:>10.1f}"
-    return "\n".join(["motor torque (mN m)", *lines, " " * 11 + axis])
+    axis = f"{left:<10.1f}{f'{of.channel} ({of.unit})':^{columns - 20}}{right:>10.1f}"
+    return "\n".join([f"{of.effort_name} ({of.effort_unit})", *lines, " " * 11 + axis])
 
 
 def _range(values: list[float]) -> tuple[float, float]:

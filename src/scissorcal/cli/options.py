@@ -1,7 +1,7 @@
 """Options that several commands share, as types of their parameters."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -61,6 +61,15 @@ Images = Annotated[
 MoreImages = Annotated[
     list[Path] | None,
     typer.Argument(metavar="FILE", help="More photographs: what --image *.jpg expands to."),
+]
+
+
+Axis = Annotated[
+    Literal["opening", "advance"],
+    typer.Option(
+        "--axis",
+        help="Whose friction: that of the blades' opening, or that of the sledge along the cut.",
+    ),
 ]
 
 

@@ -80,5 +80,8 @@ def _text(found: "RecordingSummary") -> str:
             name = [str(stroke.index), stroke.kind, speed, sheet]
             strokes.append([*name, str(row.samples), f"{row.travel:.4g}"])
         lines += [table(strokes, right=[0, 2, 3, 4, 5]), ""]
+    if found.beside:
+        listed = ", ".join(f"{rows} {topic}" for topic, rows in found.beside.items())
+        lines += [f"beside the samples: {listed}", ""]
     lines += [f"note: {sentence}" for sentence in found.notes]
     return "\n".join(lines)

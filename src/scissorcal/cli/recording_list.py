@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from scissorcal.device.completeness import Completeness
     from scissorcal.recipe.requirements import CaptureKind
 
-KINDS: "tuple[CaptureKind, ...]" = ("friction", "cut")
+KINDS: "tuple[CaptureKind, ...]" = ("friction", "friction-advance", "cut")
 Name = Annotated[str, typer.Argument(help="File name of a recording, as 'recording list' shows.")]
 
 

@@ -95,6 +95,7 @@ def _text(rendered: "Rendered") -> str:
         f"{result.faults} faults; {100 * result.limited_share:.1f} % of the frames at a limit",
         f"largest torque {result.largest_torque_Nm:.3g} N m",
         result.admission.summary,
+        *([result.plate.summary] if result.plate else []),
         "",
     ]
     ledger = [["energy", "mJ"]]

@@ -30,6 +30,8 @@ _COMMANDS = {
     "report": ("scissorcal.cli.report:report", "Write, compare or sign the report."),
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),
+    "control": ("scissorcal.cli.control:control", "Press on a plate and follow a path on it."),
+    "track": ("scissorcal.cli.track:track", "Follow the plate's pose by camera and contact."),
     "device": ("scissorcal.cli.device:device", "Find, check or simulate a rig."),
     "bench": ("scissorcal.cli.bench:bench", "What accuracy costs, measured on your own data."),
     "demo": ("scissorcal.cli.demo:demo", "The whole day on a virtual rig; estimates and truth."),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, Seed
+from scissorcal.cli.options import Axis, Folder, Seed
 from scissorcal.cli.output import Answer, command, note, table
 from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         Sensitivity,
         VerifyResult,
     )
+    from scissorcal.workday.workspace import FitKind
 
 _CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
 _ALL_CHECKS = ",".join(_CHECKS)
@@ -59,6 +60,7 @@ Cluster = Annotated[
 @command
 def verify(
     what: What = "all",
+    axis: Axis = "opening",
     fits: Fits = 200,
     checks: Checks = _ALL_CHECKS,
     prior: Prior = "local",
@@ -100,7 +102,12 @@ def verify(
     if workers is not None and cluster is not None:
         raise InputError("Give --workers or --cluster, not both: a cluster brings its workers.")
     workspace = open_workspace(folder)
-    wanted: tuple[Literal["friction", "cut"], ...] = () if what == "all" else (what,)
+    if axis == "advance" and what != "friction":
+        raise InputError(
+            "--axis advance is of friction: 'scissorcal verify friction --axis advance'."
+        )
+    kind: FitKind | Literal["all"] = "friction-advance" if axis == "advance" else what
+    wanted: tuple[FitKind, ...] = () if kind == "all" else (kind,)
     settings = VerifySettings(
         checks=_checks(checks), fits=fits, prior=prior, spread=spread, seed=seed
     )

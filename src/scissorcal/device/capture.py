@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from scissorcal.device.advance_trajectory import advance_plan, refuse_without_motor
 from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
@@ -12,7 +13,12 @@ from scissorcal.device.capture_gains import (
     Probed,
     capture_gains,
 )
-from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
+from scissorcal.device.coverage import (
+    CoverageGrid,
+    advance_coverage,
+    cut_coverage,
+    friction_coverage,
+)
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import CaptureProgress, Drive, silent
 from scissorcal.device.hand import hand_strokes, hand_travel
@@ -72,8 +78,7 @@ def open_writer(
     identity = link.identity
     strokes: tuple[Stroke, ...] = ()
     if not hand and not by_parts:
-        plan = friction_plan if kind == "friction" else cut_plan
-        strokes = plan(recipe, identity).strokes
+        strokes = planned(recipe, identity, kind).strokes
     return RecordingWriter(
         path,
         kind,
@@ -113,6 +118,35 @@ def capture_friction(
         if not cleared:
             loader.clear(plan.segments[0].request)
         plan = friction_plan(recipe, link.identity, advance=motion.position[1])
+        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
+        drive.idle()
+        drive.follow(plan.segments[0])
+        drive.idle()
+        return finish(recorder, motion)
+
+
+def capture_friction_advance(
+    link: Link,
+    recipe: Recipe,
+    writer: RecordingWriter,
+    progress: CaptureProgress | None = None,
+    *,
+    confirm: Confirm | None = None,
+    probe: ProbeResult | None = None,
+    cleared: bool = False,
+) -> CaptureReport:
+    """Drive sweeps of the sledge with empty, open blades and an excitation, and record them.
+
+    As capture_friction. InputError for a rig without an advance motor, or without travel.
+    """
+    refuse_without_motor(link.identity)
+    plan = advance_plan(recipe, link.identity)
+    recorder = Recorder(writer, advance_coverage(recipe, link.identity))
+    gains = gains_for(link, recipe, "friction-advance", probe, writer)
+    with motion_for(link, recipe, plan, gains, probe) as motion:
+        loader = Loader(motion, recorder, confirm)
+        if not cleared:
+            loader.clear(plan.segments[0].request)
         drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
         drive.idle()
         drive.follow(plan.segments[0])
@@ -164,6 +198,13 @@ def capture_cut(
             drive.follow(segment)
         drive.idle()
         return finish(recorder, motion)
+
+
+def planned(recipe: Recipe, identity: Identity, kind: Kind) -> Plan:
+    """The plan that a capture of one kind follows. Raises InputError as the plans do."""
+    if kind == "friction-advance":
+        return advance_plan(recipe, identity)
+    return friction_plan(recipe, identity) if kind == "friction" else cut_plan(recipe, identity)
 
 
 def servo_config(

@@ -24,7 +24,7 @@ from scissorcal.device.motion import Motion
 from scissorcal.device.parts import Part
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.trajectory import friction_plan
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Recording, RecordingWriter, Stroke
 from scissorcal.recording.probe import ProbeResult
@@ -43,7 +43,7 @@ CHOOSING = "motors off, the fit is brought up to date"
 def capture_by_parts(
     link: Link,
     recipe: Recipe,
-    kind: CaptureKind,
+    kind: DesignedKind,
     writer: RecordingWriter,
     next_part: NextPart,
     *,

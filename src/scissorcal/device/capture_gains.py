@@ -3,11 +3,13 @@
 import math
 from dataclasses import dataclass
 
+from scissorcal.device.advance_trajectory import largest_acceleration, sliding_speeds
 from scissorcal.device.control import Axis, Gains, Margins, PHASE_MARGIN_deg, loop_margins
 from scissorcal.device.control_design import Demand, Design, design_gains
 from scissorcal.device.trajectory import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
+    APPROACH_SPEED,
     SWING_ACCELERATION,
     TURN_ACCELERATION,
 )
@@ -144,7 +146,7 @@ def capture_gains(
         verdicts = TYPICAL.verdicts if probed is None else (_undelayed(probed),)
         return CaptureGains(opening, advance, TYPICAL.rate_cutoff_Hz, STILL_RAD, verdicts)
     axes = _axes(recipe, identity, probed)
-    demands = _demands(recipe, kind)
+    demands = _demands(recipe, kind, identity)
     cutoffs = tuple(share * 1e6 / identity.tick_us for share in CUTOFFS_PER_TICK)
     found: list[Gains] = []
     margins: list[Margins] = []
@@ -222,8 +224,12 @@ def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axi
     return opening, advance
 
 
-def _demands(recipe: Recipe, kind: Kind) -> tuple[Demand, Demand]:
+def _demands(recipe: Recipe, kind: Kind, identity: Identity) -> tuple[Demand, Demand]:
     """What the plan asks of opening and advance."""
+    if kind == "friction-advance":
+        opening = Demand(APPROACH_SPEED, TURN_ACCELERATION, 0.0, OPENING_ERROR_RAD)
+        most = largest_acceleration(recipe, identity)
+        return opening, Demand(max(sliding_speeds(recipe)), most, 0.0, ADVANCE_ERROR_M)
     advance = Demand(ADVANCE_SPEED, ADVANCE_ACCELERATION, 0.0, ADVANCE_ERROR_M)
     if kind == "friction":
         fastest = max(recipe.capture.friction.speeds_rad_per_s)

@@ -11,12 +11,21 @@ from itertools import zip_longest
 from math import degrees
 from typing import Any
 
+from scissorcal.device.counts import (
+    AnyCell,
+    AnyStrokes,
+    CellCount,
+    ExcitationCount,
+    SheetCount,
+    SledgeCellCount,
+    SledgeStrokeCount,
+    StrokeCount,
+    SummaryRow,
+    motion_of,
+)
 from scissorcal.recipe.requirements import LITTLE, CaptureKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.until import UntilMark
-
-EXCITATION_SHARE = 0.95
-"""Share of the planned excitation that must be recorded: its ramps are labelled as pauses."""
 
 SAME = 1e-9
 """Shares that differ by less are one: of percents in a recipe and in a mark."""
@@ -25,72 +34,6 @@ NAMED = 3
 """Ranges of opening that a sentence lists before it only counts them."""
 
 Counts = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class CellCount:
-    """One planned cell: direction, speed and range of opening, with seconds needed and recorded.
-
-    ``used_s`` is what the fit uses; None where there is no fit.
-    """
-
-    direction: str
-    speed_rad_per_s: float
-    opening_deg: tuple[float, float]
-    needed_s: float
-    recorded_s: float
-    used_s: float | None = None
-
-
-@dataclass(frozen=True)
-class StrokeCount:
-    """Strokes of one kind and speed: planned, recorded whole, and used by the fit."""
-
-    kind: str
-    speed_rad_per_s: float
-    planned: int
-    recorded: int
-    used: int | None = None
-
-
-@dataclass(frozen=True)
-class SheetCount:
-    """Closing strokes through one sheet, numbered across recordings: planned, recorded, used.
-
-    Sheets that the plan has and the recordings lack come last; of sheets beyond the plan's number,
-    those with the fewest strokes have none planned.
-    """
-
-    sheet: int
-    planned: int
-    recorded: int
-    used: int | None = None
-
-
-@dataclass(frozen=True)
-class ExcitationCount:
-    """Seconds of excitation: planned, recorded, and used by the fit."""
-
-    planned_s: float
-    recorded_s: float
-    used_s: float | None = None
-
-    @property
-    def missing(self) -> bool:
-        """Whether less is recorded than a whole capture labels."""
-        return self.recorded_s < EXCITATION_SHARE * self.planned_s
-
-
-@dataclass(frozen=True)
-class SummaryRow:
-    """How many ``unit`` of one motion or sheet are planned, recorded and used, for people."""
-
-    name: str
-    unit: str
-    planned: int
-    recorded: int
-    used: int | None
-    motion: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,8 +46,8 @@ class Completeness:
     fit could make use is not known here.
     """
 
-    cells: tuple[CellCount, ...] = ()
-    strokes: tuple[StrokeCount, ...] = ()
+    cells: tuple[AnyCell, ...] = ()
+    strokes: tuple[AnyStrokes, ...] = ()
     sheets: tuple[SheetCount, ...] = ()
     missing: tuple[str, ...] = ()
     little_used: tuple[str, ...] = ()
@@ -113,15 +56,12 @@ class Completeness:
     @property
     def summary(self) -> tuple[SummaryRow, ...]:
         """Strokes and ranges of opening by direction and speed, strokes by sheet, excitation."""
-        strokes = [
-            SummaryRow(_motion(row.kind, row.speed_rad_per_s), "strokes", *_counts(row))
-            for row in self.strokes
-        ]
+        strokes = [SummaryRow(motion_of(row), "strokes", *_counts(row)) for row in self.strokes]
         sheets = [
             SummaryRow(f"sheet {row.sheet}", "closing strokes", *_counts(row))
             for row in self.sheets
         ]
-        ranges = [_ranges(*key, row) for key, row in _by_speed(self.cells).items()]
+        ranges = [_ranges(motion, row) for motion, row in _by_speed(self.cells).items()]
         excitation = [_excitation(self.excitation)] if self.excitation else []
         return (*strokes, *ranges, *sheets, *excitation)
 
@@ -178,18 +118,18 @@ def _numbered(sheets: Sequence[SheetCount]) -> tuple[SheetCount, ...]:
 def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Completeness:
     """Judge recordings of one plan together."""
     driven = [(count, use) for count, use in pairs if not count["by_hand"]]
-    cells = _cells(driven)
-    strokes = _strokes(pairs, driven, recipe)
+    cells = _cells(driven, kind)
+    strokes = _strokes(pairs, driven, recipe, kind)
     sheets = _sheets(pairs, (driven or pairs)[0][0]["planned_sheets"])
     missing = [*_missing_cells(cells), *_missing_strokes(strokes), *_missing_sheets(sheets)]
     until = pairs[0][0].get("until")
     if until:
         missing = _missing_tolerance(UntilMark.of(until), recipe, kind)
     excitation = None
-    planned_s = recipe.capture.friction.excitation_s
+    planned_s = planned_excitation_s(recipe, kind)
     if pairs[0][0].get("designed"):
         planned_s = pairs[0][0]["planned_excitation_s"]
-    if kind == "friction" and planned_s > 0 and not until:
+    if kind != "cut" and planned_s > 0 and not until:
         excitation = ExcitationCount(
             planned_s,
             sum(count["excitation_s"] for count, _ in pairs),
@@ -203,7 +143,7 @@ def _of_one_plan(pairs: "_Pairs", recipe: Recipe, kind: CaptureKind) -> Complete
         missing.append(f"an undisturbed end: the servo stopped the last capture ({stop})")
     return Completeness(
         cells,
-        tuple(row for row in strokes if kind == "friction" or row.kind != "opening"),
+        tuple(row for row in strokes if kind != "cut" or row.kind != "opening"),
         sheets,
         tuple(missing),
         tuple(_little_used(cells)),
@@ -230,16 +170,27 @@ def _missing_tolerance(mark: UntilMark, recipe: Recipe, kind: CaptureKind) -> li
 _Pairs = Sequence[tuple[Counts, Counts | None]]
 
 
-def _cells(pairs: _Pairs) -> tuple[CellCount, ...]:
+def planned_excitation_s(recipe: Recipe, kind: CaptureKind) -> float:
+    """Seconds of excitation that the recipe plans for captures of friction, 0 for cuts."""
+    if kind == "cut":
+        return 0.0
+    capture = recipe.capture
+    friction = capture.friction if kind == "friction" else capture.friction_advance
+    return friction.excitation_s
+
+
+def _cells(pairs: _Pairs, kind: CaptureKind) -> tuple[AnyCell, ...]:
     if not pairs:
         return ()
     first = pairs[0][0]
     same = [pair for pair in pairs if pair[0]["openings"] == first["openings"]]
+    slides = kind == "friction-advance"
+    row = SledgeCellCount if slides else CellCount
     return tuple(
-        CellCount(
+        row(
             direction,
-            speed,
-            (degrees(low), degrees(high)),
+            1e3 * speed if slides else speed,
+            (1e3 * low, 1e3 * high) if slides else (degrees(low), degrees(high)),
             first["needed_s"],
             sum(count["seconds"][d][s][c] for count, _ in same),
             _sum(use and use["seconds"][d][s][c] for _, use in same),
@@ -250,24 +201,28 @@ def _cells(pairs: _Pairs) -> tuple[CellCount, ...]:
     )
 
 
-def _strokes(pairs: _Pairs, driven: _Pairs, recipe: Recipe) -> tuple[StrokeCount, ...]:
+def _strokes(
+    pairs: _Pairs, driven: _Pairs, recipe: Recipe, kind: CaptureKind
+) -> tuple[AnyStrokes, ...]:
     if not driven:
         capture = recipe.capture.cut
-        found = sum(kind != "opening" for count, _ in pairs for kind, _ in count["recorded"])
+        found = sum(way != "opening" for count, _ in pairs for way, _ in count["recorded"])
         used = _sum(use and sum(k != "opening" for k, _ in use["strokes"]) for _, use in pairs)
         planned = capture.sheets * capture.strokes_per_sheet
         return (StrokeCount("closing", float("nan"), planned, found, used),)
-    planned_strokes = Counter((kind, speed) for kind, speed in driven[0][0]["planned"])
-    recorded = Counter((kind, speed) for count, _ in driven for kind, speed in count["recorded"])
+    planned_strokes = Counter((way, speed) for way, speed in driven[0][0]["planned"])
+    recorded = Counter((way, speed) for count, _ in driven for way, speed in count["recorded"])
+    slides = kind == "friction-advance"
+    row = SledgeStrokeCount if slides else StrokeCount
     return tuple(
-        StrokeCount(
-            kind,
-            speed,
+        row(
+            way,
+            1e3 * speed if slides else speed,
             number,
-            recorded[kind, speed],
-            _sum(use and use["strokes"].count([kind, speed]) for _, use in driven),
+            recorded[way, speed],
+            _sum(use and use["strokes"].count([way, speed]) for _, use in driven),
         )
-        for (kind, speed), number in planned_strokes.items()
+        for (way, speed), number in planned_strokes.items()
     )
 
 
@@ -296,27 +251,23 @@ def _sum(values: Iterable[Any]) -> Any:
     return None if None in known else sum(known)
 
 
-def _by_speed(cells: Sequence[CellCount]) -> dict[tuple[str, float], list[CellCount]]:
-    found: dict[tuple[str, float], list[CellCount]] = {}
+def _by_speed(cells: Sequence[AnyCell]) -> dict[str, list[AnyCell]]:
+    """Cells by direction and speed, in words."""
+    found: dict[str, list[AnyCell]] = {}
     for cell in cells:
-        found.setdefault((cell.direction, cell.speed_rad_per_s), []).append(cell)
+        found.setdefault(motion_of(cell), []).append(cell)
     return found
 
 
-def _motion(direction: str, speed_rad_per_s: float) -> str:
-    known = speed_rad_per_s == speed_rad_per_s
-    return f"{direction} at {speed_rad_per_s:g} rad/s" if known else f"{direction} by hand"
-
-
-def _counts(row: StrokeCount | SheetCount) -> tuple[int, int, int | None]:
+def _counts(row: AnyStrokes | SheetCount) -> tuple[int, int, int | None]:
     return row.planned, row.recorded, row.used
 
 
-def _ranges(direction: str, speed: float, row: Sequence[CellCount]) -> SummaryRow:
+def _ranges(motion: str, row: Sequence[AnyCell]) -> SummaryRow:
     recorded_s, used_s = sum(c.recorded_s for c in row), _sum(c.used_s for c in row)
     return SummaryRow(
-        _motion(direction, speed),
-        "ranges of opening",
+        motion,
+        f"ranges of {row[0].of}",
         len(row),
         sum(cell.recorded_s >= cell.needed_s for cell in row),
         None if used_s is None else _filled(row),
@@ -336,49 +287,49 @@ def _excitation(count: ExcitationCount) -> SummaryRow:
     return SummaryRow("excitation", "s of excitation", planned, recorded, None, motion)
 
 
-def _filled(cells: Sequence[CellCount]) -> int:
+def _filled(cells: Sequence[AnyCell]) -> int:
     """Of how many cells the fit uses enough."""
     return sum(cell.used_s is not None and cell.used_s >= cell.needed_s for cell in cells)
 
 
-def _little_used(cells: Sequence[CellCount]) -> list[str]:
+def _little_used(cells: Sequence[AnyCell]) -> list[str]:
     sentences = []
-    for (direction, speed), row in _by_speed(cells).items():
+    for motion, row in _by_speed(cells).items():
         recorded = sum(cell.recorded_s for cell in row)
         used = _sum(cell.used_s for cell in row)
         if used is None or used >= LITTLE * recorded:
             continue
         reached = [cell for cell in row if cell.recorded_s >= cell.needed_s]
         sentences.append(
-            f"{_motion(direction, speed)}: {used:.2g} s of {recorded:.3g} s of motion are used, "
-            f"in {_filled(reached)} of {len(reached)} ranges of opening"
+            f"{motion}: {used:.2g} s of {recorded:.3g} s of motion are used, "
+            f"in {_filled(reached)} of {len(reached)} ranges of {row[0].of}"
         )
     return sentences
 
 
-def _missing_cells(cells: Sequence[CellCount]) -> list[str]:
+def _missing_cells(cells: Sequence[AnyCell]) -> list[str]:
     thin = _by_speed([cell for cell in cells if cell.recorded_s < cell.needed_s])
     sentences = []
-    for (direction, speed), rows in thin.items():
-        ranges = [f"{row.opening_deg[0]:.0f}-{row.opening_deg[1]:.0f}" for row in rows]
+    for motion, rows in thin.items():
+        ranges = [f"{row.range[0]:.0f}-{row.range[1]:.0f}" for row in rows]
         listed = ", ".join(ranges[:NAMED]) + (" ..." if len(ranges) > NAMED else "")
         sentences.append(
-            f"{_motion(direction, speed)}: {len(rows)} ranges of opening ({listed} deg) have "
+            f"{motion}: {len(rows)} ranges of {rows[0].of} ({listed} {rows[0].unit}) have "
             f"less than {rows[0].needed_s:g} s of motion"
         )
     return sentences
 
 
-def _missing_strokes(strokes: Sequence[StrokeCount]) -> list[str]:
+def _missing_strokes(strokes: Sequence[AnyStrokes]) -> list[str]:
     short: dict[tuple[str, int, int], list[float]] = {}
     for row in strokes:
         if row.recorded < row.planned:
-            short.setdefault((row.kind, row.recorded, row.planned), []).append(row.speed_rad_per_s)
+            short.setdefault((row.kind, row.recorded, row.planned), []).append(row.speed)
     sentences = []
     for (kind, recorded, planned), speeds in short.items():
         at = ", ".join(f"{speed:g}" for speed in speeds if speed == speed)
         each = " each" if len(speeds) > 1 else ""
-        of_speed = f" at {at} rad/s" if at else ""
+        of_speed = f" at {at} {strokes[0].rate_unit}" if at else ""
         sentences.append(f"{kind} strokes{of_speed}: {recorded} of {planned} recorded{each}")
     return sentences
 

@@ -25,6 +25,8 @@ GRID = 400
 LOWEST = 1e-4
 """Frequencies of the response begin at this share of the highest, half a turn a tick."""
 SETTLING_TICKS = 4000
+INTEGRAL = 4
+"""Place of the integral among the loop's states."""
 
 
 @dataclass(frozen=True)
@@ -108,10 +110,13 @@ def keeps_margins(axis: Axis, gains: Gains) -> bool:
 def loop_poles(axis: Axis, gains: Gains) -> NDArray[np.complex128]:
     """Poles of the sampled loop: it settles where all are inside the unit circle.
 
-    States are place, rate, the estimated rate, the last place, the integral, and the efforts on
-    their way. (The limits of effort and of its slew are not in it.)
+    States are place, rate, the estimated rate, the last place, the integral (unless ``ki`` is 0),
+    and the efforts on their way. (The limits of effort and of its slew are not in it.)
     """
-    return np.asarray(np.linalg.eigvals(_loop(axis, gains)[0]))
+    matrix = _loop(axis, gains)[0]
+    if gains.ki == 0.0:
+        matrix = np.delete(np.delete(matrix, INTEGRAL, axis=0), INTEGRAL, axis=1)
+    return np.asarray(np.linalg.eigvals(matrix))
 
 
 def open_loop(axis: Axis, gains: Gains, omega: Array | float) -> NDArray[np.complex128]:
@@ -120,7 +125,7 @@ def open_loop(axis: Axis, gains: Gains, omega: Array | float) -> NDArray[np.comp
     turn, keep, fresh, stale, ticks = _sampled(axis)
     forced = np.multiply.outer(fresh, z**-ticks) + np.multiply.outer(stale, z ** -(ticks + 1))
     place = (forced[0] + turn * forced[1] / (z - keep)) / (z - 1.0)
-    weight = _weight(axis)
+    weight = rate_weight(axis.rate_cutoff_Hz, axis.tick_s)
     rate = weight * (1.0 - 1.0 / z) / axis.tick_s / (1.0 - (1.0 - weight) / z)
     return np.asarray(place * (gains.kp + gains.kd * rate + gains.ki * axis.tick_s * z / (z - 1.0)))
 
@@ -153,16 +158,30 @@ def spread_of_error(axis: Axis, gains: Gains) -> float:
 
 def count_effort(axis: Axis, gains: Gains) -> float:
     """Change of effort by one count of the encoder."""
-    return axis.step * (gains.kp + gains.kd * _weight(axis) / axis.tick_s)
+    return axis.step * (
+        gains.kp + gains.kd * rate_weight(axis.rate_cutoff_Hz, axis.tick_s) / axis.tick_s
+    )
+
+
+def rate_weight(cutoff_Hz: float, tick_s: float) -> float:
+    """Share of a fresh difference in the estimated rate, as sc_motion.c takes it; 0 Hz: no filter.
+
+    >>> round(rate_weight(100.0, 1e-3), 3)
+    0.386
+    """
+    if cutoff_Hz <= 0.0:
+        return 1.0
+    passed = 2.0 * math.pi * cutoff_Hz * tick_s
+    return passed / (1.0 + passed)
 
 
 def _loop(axis: Axis, gains: Gains) -> tuple[Array, Array]:
     """The loop from tick to tick (n, n), and what a unit effort from outside adds (n,)."""
     turn, keep, fresh, stale, ticks = _sampled(axis)
     size = 5 + ticks + 1
-    place, rate, seen, last, integral = range(5)
+    place, rate, seen, last, integral = *range(4), INTEGRAL
     late = 5  # the effort of the tick before, then those before it
-    weight = _weight(axis)
+    weight = rate_weight(axis.rate_cutoff_Hz, axis.tick_s)
     # What a tick's measurement makes of the state, as rows over the state before.
     estimate = np.zeros(size)
     estimate[seen] = 1.0 - weight
@@ -214,14 +233,6 @@ def _settles(axis: Axis, gains: Gains) -> bool:
 
 def _frequencies(axis: Axis) -> Array:
     return np.asarray(np.geomspace(LOWEST, 0.9999, GRID) * math.pi / axis.tick_s)
-
-
-def _weight(axis: Axis) -> float:
-    """Share of a fresh difference in the estimated rate, as sc_motion.c takes it."""
-    if axis.rate_cutoff_Hz <= 0.0:
-        return 1.0
-    passed = 2.0 * math.pi * axis.rate_cutoff_Hz * axis.tick_s
-    return passed / (1.0 + passed)
 
 
 def _sampled(axis: Axis) -> tuple[float, float, Array, Array, int]:

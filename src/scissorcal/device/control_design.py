@@ -104,15 +104,19 @@ def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
         filtered = axis.filtered(cutoff)
         for lead in LEADS:
             for integral in INTEGRALS:
-                one = _fastest(filtered, lead, integral)
+                one = fastest_design(filtered, lead, integral)
                 error = math.inf if one is None else spread_of_error(filtered, one.gains)
                 if error < least:
                     least, found = error, one
     return found
 
 
-def _fastest(axis: Axis, lead: float, integral: float) -> Design | None:
-    """The design of highest crossover of one shape, if any keeps the margins."""
+def fastest_design(axis: Axis, lead: float, integral: float) -> Design | None:
+    """The design of highest crossover of one shape; None where none keeps the margins.
+
+    ``lead`` is the crossover over the corner at which the rate takes over from the error,
+    ``integral`` that corner over the integral's (infinite: no integral).
+    """
     ratio = FASTEST_CROSSOVER_rad_per_s / SLOWEST_CROSSOVER_rad_per_s
     for step in range(STEPS):
         omega = FASTEST_CROSSOVER_rad_per_s * ratio ** (-step / (STEPS - 1))

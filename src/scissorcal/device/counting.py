@@ -5,10 +5,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.capture import identity_of
-from scissorcal.device.coverage import NEEDED_S, CoverageGrid, cut_coverage, friction_coverage
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import friction_plan
+from scissorcal.device.capture import identity_of, planned
+from scissorcal.device.completeness import planned_excitation_s
+from scissorcal.device.coverage import (
+    NEEDED_S,
+    CoverageGrid,
+    advance_coverage,
+    cut_coverage,
+    friction_coverage,
+)
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.load import parse_recipe
@@ -52,7 +57,7 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
         "recorded": _named(recording, whole),
         "sheets": _sheets(recording, whole),
         "excitation_s": _excitation(recording, label),
-        "planned_excitation_s": recipe.capture.friction.excitation_s,
+        "planned_excitation_s": planned_excitation_s(recipe, kind),
         "designed": designed_capture(recording) is not None,
         "until": until.as_dict() if until else None,
     }
@@ -127,6 +132,8 @@ def _grid(recording: Recording, recipe: Recipe, kind: CaptureKind) -> tuple[bool
     identity = identity_of(recording.device)
     if kind == "friction":
         return False, friction_coverage(recipe, identity)
+    if kind == "friction-advance":
+        return False, advance_coverage(recipe, identity)
     planned = {round(speed, 9) for speed in recipe.capture.cut.speeds_rad_per_s}
     closing = [s for s in recording.strokes if s.kind in ("closing", "press")]
     by_hand = bool(closing) and all(round(s.speed, 9) not in planned for s in closing)
@@ -154,8 +161,7 @@ def _plan(
     capture = recipe.capture.cut
     if by_hand:
         return [], [capture.strokes_per_sheet] * capture.sheets
-    plan = friction_plan if kind == "friction" else cut_plan
-    strokes = [s for s in plan(recipe, identity).strokes if s.kind != "excitation"]
+    strokes = [s for s in planned(recipe, identity, kind).strokes if s.kind != "excitation"]
     closing = [s.sheet for s in strokes if kind == "cut" and s.kind == "closing"]
     sheets = [closing.count(sheet) for sheet in sorted(set(closing))]
     return [[s.kind, s.speed] for s in strokes], sheets

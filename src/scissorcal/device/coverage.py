@@ -1,11 +1,13 @@
 """Coverage of a capture: which speeds were recorded at which angles, per direction, live."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
 from scissorcal.device.cut_trajectory import press_openings
 from scissorcal.device.trajectory import opening_range
 from scissorcal.kernel import Identity
@@ -16,19 +18,74 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
-Direction = Literal["closing", "opening"]
+Direction = Literal["closing", "opening", "backward", "forward"]
+
+FALLING: tuple[Direction, ...] = ("closing", "backward")
 
 ANGLE_CELLS = 8
 NEEDED_S = 0.02
 RATE_WINDOW_S = 0.02
 
 
+@dataclass(frozen=True)
+class CoveredAxis:
+    """Which axis a capture moves, in the words and units that people are shown.
+
+    ``channel`` and ``effort`` are channels of a sample; ``places``, ``rates`` and ``efforts`` take
+    their SI units to those shown.
+    """
+
+    channel: Literal["opening", "advance"]
+    unit: str
+    places: float
+    rate_unit: str
+    rates: float
+    effort: Literal["motor_torque", "force_command"]
+    effort_name: str
+    effort_unit: str
+    efforts: float
+
+    def motion(self, kind: str, speed: float) -> str:
+        """A stroke in words, without its speed where that is not finite.
+
+        >>> ADVANCE.motion("backward", 0.012), OPENING.motion("excitation", float("nan"))
+        ('backward at 12 mm/s', 'excitation')
+        """
+        pace = f" at {self.rates * speed:g} {self.rate_unit}" if np.isfinite(speed) else ""
+        return f"{kind}{pace}"
+
+
+OPENING = CoveredAxis(
+    channel="opening",
+    unit="deg",
+    places=float(np.degrees(1.0)),
+    rate_unit="rad/s",
+    rates=1.0,
+    effort="motor_torque",
+    effort_name="motor torque",
+    effort_unit="mN m",
+    efforts=1e3,
+)
+ADVANCE = CoveredAxis(
+    channel="advance",
+    unit="mm",
+    places=1e3,
+    rate_unit="mm/s",
+    rates=1e3,
+    effort="force_command",
+    effort_name="commanded force",
+    effort_unit="N",
+    efforts=1.0,
+)
+
+
 class CoverageGrid:
-    """Seconds of motion by direction, speed and angle; a cell is filled once it has ``needed_s``.
+    """Seconds of motion by direction, speed and place; a cell is filled once it has ``needed_s``.
 
     ``speeds`` (rad/s, ascending) are the nominal ones; a cell of speed reaches half-way to its
     neighbours in the logarithm, and by the same factor outwards. ``cells`` are ranges of opening
-    (rad). Motion outside all cells is not counted. Samples may come in blocks of any size.
+    (rad); of the advance both are in metres. Motion outside all cells is not counted. Samples may
+    come in blocks of any size.
     """
 
     def __init__(
@@ -37,7 +94,9 @@ class CoverageGrid:
         cells: tuple[Range, ...],
         directions: tuple[Direction, ...] = ("closing", "opening"),
         needed_s: float = NEEDED_S,
+        axis: CoveredAxis = OPENING,
     ) -> None:
+        self.axis = axis
         self.speeds = tuple(sorted(set(speeds)))
         self.directions = directions
         self.needed_s = needed_s
@@ -57,7 +116,7 @@ class CoverageGrid:
         if len(samples) == 0:
             return
         time = np.concatenate([self._time, samples["device_time_us"] * 1e-6])
-        opening = np.concatenate([self._opening, samples["opening"]])
+        opening = np.concatenate([self._opening, samples[self.axis.channel]])
         step = np.diff(time, prepend=time[0])
         usual = float(np.median(step[1:])) if len(step) > 1 else 0.0
         window = max(1, round(RATE_WINDOW_S / usual)) if usual > 0 else 1
@@ -93,30 +152,32 @@ class CoverageGrid:
         parts = []
         for d, direction in enumerate(self.directions):
             speeds = [
-                f"{speed:g}"
+                f"{self.axis.rates * speed:g}"
                 for speed, filled in zip(self.speeds, self.filled[d].all(axis=1), strict=True)
                 if not filled
             ]
             if speeds:
-                parts.append(f"{direction} at {', '.join(speeds)} rad/s")
+                parts.append(f"{direction} at {', '.join(speeds)} {self.axis.rate_unit}")
         counts = f"{int(self.filled.sum())} of {self.filled.size} cells filled"
         return f"{counts}; thin: {'; '.join(parts)}" if parts else counts
 
     def table(self) -> "Table":
-        """Return the grid as a table for rich: a row per speed, a column per angle."""
+        """Return the grid as a table for rich: a row per speed, a column per place."""
         from rich.table import Table
 
-        title = f"coverage {100 * self.share:.0f} %: speed (rad/s) over opening (deg)"
+        axis = self.axis
+        of = f"speed ({axis.rate_unit}) over {axis.channel} ({axis.unit})"
+        title = f"coverage {100 * self.share:.0f} %: {of}"
         table = Table(title=title, title_justify="left")
-        table.add_column("rad/s", justify="right")
-        for low, high in self.cells:
-            table.add_column(f"{np.degrees(low):.0f}-{np.degrees(high):.0f}", justify="center")
+        table.add_column(axis.rate_unit, justify="right")
+        for cell in self.cells:
+            low, high = (axis.places * end for end in cell)
+            table.add_column(f"{low:.0f}-{high:.0f}", justify="center")
         for d, direction in enumerate(self.directions):
             for s, speed in enumerate(self.speeds):
                 marks = [self._mark(float(seconds)) for seconds in self.seconds[d, s]]
-                table.add_row(
-                    f"{direction} {speed:g}", *marks, end_section=s + 1 == len(self.speeds)
-                )
+                name = f"{direction} {axis.rates * speed:g}"
+                table.add_row(name, *marks, end_section=s + 1 == len(self.speeds))
         return table
 
     def __rich__(self) -> "Table":
@@ -131,7 +192,7 @@ class CoverageGrid:
         speed = np.searchsorted(self.speed_edges, np.abs(rate), side="right") - 1
         towards = np.full(len(rate), -1)
         for d, direction in enumerate(self.directions):
-            towards[(rate < 0) if direction == "closing" else (rate > 0)] = d
+            towards[(rate < 0) if direction in FALLING else (rate > 0)] = d
         fits = (speed >= 0) & (speed < len(self.speeds)) & (towards >= 0)
         low, high = np.asarray(self.cells, dtype=np.float64).reshape(-1, 2).T
         inside = (opening[:, None] >= low) & (opening[:, None] < high) & fits[:, None]
@@ -152,6 +213,12 @@ def friction_coverage(recipe: Recipe, identity: Identity) -> CoverageGrid:
     """Grid of a friction capture: its speeds in both directions over the scene's openings."""
     cells = even_cells(opening_range(recipe, identity))
     return CoverageGrid(recipe.capture.friction.speeds_rad_per_s, cells)
+
+
+def advance_coverage(recipe: Recipe, identity: Identity) -> CoverageGrid:
+    """Grid of a capture of the sledge: its speeds both ways over its travel."""
+    cells = even_cells(advance_range(recipe, identity))
+    return CoverageGrid(sliding_speeds(recipe), cells, ("backward", "forward"), axis=ADVANCE)
 
 
 def cut_coverage(recipe: Recipe, identity: Identity, *, hand: bool = False) -> CoverageGrid:

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.recorder import Recorder, unloaded_sentence
 from scissorcal.device.trajectory import Segment
@@ -89,10 +87,9 @@ class Drive:
         if len(labels) == 0 or labels[-1] < 0:
             return "between strokes"
         stroke = self._strokes[int(labels[-1])]
-        speed = f" at {stroke.speed:g} rad/s" if np.isfinite(stroke.speed) else ""
         sheet = f", piece {stroke.sheet + 1}" if stroke.sheet >= 0 else ""
         of = f"stroke {stroke.index + 1} of {len(self._strokes)}{sheet}"
-        return f"{stroke.kind}{speed} ({of})"
+        return f"{self._recorder.axis.motion(stroke.kind, stroke.speed)} ({of})"
 
 
 def silent(done: float, sentence: str, recorder: Recorder) -> None:

@@ -299,6 +299,12 @@ def check_identity(name: str, identity: Identity) -> Identity:
     return identity
 
 
+_BLOCKED = (
+    "; open the blades before a sheet or plate is put in, and give the virtual rig's specimen a "
+    "plate where one shall be touched."
+)
+
+
 def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
     """Raise DeviceError unless the echo confirms the value."""
     if echo.status == ConfigStatus.UNKNOWN_KEY:
@@ -309,11 +315,7 @@ def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
     if echo.status != ConfigStatus.OK:
         raise DeviceError(
             f"{name} refused {_key_name(key)} = {value:g} (in force: {echo.value:g})"
-            + (
-                "; open the blades before a fresh sheet is loaded."
-                if key == ConfigKey.MATERIAL
-                else "."
-            )
+            + (_BLOCKED if key == ConfigKey.MATERIAL else ".")
         )
 
 

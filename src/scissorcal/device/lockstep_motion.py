@@ -11,18 +11,25 @@ from scissorcal.device.motion import (
     BLOCK_S,
     RELEASE_COMMANDS,
     SILENCE_S,
+    Array,
     Motion,
     MotionReport,
     Samples,
+    Stages,
 )
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    CONTROL_DTYPE,
     SAMPLE_DTYPE,
     ConfigKey,
+    Contour,
+    ControlConfig,
+    ControlTask,
     Mode,
     ModelTables,
+    Section,
     Servo,
     ServoConfig,
     StopReason,
@@ -45,12 +52,20 @@ class LockstepMotion(Motion):
     The host's clock is the virtual one, in nanoseconds since the rig was switched on.
     """
 
-    def __init__(self, link: Exchanging, config: ServoConfig, tables: ModelTables | None) -> None:
-        super().__init__(link.identity)
+    def __init__(
+        self,
+        link: Exchanging,
+        config: ServoConfig,
+        tables: ModelTables | None,
+        every_s: float = BLOCK_S,
+        control: ControlConfig | None = None,
+    ) -> None:
+        super().__init__(link.identity, every_s)
         self._link = link
-        self._servo = Servo(tables, config)
+        self._servo = Servo(tables, config, control)
+        self._control_rows: list[bytes] = []
         self._frame: bytes | None = None
-        self._ticks = max(1, round(BLOCK_S / self.tick_s))
+        self._ticks = max(1, round(every_s / self.tick_s))
         self._failure: DeviceError | None = None
         self._last_sequence = -1
         self._silent_s = 0.0
@@ -81,13 +96,31 @@ class LockstepMotion(Motion):
         self._servo.engage(mode)
 
     def set_reference(self, reference: Reference) -> None:
-        self._leave_track()
+        self._leave_path()
         self._servo.set_reference(
             reference.opening, reference.opening_rate, reference.advance, reference.stroke
         )
 
+    def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
+        self._leave_path()
+        self._task().set_path(place, rate, force, stage)
+
+    def send_contour(self, contour: Contour) -> None:
+        self._task().send(contour)
+
+    def control_samples(self) -> Samples:
+        rows, self._control_rows = b"".join(self._control_rows), []
+        return np.frombuffer(rows, dtype=CONTROL_DTYPE)
+
     def fresh_sheet(self, crack: float = 0.0) -> None:
         self._servo.fresh_sheet(crack)
+
+    def place(self, section: Section, usable: bool, age_s: float) -> None:
+        self._servo.place(section, usable, age_s)
+
+    @property
+    def now_s(self) -> float:
+        return self._link.virtual_time
 
     def configure(self, key: int, value: float) -> float:
         return self._link.configure(key, value)
@@ -156,6 +189,8 @@ class LockstepMotion(Motion):
             )
             self._passed_ns = now_ns
             rows.append(self._servo.telemetry().tobytes())
+            if self._servo.mode is Mode.CONTROL:
+                self._control_rows.append(self._servo.control_telemetry().tobytes())
         return rows
 
     def _without_repeats(self, samples: Samples) -> Samples:
@@ -169,7 +204,12 @@ class LockstepMotion(Motion):
     def _why_lost(self) -> DeviceError | None:
         return self._failure
 
-    def _leave_track(self) -> None:
-        if self.mode is Mode.TRACK:
+    def _leave_path(self) -> None:
+        if self.mode in (Mode.TRACK, Mode.CONTROL):
             self.engage(Mode.IDLE)
             self.step()
+
+    def _task(self) -> ControlTask:
+        if self._servo.control is None:
+            raise ValueError("This motion has no configuration of CONTROL.")
+        return self._servo.control

@@ -17,20 +17,28 @@ from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    Contour,
     EnergyLedger,
     Identity,
     Mode,
+    Section,
     ServoCounters,
     StopReason,
 )
 
 Samples = NDArray[np.void]
+Array = NDArray[np.float64]
+Stages = NDArray[np.int32]
 
 BLOCK_S = 0.05
 STOP_MARGIN_RAD = 0.05
 """Openings are usable up to so far beyond the stops that a device states."""
 SILENCE_S = 1.0
 """A device that sends nothing for so long is gone; `LoopBlock.create` has it in milliseconds."""
+FELL_BACK = (
+    "The servo fell back to damping: this process did not send its heartbeat in time. Close "
+    "programs that load the processor, and start again."
+)
 RELEASE_COMMANDS = 3
 """Zero commands at the end of a run, in case one is garbled; as FAREWELLS in sc_loop.c."""
 
@@ -65,14 +73,16 @@ class MotionReport:
 class Motion(AbstractContextManager["Motion"], ABC):
     """A running servo on a rig; leaving the context switches the motors off.
 
-    ``identity`` is the rig's, ``position`` its last opening (rad) and advance (m). Methods that
-    yield samples raise DeviceError once the servo has stopped by itself, after the last sample.
+    ``identity`` is the rig's, ``position`` its last opening (rad) and advance (m), ``every_s`` the
+    length of a block of samples. Methods that yield samples raise DeviceError once the servo has
+    stopped by itself, after the last sample.
     """
 
     identity: Identity
 
-    def __init__(self, identity: Identity) -> None:
+    def __init__(self, identity: Identity, every_s: float = BLOCK_S) -> None:
         self.identity = identity
+        self.every_s = every_s
         self._position: tuple[float, float] | None = None
         self._approach_ticks = 0
 
@@ -114,10 +124,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
         self.engage(Mode.TRACK)
         while not (self.mode is Mode.TRACK and self.track_index >= len(whole) - 1):
             if self.mode is Mode.DAMP:
-                raise DeviceError(
-                    "The servo fell back to damping: this process did not send its heartbeat in "
-                    "time. Close programs that load the processor, and start again."
-                )
+                raise DeviceError(FELL_BACK)
             yield self.step()
         yield from self.idle(BLOCK_S)
 
@@ -127,8 +134,24 @@ class Motion(AbstractContextManager["Motion"], ABC):
         yield from self._for_ticks(round(seconds / self.tick_s))
         yield from self.idle(BLOCK_S)
 
+    def control(self) -> Iterator[Samples]:
+        """Follow the path that :meth:`set_path` set until the caller ends it; then motors off.
+
+        Between blocks the caller sends contours and looks at :meth:`control_samples`.
+        """
+        self.engage(Mode.CONTROL)
+        begun = False
+        try:
+            while True:
+                yield self.step()
+                if begun and self.mode is Mode.DAMP:
+                    raise DeviceError(FELL_BACK)
+                begun = begun or self.mode is Mode.CONTROL
+        finally:
+            self.engage(Mode.IDLE)
+
     def step(self) -> Samples:
-        """Wait about 50 ms, send a heartbeat, and return the samples that arrived."""
+        """Wait for about a block, send a heartbeat, and return the samples that arrived."""
         samples = self._pass_time()
         if len(samples):
             place = (float(samples["opening"][-1]), float(samples["advance"][-1]))
@@ -147,8 +170,29 @@ class Motion(AbstractContextManager["Motion"], ABC):
         """Set what TRACK follows; not while TRACK is engaged."""
 
     @abstractmethod
+    def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
+        """Set what CONTROL follows, an entry each tick (m, m/s, N, stage); not while it does."""
+
+    @abstractmethod
+    def send_contour(self, contour: Contour) -> None:
+        """Tell the servo how the surface runs near the tip; needed before CONTROL presses."""
+
+    @abstractmethod
+    def control_samples(self) -> Samples:
+        """Samples of CONTROL since the last call, shape (n,) with CONTROL_DTYPE."""
+
+    @abstractmethod
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m)."""
+
+    @property
+    @abstractmethod
+    def now_s(self) -> float:
+        """The clock of this process, by which an estimate's age counts: the host's, or virtual."""
+
+    @abstractmethod
+    def place(self, section: Section, usable: bool, age_s: float) -> None:
+        """Take an estimate of where the plate stands, ``age_s`` old; not usable: force falls."""
 
     @abstractmethod
     def configure(self, key: int, value: float) -> float:

@@ -2,9 +2,9 @@
 
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
-from scissorcal.device.motion import Motion
+from scissorcal.device.motion import BLOCK_S, Motion
 from scissorcal.device.port_motion import PortMotion
-from scissorcal.kernel import ModelTables, ServoConfig
+from scissorcal.kernel import ControlConfig, ModelTables, ServoConfig
 
 SPARE_S = 30.0
 """Room in the shared memory beyond the longest reference, for the approach to its start."""
@@ -16,11 +16,14 @@ def open_motion(
     tables: ModelTables | None = None,
     *,
     longest_reference: int = 0,
+    every_s: float = BLOCK_S,
+    control: ControlConfig | None = None,
 ) -> Motion:
     """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 
-    ``tables`` are needed to render, ``longest_reference`` (ticks) to track. It starts idle, with
-    the rig's position known. A fault that the device has latched is cleared.
+    ``tables`` are needed to render, ``longest_reference`` (ticks) to track or to follow a path,
+    ``control`` to press on a surface; samples come in blocks of about ``every_s``. It starts idle,
+    with the rig's position known. A fault that the device has latched is cleared.
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
@@ -32,9 +35,8 @@ def open_motion(
     (200, False)
     """
     if isinstance(link, Exchanging):
-        return LockstepMotion(link, config, tables)
+        return LockstepMotion(link, config, tables, every_s, control)
     if not isinstance(link, PortLink):
         raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
-    return PortMotion(
-        link, config, tables, longest_reference + round(SPARE_S * 1e6 / config.tick_us)
-    )
+    capacity = longest_reference + round(SPARE_S * 1e6 / config.tick_us)
+    return PortMotion(link, config, tables, capacity, every_s, control)

@@ -18,7 +18,7 @@ from scissorcal.device.trajectory import (
     friction_plan,
 )
 from scissorcal.kernel import Identity
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe
 from scissorcal.recording import Stroke
 
@@ -149,7 +149,9 @@ def stroke_of_tick(labels: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.append(labels[marked], np.int32(-1))[following]
 
 
-def with_capture(recipe: Recipe, kind: CaptureKind, wanted: CaptureFriction | CaptureCut) -> Recipe:
+def with_capture(
+    recipe: Recipe, kind: DesignedKind, wanted: CaptureFriction | CaptureCut
+) -> Recipe:
     """The recipe with another list of one kind of capture."""
     capture = recipe.capture.model_copy(update={kind: wanted})
     return recipe.model_copy(update={"capture": capture})

@@ -65,11 +65,12 @@ class PathBuilder:
         self._append(self.opening + way, rate, np.full(len(way), self.advance), stroke)
         self.opening = opening
 
-    def advance_to(self, advance: float, speed: float, acceleration: float) -> None:
+    def advance_to(
+        self, advance: float, speed: float, acceleration: float, stroke: int = -1
+    ) -> None:
         """Move the pivot to ``advance`` at a cruising ``speed`` (m/s), the blades at rest."""
         way, _ = glide(advance - self.advance, speed, acceleration, self._tick_s)
-        still = np.full(len(way), self.opening)
-        self._append(still, np.zeros(len(way)), self.advance + way, -1)
+        self.slide(way, stroke)
         self.advance = advance
 
     def rest(self, seconds: float) -> None:
@@ -81,6 +82,11 @@ class PathBuilder:
     def swing(self, way: Array, rate: Array, stroke: int) -> None:
         """Follow an excitation around the current opening; it must end where it began."""
         self._append(self.opening + way, rate, np.full(len(way), self.advance), stroke)
+
+    def slide(self, way: Array, stroke: int) -> None:
+        """Follow a way of the pivot from where it stands, the blades at rest."""
+        still = np.full(len(way), self.opening)
+        self._append(still, np.zeros(len(way)), self.advance + way, stroke)
 
     def reference(self) -> Reference:
         """Return everything so far as one reference."""
@@ -130,7 +136,7 @@ def ramp_way(speed: float, acceleration: float) -> float:
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """Bounds of an excitation: amplitude (rad), rate (rad/s), acceleration (rad/s^2)."""
+    """Bounds of an excitation: amplitude (rad or m), rate and acceleration per s and s^2."""
 
     amplitude: float
     rate: float

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import Motion, MotionReport, Samples
+from scissorcal.device.motion import BLOCK_S, Array, Motion, MotionReport, Samples, Stages
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
@@ -13,14 +13,16 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     Command,
     ConfigKey,
+    Contour,
+    ControlConfig,
     LoopBlock,
     Mode,
     ModelTables,
+    Section,
     ServoConfig,
     StopReason,
 )
 
-DRAIN_S = 0.05
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
 FIRST_POSITION_TIMEOUT_S = 2.0
@@ -33,11 +35,17 @@ class PortMotion(Motion):
     """
 
     def __init__(
-        self, link: PortLink, config: ServoConfig, tables: ModelTables | None, capacity: int
+        self,
+        link: PortLink,
+        config: ServoConfig,
+        tables: ModelTables | None,
+        capacity: int,
+        every_s: float = BLOCK_S,
+        control: ControlConfig | None = None,
     ) -> None:
-        super().__init__(link.identity)
+        super().__init__(link.identity, every_s)
         self._link = link
-        self._block = LoopBlock.create(config, tables, reference_capacity=capacity)
+        self._block = LoopBlock.create(config, tables, control=control, reference_capacity=capacity)
         self._process = ServoProcess(link, self._block)
         self._drain_at = 0.0
         self._final: MotionReport | None = None
@@ -78,14 +86,32 @@ class PortMotion(Motion):
         self._block.engage(mode)
 
     def set_reference(self, reference: Reference) -> None:
-        if self.mode is Mode.TRACK:
+        if self.mode in (Mode.TRACK, Mode.CONTROL):
             self._go_idle()
         self._block.set_reference(
             reference.opening, reference.opening_rate, reference.advance, reference.stroke
         )
 
+    def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
+        if self.mode in (Mode.TRACK, Mode.CONTROL):
+            self._go_idle()
+        self._block.set_path(place, rate, force, stage)
+
+    def send_contour(self, contour: Contour) -> None:
+        self._block.control.send(contour)
+
+    def control_samples(self) -> Samples:
+        return self._block.control.read()
+
     def fresh_sheet(self, crack: float = 0.0) -> None:
         self._block.fresh_sheet(crack)
+
+    def place(self, section: Section, usable: bool, age_s: float) -> None:
+        self._block.place(section, usable, age_s)
+
+    @property
+    def now_s(self) -> float:
+        return time.monotonic()
 
     def configure(self, key: int, value: float) -> float:
         for _ in range(CONFIGURE_ATTEMPTS):
@@ -140,9 +166,9 @@ class PortMotion(Motion):
             self._link.flush()
 
     def _pass_time(self) -> Samples:
-        """Wait until 50 ms after the last call, or the end of the loop; empty the ring buffer."""
+        """Wait until a block after the last call, or the end of the loop; empty the ring buffer."""
         self._process.heartbeat.seen()
-        self._drain_at = max(self._drain_at + DRAIN_S, time.monotonic())
+        self._drain_at = max(self._drain_at + self.every_s, time.monotonic())
         left = self._drain_at - time.monotonic()
         if left > 0 and self._process.alive:
             time.sleep(left)  # in one piece: each time this process wakes may delay the loop

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.coverage import CoverageGrid
+from scissorcal.device.coverage import CoverageGrid, CoveredAxis
 from scissorcal.kernel import StateFlag
 from scissorcal.recording import RecordingWriter, Stroke
 from scissorcal.recording.recording import UNLOADED_MARK
@@ -51,6 +51,11 @@ class Recorder:
     def sample_count(self) -> int:
         """Samples recorded so far."""
         return self.writer.sample_count
+
+    @property
+    def axis(self) -> CoveredAxis:
+        """The axis that the capture moves."""
+        return self._coverage.axis
 
     @property
     def coverage(self) -> CoverageGrid:

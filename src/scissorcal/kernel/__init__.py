@@ -1,11 +1,28 @@
 """The C core and its thin binding: wire frames, tables, the model's step, the servo loop."""
 
+from scissorcal.kernel.control import (
+    CONTROL_DTYPE,
+    AxisFriction,
+    Contour,
+    ControlConfig,
+    ControlFlag,
+    ControlTask,
+)
 from scissorcal.kernel.crack import CrackLaw, CrackPath, Curve, walk_crack
 from scissorcal.kernel.cut_fit import (
     CutFitData,
     CutFitParameters,
     cut_log_likelihood,
     cut_log_likelihoods,
+)
+from scissorcal.kernel.hybrid import (
+    HYBRID_INPUT_DTYPE,
+    HYBRID_OUTPUT_DTYPE,
+    Hybrid,
+    HybridConfig,
+    HybridFlag,
+    NormalLaw,
+    hybrid_inputs,
 )
 from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.loop import (
@@ -32,12 +49,13 @@ from scissorcal.kernel.messages import (
     State,
     StateFlag,
 )
+from scissorcal.kernel.modes import Mode
 from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
+from scissorcal.kernel.plate import PlacedModel, PlateConfig, Pull, Section
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.rates import estimated_rates
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
-    Mode,
     SampleFlag,
     Servo,
     ServoConfig,
@@ -52,10 +70,14 @@ from scissorcal.kernel.watching import WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [
+    "CONTROL_DTYPE",
+    "HYBRID_INPUT_DTYPE",
+    "HYBRID_OUTPUT_DTYPE",
     "PROTOCOL_VERSION",
     "SAMPLE_DTYPE",
     "SCHEMA_HASH",
     "STEP_DTYPE",
+    "AxisFriction",
     "Capability",
     "Command",
     "CommandFlag",
@@ -63,6 +85,10 @@ __all__ = [
     "ConfigEcho",
     "ConfigKey",
     "ConfigStatus",
+    "Contour",
+    "ControlConfig",
+    "ControlFlag",
+    "ControlTask",
     "CrackLaw",
     "CrackPath",
     "Curve",
@@ -72,6 +98,9 @@ __all__ = [
     "FrameDecoder",
     "Hello",
     "Histogram",
+    "Hybrid",
+    "HybridConfig",
+    "HybridFlag",
     "Identity",
     "Kernel",
     "LagCounts",
@@ -80,9 +109,14 @@ __all__ = [
     "Message",
     "Mode",
     "ModelTables",
+    "NormalLaw",
     "PassivityConfig",
+    "PlacedModel",
+    "PlateConfig",
+    "Pull",
     "Row16",
     "SampleFlag",
+    "Section",
     "Servo",
     "ServoConfig",
     "ServoCounters",
@@ -103,6 +137,7 @@ __all__ = [
     "encode",
     "encode_frame",
     "estimated_rates",
+    "hybrid_inputs",
     "lock_memory",
     "presliding_path",
     "run_loop",

@@ -23,9 +23,9 @@ _NUMBERS = {
 
 
 def dtype_of(struct: str) -> np.dtype[Any]:
-    """Give the dtype of a C struct of plain numbers, with the compiler's own offsets."""
+    """Give the dtype of a C struct of numbers and arrays of them, with the compiler's offsets."""
     kind = ffi.typeof(struct)
-    fields = [(name, _NUMBERS[field.type.cname], field.offset) for name, field in kind.fields]
+    fields = [(name, _format_of(field.type), field.offset) for name, field in kind.fields]
     return np.dtype(
         {
             "names": [name for name, _, _ in fields],
@@ -34,6 +34,15 @@ def dtype_of(struct: str) -> np.dtype[Any]:
             "itemsize": ffi.sizeof(kind),
         }
     )
+
+
+def _format_of(kind: Any) -> Any:
+    """NumPy's format of a C number, or of an array of numbers of any depth."""
+    shape: tuple[int, ...] = ()
+    while kind.kind == "array":
+        shape, kind = (*shape, kind.length), kind.item
+    number = _NUMBERS[kind.cname]
+    return (number, shape) if shape else number
 
 
 def fill_struct(struct: Any, values: "DataclassInstance") -> None:

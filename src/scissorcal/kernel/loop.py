@@ -16,17 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.control import ControlBlock, ControlConfig, path_arrays
 from scissorcal.kernel.layout import fill_struct
 from scissorcal.kernel.messages import ConfigEcho
-from scissorcal.kernel.servo import (
-    SAMPLE_DTYPE,
-    Mode,
-    ServoConfig,
-    ServoView,
-    reference_arrays,
-    refuse_change,
-    refuse_mode,
-)
+from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
+from scissorcal.kernel.plate import Section, placing
+from scissorcal.kernel.servo import SAMPLE_DTYPE, ServoConfig, ServoView
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
 
@@ -125,6 +120,7 @@ class LoopBlock(ServoView):
         self._servo = ffi.addressof(self.pointer, "servo")
         self._cursor = ffi.new("uint64_t *")
         self._lost = ffi.new("uint64_t *")
+        self.control = ControlBlock(self.pointer)
 
     @classmethod
     def create(
@@ -132,12 +128,14 @@ class LoopBlock(ServoView):
         config: ServoConfig,
         tables: ModelTables | None = None,
         *,
+        control: ControlConfig | None = None,
         reference_capacity: int = 0,
         silence_limit_ms: int = 1000,
     ) -> Self:
         """Create a block with everything the loop needs.
 
-        ``reference_capacity``: longest reference in ticks that TRACK will get.
+        ``tables`` are needed to render, ``control`` to press on a surface.
+        ``reference_capacity``: longest reference or path in ticks that it will get.
         ``silence_limit_ms``: how long the device may send no STATE before the loop gives up.
         """
         size = int(lib.sc_block_size(reference_capacity))
@@ -149,6 +147,9 @@ class LoopBlock(ServoView):
         fill_struct(block.pointer.config, config)
         if tables is not None:
             _store_tables(block.pointer, tables)
+        if control is not None:
+            fill_struct(block.pointer.control.config, control)
+            block.pointer.control.has_config = 1
         return block
 
     @classmethod
@@ -182,21 +183,35 @@ class LoopBlock(ServoView):
 
     def _unmap(self) -> None:
         self.pointer = self._servo = ffi.NULL
+        self.control = ControlBlock(ffi.NULL)
         ffi.release(self._keep)
         self._memory.close()
 
     def engage(self, mode: Mode) -> None:
         """Request a mode; it engages with the next frame (RENDER from zero force)."""
-        refuse_mode(mode, bool(self.pointer.has_model), self.pointer.reference_size)
+        size = int(self.pointer.reference_size)
+        path = size if self.pointer.control.has_config else 0
+        refuse_mode(mode, bool(self.pointer.has_model), size, path)
         lib.sc_block_order(self.pointer, int(mode))
 
     def set_reference(
         self, opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
     ) -> None:
         """Set what TRACK follows, as :meth:`Servo.set_reference`; not while TRACK is engaged."""
+        self._follow(reference_arrays(opening, opening_rate, advance, stroke))
+
+    def set_path(
+        self, place: ArrayLike, rate: ArrayLike, force: ArrayLike, stage: ArrayLike
+    ) -> None:
+        """Set what CONTROL follows, in the place of the reference; as :meth:`ControlTask.set_path`.
+
+        Neither TRACK nor CONTROL may be engaged.
+        """
+        self._follow(path_arrays(place, rate, force, stage))
+
+    def _follow(self, arrays: tuple[NDArray[Any], ...]) -> None:
         block = self.pointer
         refuse_change(block.orders.mode, block.servo.mode)
-        arrays = reference_arrays(opening, opening_rate, advance, stroke)
         n, capacity = len(arrays[0]), int(block.reference_capacity)
         if n > capacity:
             raise ValueError(
@@ -211,6 +226,10 @@ class LoopBlock(ServoView):
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
         lib.sc_block_fresh_sheet(self.pointer, crack)
+
+    def place(self, section: Section, usable: bool = True, age_s: float = 0.0) -> None:
+        """Take an estimate of where the plate stands, ``age_s`` old; not usable: force falls."""
+        lib.sc_block_place(self.pointer, placing(section, usable, age_s))
 
     def beat(self) -> None:
         """Send a heartbeat to the loop; at least every supervisor_ms."""

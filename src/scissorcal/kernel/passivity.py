@@ -46,7 +46,8 @@ class EnergyLedger:
     ``engaged_J`` is what the ramp put into pressed material, ``limited_J`` the work that limits
     kept back, ``injected_J`` (negative) what the passivity controller took, ``late_J`` the rest:
     work beyond the commands, by holding, delay and lag. ``hand_J``: work of the hand while the
-    motors are on, 0 without a sensor of its force.
+    motors are on, 0 without a sensor of its force. ``plate_J``: what who moves a plate of estimated
+    pose put into its material.
     """
 
     delivered_J: float
@@ -59,6 +60,7 @@ class EnergyLedger:
     late_J: float = 0.0
     injected_J: float = 0.0
     hand_J: float = 0.0
+    plate_J: float = 0.0
 
     @property
     def absorbed_J(self) -> float:  # noqa: N802  (J is the unit)
@@ -71,7 +73,7 @@ class EnergyLedger:
 
         For runs that only rendered: tracking a reference delivers work as well.
         """
-        came = self.engaged_J + self.limited_J
+        came = self.engaged_J + self.limited_J + self.plate_J
         return self.delivered_J + self.stored_J + self.absorbed_J - came
 
     @property

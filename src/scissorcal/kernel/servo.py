@@ -1,18 +1,20 @@
 """The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
 
-import math
-from dataclasses import Field, dataclass, fields
-from enum import IntEnum, IntFlag
+from dataclasses import Field, dataclass, fields, is_dataclass
+from enum import IntFlag
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.control import ControlConfig, ControlTask, control_sample
 from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
+from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
 from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
+from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
@@ -47,19 +49,11 @@ _ABOVE_ZERO = (
 )
 
 
-class Mode(IntEnum):
-    """IDLE: motors off. TRACK: follow the reference. RENDER: the model. DAMP: damping only."""
-
-    IDLE = 0
-    TRACK = 1
-    RENDER = 2
-    DAMP = 3
-
-
 class SampleFlag(IntFlag):
     """A sample's ``flags`` above bit 15; below are the device's own (StateFlag).
 
-    A rendered step's flags (StepFlag) follow from bit 24 on.
+    PLATE_OUT: rendering with less than its force, for want of the plate's pose. A rendered step's
+    flags (StepFlag) follow from bit 24 on.
     """
 
     TORQUE_LIMITED = 0x10000
@@ -67,6 +61,7 @@ class SampleFlag(IntFlag):
     FALLBACK = 0x40000
     INVALID = 0x80000
     AFTER_GAP = 0x100000
+    PLATE_OUT = 0x800000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +79,8 @@ class ServoConfig:
     ``supervisor_ms`` without a heartbeat leave damping only, five times as long stops;
     0 switches that off. ``fault_clearings``: how many latched faults are cleared; one
     more stops. ``watch`` has the thresholds of the watches, by default none; ``passivity`` watches
-    the energy of RENDER. Raises ValueError for a number that is not finite or below 0.
+    the energy of RENDER, ``plate`` follows a plate whose pose is estimated. Raises ValueError for
+    a number that is not finite or below 0.
     """
 
     torque_limit: float
@@ -112,6 +108,7 @@ class ServoConfig:
     motor_sign: int = 1
     watch: WatchConfig = NO_WATCHES
     passivity: PassivityConfig = UNWATCHED_ENERGY
+    plate: PlateConfig = KNOWN_PLATE
 
     def __post_init__(self) -> None:
         for field in self._numbers():
@@ -132,14 +129,15 @@ class ServoConfig:
             raise ValueError("opening_low must be below opening_high.")
 
     def _numbers(self) -> list[Field[Any]]:
-        return [field for field in fields(self) if field.name not in ("watch", "passivity")]
+        return [field for field in fields(self) if not is_dataclass(getattr(self, field.name))]
 
 
 @dataclass(frozen=True)
 class ServoCounters:
     """How many frames: taken, missed (gaps in the sequence), repeated, without usable numbers;
     and in how many the torque or force met a limit or slew, the device saturated, or only
-    damping was left. ``faults`` counts faults of the device after the motors were first on.
+    damping was left. ``faults`` counts faults of the device after the motors were first on,
+    ``plate_out_frames`` those rendered with less than their force for want of the plate's pose.
     """
 
     frames: int
@@ -153,6 +151,7 @@ class ServoCounters:
     device_saturated: int
     fallback_frames: int
     faults: int
+    plate_out_frames: int
 
 
 class ServoView:
@@ -186,6 +185,13 @@ class ServoView:
         return float(self._servo.crack.crack)
 
     @property
+    def plate(self) -> tuple[Section, float]:
+        """Where an estimated plate is rendered now, and the share of force that it lets through."""
+        plate = self._servo.plate
+        now = Section(*(float(getattr(plate.now, field.name)) for field in fields(Section)))
+        return now, float(plate.share)
+
+    @property
     def ledger(self) -> EnergyLedger:
         ledger = self._servo.ledger
         return EnergyLedger(*(getattr(ledger, field.name) for field in fields(EnergyLedger)))
@@ -209,7 +215,8 @@ class ServoView:
 class Servo(ServoView):
     """The servo on its own, for lockstep runs, tests and other loops.
 
-    ``tables`` is needed for RENDER only. It starts in IDLE with a fresh sheet (crack at 0).
+    ``tables`` is needed for RENDER only, ``control`` for CONTROL. It starts in IDLE with a fresh
+    sheet (crack at 0).
 
     >>> servo = Servo(None, ServoConfig(torque_limit=1, torque_slew=200, force_limit=0,
     ...                                 force_slew=0, damping_Nm_s_per_rad=0.1))
@@ -220,13 +227,21 @@ class Servo(ServoView):
     0.1
     """
 
-    def __init__(self, tables: ModelTables | None, config: ServoConfig) -> None:
+    def __init__(
+        self,
+        tables: ModelTables | None,
+        config: ServoConfig,
+        control: ControlConfig | None = None,
+    ) -> None:
         self.config = config
+        self.control = None if control is None else ControlTask(control)
         self._config = ffi.new("sc_servo_config *")
         fill_struct(self._config, config)
         self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
         self._orders = ffi.new("sc_orders *")
         self._reference = ffi.new("sc_reference *")
+        if self.control is not None:
+            self._reference.task = self.control.pointer
         self._reference_arrays: tuple[NDArray[Any], ...] = ()
         self._servo = ffi.new("sc_servo *")
         self._state = ffi.new("sc_state *")
@@ -236,7 +251,8 @@ class Servo(ServoView):
 
     def engage(self, mode: Mode) -> None:
         """Request a mode; it engages with the next frame (RENDER from zero force)."""
-        refuse_mode(mode, self._model != ffi.NULL, self._reference.size)
+        path = 0 if self.control is None else self.control.path_size
+        refuse_mode(mode, self._model != ffi.NULL, self._reference.size, path)
         self._orders.mode = int(mode)
         self._orders.order = (self._orders.order + 1) & U32
 
@@ -261,6 +277,10 @@ class Servo(ServoView):
         """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
         self._orders.crack = crack
         self._orders.sheet = (self._orders.sheet + 1) & U32
+
+    def place(self, section: Section, usable: bool = True, age_s: float = 0.0) -> None:
+        """Take an estimate of where the plate stands, ``age_s`` old; not usable: force falls."""
+        lib.sc_servo_place(self._config, self._model, self._servo, placing(section, usable, age_s))
 
     def stop(self) -> None:
         """Release the motors from the next frame on, for good."""
@@ -335,37 +355,11 @@ class Servo(ServoView):
         else:
             lib.sc_servo_not_sent(self._servo)
 
+    def control_telemetry(self) -> NDArray[np.void]:
+        """The last frame's sample of CONTROL, shape (1,), CONTROL_DTYPE; a copy."""
+        return control_sample(self._servo)
+
     def telemetry(self) -> NDArray[np.void]:
         """The last frame's sample, shape (1,), SAMPLE_DTYPE; a copy."""
         data = bytes(ffi.buffer(ffi.addressof(self._servo, "sample")))
         return np.frombuffer(data, dtype=SAMPLE_DTYPE)
-
-
-def refuse_mode(mode: Mode, has_model: bool, reference_size: int) -> None:
-    """Raise ValueError for a mode that lacks what it needs: a model, or a reference."""
-    if mode is Mode.RENDER and not has_model:
-        raise ValueError("RENDER needs the tables of a model, and there are none.")
-    if mode is Mode.TRACK and reference_size == 0:
-        raise ValueError("TRACK needs a reference: call set_reference first.")
-
-
-def refuse_change(*modes: int) -> None:
-    """Raise ValueError for a change of the reference where TRACK is engaged or asked for."""
-    if Mode.TRACK in modes:
-        raise ValueError("The reference cannot change while TRACK follows it.")
-
-
-def reference_arrays(
-    opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike, stroke: ArrayLike
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
-    """Check a reference and return it as the C core takes it; ValueError if it is not valid."""
-    places = [np.ascontiguousarray(a, dtype=np.float32) for a in (opening, opening_rate, advance)]
-    strokes = np.ascontiguousarray(stroke, dtype=np.int32)
-    n = places[0].size
-    if n == 0 or any(a.shape != (n,) for a in (*places, strokes)):
-        raise ValueError("A reference needs four arrays of one shape (N,), N >= 1.")
-    if not all(np.isfinite(a).all() for a in places):
-        raise ValueError("A reference must be finite throughout.")
-    if np.any(np.abs(places[0]) > math.pi):
-        raise ValueError("A reference's opening must stay within half a turn.")
-    return places[0], places[1], places[2], strokes

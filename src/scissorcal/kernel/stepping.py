@@ -1,7 +1,7 @@
 """The model's step from Python: one at a time, or many in one C loop."""
 
 from enum import IntFlag
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,19 +87,7 @@ class Kernel:
         """
         out = self._out
         lib.sc_model_step(self._model, self._state, opening, rate, advance, out)
-        return StepOutput(
-            out.torque,
-            out.force,
-            out.contact,
-            out.indentation,
-            out.height,
-            out.response,
-            out.friction_torque,
-            out.stored_J,
-            out.fracture_J,
-            out.arrest_J,
-            out.flags,
-        )
+        return step_output(out)
 
     def step_many(
         self, opening: ArrayLike, rate: ArrayLike, advance: ArrayLike
@@ -141,6 +129,23 @@ class Kernel:
             ffi.from_buffer("float[]", torque, require_writable=True),
         )
         return torque.reshape(shape)
+
+
+def step_output(out: Any) -> StepOutput:
+    """The output of a step as the C struct ``out`` has it."""
+    return StepOutput(
+        out.torque,
+        out.force,
+        out.contact,
+        out.indentation,
+        out.height,
+        out.response,
+        out.friction_torque,
+        out.stored_J,
+        out.fracture_J,
+        out.arrest_J,
+        out.flags,
+    )
 
 
 def _float32_columns(*arguments: ArrayLike) -> list[NDArray[np.float32]]:

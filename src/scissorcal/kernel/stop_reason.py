@@ -20,6 +20,13 @@ class StopReason(IntEnum):
     DEVICE_CLOCK = 11
     OVERSPEED = 12
     RESTARTED = 13
+    NO_CONTOUR = 17
+    HANDLE_HELD = 18
+    PRESSED_AWAY = 19
+    NO_SURFACE = 20
+    PRESSED_TOO_HARD = 21
+    PATH_LOST = 22
+    CONTROL_REFUSED = 23
     TORQUE_HELD = 32
     OSCILLATION = 33
     RUNAWAY = 34
@@ -54,7 +61,7 @@ _STOP_SENTENCES = {
         "The device reports a fault of its encoder; check the encoder and its cable."
     ),
     StopReason.TRACKING_LOST: (
-        "The blades did not follow the commanded motion; check for an obstacle, a stuck "
+        "Blades or sledge did not follow the commanded motion; check for an obstacle, a stuck "
         "encoder or gains that are too weak."
     ),
     StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
@@ -80,6 +87,34 @@ _STOP_SENTENCES = {
     StopReason.RESTARTED: (
         "The device restarted: its sequence numbers fell back. Check its power supply and cable, "
         "then start again."
+    ),
+    StopReason.NO_CONTOUR: (
+        "No new estimate of the surface came for too long, so the tip was lifted and the motors "
+        "released. Check the camera or what else states the plate's pose, and start again."
+    ),
+    StopReason.HANDLE_HELD: (
+        "A force acts on the handles, so the force at the tip cannot be known: nobody may hold the "
+        "handles while the rig presses. Let go, and start again."
+    ),
+    StopReason.PRESSED_AWAY: (
+        "The tip presses on something before it reaches the surface. Remove what it met, or check "
+        "the plate's pose and the surface that the recipe states."
+    ),
+    StopReason.NO_SURFACE: (
+        "The tip found nothing to press on where the surface should be. Put the plate in its "
+        "place, or check its pose and the surface that the recipe states."
+    ),
+    StopReason.PRESSED_TOO_HARD: (
+        "The tip pressed much harder than asked for. Check for an obstacle on the path and the "
+        "plate's pose; a softer touch needs a slower path."
+    ),
+    StopReason.PATH_LOST: (
+        "The tip fell behind its path. Check for an obstacle and a sledge that sticks, or take a "
+        "slower path."
+    ),
+    StopReason.CONTROL_REFUSED: (
+        "The tip stands where the axes cannot press on the surface, or a sensor sends no number. "
+        "Choose a path nearer to the middle of the rig's reach, and check the sensors."
     ),
     StopReason.TORQUE_HELD: (
         "The motor's torque was at its limit for limits.held_at_limit_s. Check for an obstacle, "

@@ -29,6 +29,24 @@ def spline_design(count: int, start: float, end: float, at: ArrayLike) -> Array:
     return spline_value(np.eye(count)[:, None, :], start, end, places).T
 
 
+def spline_powers(weights: ArrayLike) -> Array:
+    """Coefficients (..., pieces, 4) of 1, t, t^2 and t^3 on each piece of a spline.
+
+    ``weights`` (..., n) make n - 3 pieces; t goes from 0 to 1 along each.
+
+    >>> spline_powers([0.0, 0.0, 0.0, 6.0]).tolist()
+    [[0.0, 0.0, 0.0, 1.0]]
+    """
+    four = np.lib.stride_tricks.sliding_window_view(np.asarray(weights, np.float64), FEWEST, -1)
+    return np.asarray(four @ _POWERS)
+
+
+_POWERS = (
+    np.array(((1, -3, 3, -1), (4, 0, -6, 3), (1, 3, 3, -3), (0, 0, 0, 1)), dtype=np.float64) / 6.0
+)
+"""Row k: the powers of t in the k-th of the four basis functions on a piece."""
+
+
 def _evaluate(weights: ArrayLike, start: float, end: float, at: ArrayLike, slope: bool) -> Array:
     w = np.asarray(weights, dtype=np.float64)
     s = np.asarray(at, dtype=np.float64)

@@ -126,6 +126,7 @@ def build_package(
             members=tuple(
                 member_of(file, array, compiled.rows.get(file)) for file, array in arrays.items()
             ),
+            plate_pose=recipe.scene.plate_pose,
             plate=_plate_record(plate) if plate else None,
             simplification=simplified.record,
             review=review,

@@ -259,7 +259,8 @@ class Manifest(Section):
     under the report of the package's fits, null as long as there is none. ``simplification`` says
     which simpler laws were enough for the scene, so that they stand here in the place of the fits'
     own: structure, parameters and draws are of the law that is rendered. It is null in packages
-    that were built before there was such a choice.
+    that were built before there was such a choice. ``plate_pose`` is the scene's: "estimated" makes
+    a rendering follow the plate, from ``plate`` where no tracker does.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -271,6 +272,7 @@ class Manifest(Section):
     bound: Bound
     provenance: Provenance
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
+    plate_pose: Literal["known", "estimated"] = "known"
     plate: PlateRecord | None = None
     simplification: Simplification | None = None
     review: Review | None

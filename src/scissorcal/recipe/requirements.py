@@ -6,7 +6,9 @@ from typing import Literal
 
 from scissorcal.recipe.schema import Recipe
 
-CaptureKind = Literal["friction", "cut"]
+CaptureKind = Literal["friction", "friction-advance", "cut"]
+DesignedKind = Literal["friction", "cut"]
+"""Captures whose strokes can be chosen by what they are worth to the scene's torque."""
 GeometryKind = Literal["camera", "blade", "plate"]
 
 LITTLE = 0.5
@@ -52,7 +54,8 @@ def requirements(recipe: Recipe) -> Requirements:
     what the motor measures while it cuts is cutting *and* friction, so the response of the material
     cannot be separated from the friction of the pivot unless that is known from an empty stroke.
     A scene that only presses needs neither toughness nor fracture. A linear joint carries no
-    blades: it has friction and inertia, and nothing is cut with it.
+    blades: it has friction and inertia, and nothing is cut with it. Mass and friction of the sledge
+    are needed where a force along the cut is rendered with friction.
 
     >>> from scissorcal.recipe.library import builtin_recipe
     >>> needs = requirements(builtin_recipe("press-only"))
@@ -93,6 +96,7 @@ def requirements(recipe: Recipe) -> Requirements:
         left_out.append(
             Requirement("translation force", 'scene.render does not name "translation_force"')
         )
+    advance = _advance(recipe)
     geometry = _geometry(recipe)
     if not any(item.name == "blade" for item in geometry):
         left_out.append(Requirement("blade photographs", 'rig.edge.source = "recipe"'))
@@ -101,10 +105,12 @@ def requirements(recipe: Recipe) -> Requirements:
     return Requirements(
         captures=(
             Requirement("friction", why_friction),
+            *advance,
             Requirement("cut", f"{recipe.material.name} is {verb} in this scene"),
         ),
         fits=(
             Requirement("friction", why_friction),
+            *advance,
             Requirement("cut", "response and toughness" if scene.cut else "response only"),
         ),
         tables=tuple(tables),
@@ -112,6 +118,15 @@ def requirements(recipe: Recipe) -> Requirements:
         photographs=geometry,
         geometry=geometry,
     )
+
+
+def _advance(recipe: Recipe) -> tuple[Requirement, ...]:
+    """Friction of the sledge, where a hand feels it beside a rendered force."""
+    scene = recipe.scene
+    if "translation_force" not in scene.render or not scene.render_friction:
+        return ()
+    why = "a force along the cut is rendered with friction, and the sledge's own comes on top"
+    return (Requirement("friction-advance", why),)
 
 
 def _geometry(recipe: Recipe) -> tuple[Requirement, ...]:
@@ -149,6 +164,8 @@ def capture_facts(recipe: Recipe, kind: CaptureKind) -> Mapping[str, object]:
     repeats, sheets) are not among them: what was recorded stays true.
     """
     rig = recipe.rig
+    if kind == "friction-advance":
+        return {"rig.joint": rig.joint}
     facts: dict[str, object] = {
         "rig.joint": rig.joint,
         "rig.moving": rig.moving,

@@ -8,42 +8,35 @@ are refused.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, GetCoreSchemaHandler, Strict, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, Strict, model_validator
 
-from scissorcal.model.friction_terms import TERMS, law_names
+from scissorcal.recipe.fields import (
+    Count,
+    Finite,
+    Length_mm,
+    NonNegative,
+    Positive,
+    Range,
+    Speeds,
+    Thickness_mm,
+)
+from scissorcal.recipe.friction import (
+    AdvanceSettings,
+    CaptureFrictionAdvance,
+    FitFrictionAdvance,
+)
+from scissorcal.recipe.friction import CaptureFriction as CaptureFriction
+from scissorcal.recipe.friction import FitFriction as FitFriction
+from scissorcal.recipe.friction import FrictionRung as FrictionRung
+from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
-from scissorcal.recipe.priors import CutPriors, JointPriors, LogNormalPrior, Section
+from scissorcal.recipe.plate_surface import PlateSurface
+from scissorcal.recipe.plate_tracking import PlateTracking
+from scissorcal.recipe.priors import CutPriors, LogNormalPrior, Section
+from scissorcal.recipe.touch import Touch
 
-
-class OneOf:
-    """One of some names: a literal whose names come from a table."""
-
-    def __init__(self, *names: str) -> None:
-        self.names = names
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.literal_schema(list(self.names))
-
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=1000)]
-Range = Annotated[tuple[Finite, Finite], Strict(False)]
-
-Length_mm = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-"""No blade, handle or contact of scissors is longer than a metre: beyond it a unit went wrong."""
-
-Thickness_mm = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-Speed_rad_per_s = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-Speeds = Annotated[tuple[Speed_rad_per_s, ...], Strict(False), Field(min_length=1, max_length=100)]
-FrictionRung = Annotated[str, OneOf(*law_names())]
-FrictionTerm = Annotated[str, OneOf(*(term.name for term in TERMS.values() if term.adoptable))]
 Rendered = Literal["torque", "handle_force", "translation_force"]
 
 
@@ -220,7 +213,7 @@ class Scene(Section):
 
 
 class Plate(Section):
-    """How the printed target lies on the plate, where the plate's pose is estimated.
+    """How the printed target lies on the plate, where its pose is estimated; surface and tracking.
 
     ``place_mm`` is the pattern's upper left corner as printed, in the plate's frame (x along the
     cut from the near edge, y to the left of the cut, z out of the upper face); ``turn_deg`` turns
@@ -229,6 +222,9 @@ class Plate(Section):
 
     place_mm: Range = (0.0, 0.0)
     turn_deg: Finite = 0.0
+    surface: PlateSurface = PlateSurface()
+    touch: Touch = Touch()
+    tracking: PlateTracking = PlateTracking()
 
 
 class Limits(Section):
@@ -243,14 +239,6 @@ class Limits(Section):
     force_slew_N_per_s: Annotated[float, Field(gt=0, le=1e8, allow_inf_nan=False)] = 5000.0
     engagement_ramp_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] = 0.5
     held_at_limit_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 2.0
-
-
-class CaptureFriction(Section):
-    """Empty closing and opening at several speeds, then excited motion for the inertia."""
-
-    speeds_rad_per_s: Speeds = (0.05, 0.12, 0.3, 0.7, 1.5)
-    repeats: Count = 2
-    excitation_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 10.0
 
 
 class CaptureCut(Section):
@@ -272,6 +260,7 @@ class Capture(Section):
     plan: Literal["auto", "designed", "listed"] = "auto"
     handling_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 20.0
     friction: CaptureFriction = CaptureFriction()
+    friction_advance: CaptureFrictionAdvance = CaptureFrictionAdvance()
     cut: CaptureCut = CaptureCut()
 
     def designed(self, kind: Literal["friction", "cut"]) -> bool:
@@ -283,23 +272,6 @@ class Capture(Section):
         if self.plan == "auto":
             return kind not in self.model_fields_set
         return self.plan == "designed"
-
-
-class FitFriction(Section):
-    """``rung = "auto"`` compares the candidate laws; ``symmetry = "auto"`` compares both.
-
-    ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
-    the windows, over which data and law are averaged alike, pass half; they are longer where the
-    encoder is too coarse for that.
-    ``critic`` searches the residuals for terms that the law lacks (not at draft effort).
-    """
-
-    rung: Annotated[str, OneOf("auto", *law_names())] = "auto"
-    symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
-    adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
-    cutoff_Hz: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 75.0
-    critic: bool = True
-    priors: JointPriors = JointPriors()
 
 
 class FitCut(Section):
@@ -346,7 +318,13 @@ class Fit(Section):
     blade: FitBlade = FitBlade()
     plate: FitPlate = FitPlate()
     friction: FitFriction = FitFriction()
+    friction_advance: FitFrictionAdvance = FitFrictionAdvance()
     cut: FitCut = FitCut()
+
+    @property
+    def advance(self) -> AdvanceSettings:
+        """Settings of the sledge's fit, with the priors of friction."""
+        return self.friction_advance.with_priors(self.friction.priors)
 
 
 class Recipe(Section):

@@ -4,7 +4,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.recording.exporting import export_table
+    from scissorcal.recording.exporting import export_channel, export_table
     from scissorcal.recording.header import (
         Joint,
         Kind,
@@ -15,7 +15,12 @@ if TYPE_CHECKING:
     )
     from scissorcal.recording.importing import import_table
     from scissorcal.recording.layout import SAMPLE_DTYPE
-    from scissorcal.recording.reader import content_hash, read_attachments, read_recording
+    from scissorcal.recording.reader import (
+        content_hash,
+        read_attachments,
+        read_recording,
+        read_telemetry,
+    )
     from scissorcal.recording.recording import Recording
     from scissorcal.recording.recovering import Recovered, recover
     from scissorcal.recording.scan import Attachment
@@ -39,12 +44,14 @@ __all__ = [
     "StrokeLabels",
     "TurningPoints",
     "content_hash",
+    "export_channel",
     "export_table",
     "import_table",
     "label_strokes",
     "read_attachments",
     "read_header",
     "read_recording",
+    "read_telemetry",
     "recording_schema",
     "recover",
     "summary",
@@ -52,11 +59,11 @@ __all__ = [
 ]
 
 _HOMES = {
-    "exporting": ("export_table",),
+    "exporting": ("export_channel", "export_table"),
     "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind", "read_header"),
     "importing": ("import_table",),
     "layout": ("SAMPLE_DTYPE",),
-    "reader": ("content_hash", "read_attachments", "read_recording"),
+    "reader": ("content_hash", "read_attachments", "read_recording", "read_telemetry"),
     "recording": ("Recording",),
     "recovering": ("Recovered", "recover"),
     "scan": ("Attachment",),

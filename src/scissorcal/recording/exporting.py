@@ -3,14 +3,21 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.recording import layout
+from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.scan import scan_file
 from scissorcal.recording.schema import describe
+from scissorcal.recording.telemetry import TelemetryChannel
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -25,7 +32,72 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     The file is written whole or not at all. Raises InputError for another extension, a missing
     folder, an existing file, unless ``overwrite``, or Parquet without pyarrow.
     """
-    path = Path(path)
+    metadata = describe(
+        recording.kind,
+        recording.joint,
+        recording.handle_radius_m,
+        recording.strokes,
+        recording.recipe_toml,
+        recording.device,
+    )
+    about = {
+        METADATA_NAME: metadata.model_dump_json(),
+        "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
+    }
+    return _write(layout.columns(recording), about, Path(path), overwrite)
+
+
+def export_channel(
+    recording: str | Path, name: str, path: str | Path, *, overwrite: bool = False
+) -> Path:
+    """Write the rows of a channel beside the samples as a table: "pose", "picture" or "control".
+
+    ``recording`` is the file. One row a message: ``host_time_ns``, then each field with its unit;
+    an array has a column for each number (``translation_x_m``). Raises as `export_table` does,
+    and InputError where the recording has no such channel.
+    """
+    scan = scan_file(Path(recording))
+    known = {topic.rpartition("/")[2]: channel for topic, channel in CHANNELS.items()}
+    del known["frame"]  # the same poses, for viewers
+    there = [name for name in known if known[name].topic in scan.telemetry_rows()]
+    if name not in known:
+        listed = ", ".join(["sample", *known])
+        raise InputError(f"A recording has no channel '{name}'. Name one of these: {listed}.")
+    if name not in there:
+        raise InputError(
+            f"{recording} has no rows of '{name}'; it has: {', '.join(there) or 'samples alone'}."
+        )
+    channel = known[name]
+    return _write(channel_columns(channel, scan.telemetry(channel)), {}, Path(path), overwrite)
+
+
+def channel_columns(channel: TelemetryChannel, rows: NDArray[np.void]) -> dict[str, NDArray[Any]]:
+    """Rows of a channel by column, each (n,), the unit in each column's name."""
+    found: dict[str, NDArray[Any]] = {"host_time_ns": np.ascontiguousarray(rows["host_time_ns"])}
+    for name, _, unit, _ in channel.fields:
+        values = rows[name]
+        plain = unit.replace(" ", "").replace("/", "_per_")
+        end = f"_{plain}" if plain and not name.endswith(f"_{plain}") else ""
+        parts = _PARTS.get(values.shape[1], ()) if values.ndim > 1 else ()
+        for index, part in enumerate(parts):
+            found[f"{name}_{part}{end}"] = np.ascontiguousarray(values[:, index])
+        if not parts:
+            found[f"{name}{end}"] = np.ascontiguousarray(values)
+    return found
+
+
+_PARTS = {
+    3: ("x", "y", "z"),
+    4: ("w", "x", "y", "z"),
+    6: ("turn_x", "turn_y", "turn_z", "x", "y", "z"),
+    36: tuple(f"{row}_{column}" for row in range(1, 7) for column in range(1, 7)),
+}
+"""Names of an array's numbers, by their count."""
+
+
+def _write(
+    columns: dict[str, NDArray[Any]], about: dict[str, str], path: Path, overwrite: bool
+) -> Path:
     if path.suffix.lower() not in _WRITERS:
         raise InputError(
             f"{path}: tables are written as {' or '.join(_WRITERS)}. Choose one of these "
@@ -37,36 +109,22 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
         raise InputError(f"{path.parent} is not a folder. Create it first, or choose another.")
     try:
         with replacing(path) as part:
-            _WRITERS[path.suffix.lower()](recording, part)
+            _WRITERS[path.suffix.lower()](columns, about, part)
     except OSError as error:
         raise file_error(error, path, "The recording is unchanged.") or error from None
     return path
 
 
-def _write_csv(recording: Recording, path: Path) -> None:
-    columns = layout.columns(recording)
+def _write_csv(columns: dict[str, NDArray[Any]], about: dict[str, str], path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
 
-def _write_parquet(recording: Recording, path: Path) -> None:
+def _write_parquet(columns: dict[str, NDArray[Any]], about: dict[str, str], path: Path) -> None:
     pa, pq = require_pyarrow()
-    metadata = describe(
-        recording.kind,
-        recording.joint,
-        recording.handle_radius_m,
-        recording.strokes,
-        recording.recipe_toml,
-        recording.device,
-    )
-    table = pa.table(layout.columns(recording)).replace_schema_metadata(
-        {
-            METADATA_NAME: metadata.model_dump_json(),
-            "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
-        }
-    )
+    table = pa.table(columns).replace_schema_metadata(about)
     pq.write_table(table, path, compression="zstd")
 
 

@@ -12,8 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
-Kind = Literal["friction", "cut", "render"]
-StrokeKind = Literal["closing", "opening", "excitation", "press"]
+Kind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
+"""What was recorded: empty motion of the blades, of the sledge, cuts and presses, a rendering, a
+path along a surface, a plate's pose."""
+
+StrokeKind = Literal["closing", "opening", "excitation", "press", "forward", "backward"]
+"""What a stroke moves: the blades, or forward and backward the sledge."""
+
 
 FORMAT: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"
 METADATA_NAME = "scissorcal.recording"
@@ -21,6 +26,9 @@ NOTE_NAME = "scissorcal.note"
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 """Opcode and length that precede every MCAP record."""
+
+SAMPLE_CHANNEL = 1
+"""Number of the channel of samples in a file that this program wrote."""
 
 _FOOTER = struct.Struct("<BQQQI")
 _STATISTICS = struct.Struct("<QHIIIIQQ")
@@ -123,6 +131,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
         for opcode, body in _records(summary):
             if opcode == 0x0B:
                 count, *_, first, last = _STATISTICS.unpack_from(body)
+                count -= _beside_samples(body[_STATISTICS.size :])
                 duration_ns = last - first
             elif opcode == 0x0D:
                 offset, length = _METADATA_INDEX.unpack_from(body)
@@ -136,6 +145,13 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
         return _header(described[-1], notes, count, duration_ns * 1e-9)
     except (struct.error, KeyError, ValueError, TypeError):
         return None
+
+
+def _beside_samples(counts: bytes) -> int:
+    """Messages of channels other than the first, by the counts of a statistics record."""
+    (size,) = struct.unpack_from("<I", counts)
+    pairs = struct.iter_unpack("<HQ", counts[4 : 4 + size])
+    return sum(count for channel, count in pairs if channel != SAMPLE_CHANNEL)
 
 
 def _is_sound(entries: Mapping[str, str]) -> bool:

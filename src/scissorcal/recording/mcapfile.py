@@ -1,4 +1,4 @@
-"""An MCAP file with one channel of samples of one size, written a block at a time.
+"""An MCAP file of samples of one size, written a block at a time, and of telemetry beside them.
 
 The bytes are those of `mcap.writer.Writer`, which writes message by message: at 4 kHz that takes
 40 ms of each second, in bursts beside the servo loop. Here a block of samples becomes messages, and
@@ -8,15 +8,17 @@ its index entries, in a few operations on arrays. Records other than messages ar
 import struct
 import zlib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recording import layout
-from scissorcal.recording.header import HEAD, MAGIC
+from scissorcal.recording.header import HEAD, MAGIC, SAMPLE_CHANNEL
+from scissorcal.recording.telemetry import TelemetryChannel
 
-_CHANNEL = 1
+_CHANNEL = SAMPLE_CHANNEL
 _SCHEMA = 1
 _COMPRESSION = "zstd"
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
@@ -53,8 +55,9 @@ class McapFile:
         self._chunks: list[Any] = []
         self._attachments: list[Any] = []
         self._metadata: list[Any] = []
-        self._count = 0
+        self._counts: dict[int, int] = {}
         self._first = self._last = 0
+        self._others: dict[TelemetryChannel, _Other] = {}
         stream.write(MAGIC + _bytes_of([Header(layout.PROFILE, library)]))
 
     def begin_channel(
@@ -92,6 +95,29 @@ class McapFile:
             if self._size > self._chunk_bytes:
                 self._close_chunk()
 
+    def add_telemetry(
+        self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
+    ) -> None:
+        """Add rows (n,) of a channel beside the samples, at the host's times; in separate chunks.
+
+        They are written with the samples' next chunk.
+        """
+        other = self._others.get(channel)
+        if other is None:
+            other = self._others[channel] = _other(channel, _CHANNEL + 1 + len(self._others))
+        messages = np.zeros(len(rows), dtype=channel.message_dtype)
+        messages["opcode"] = 0x05
+        messages["length"] = channel.message_dtype.itemsize - HEAD.size
+        messages["channel"] = other.channel.id
+        counts = "sequence" in (rows.dtype.names or ())
+        messages["sequence"] = rows["sequence"] if counts else other.count + np.arange(len(rows))
+        messages["log_time"] = np.maximum(times_ns, 0)
+        messages["publish_time"] = messages["log_time"]
+        messages["cdr_header"] = layout.CDR_HEADER
+        messages["row"] = rows
+        other.waiting.append(messages)
+        other.count += len(rows)
+
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Add a named set of texts, in its place in the file."""
         from mcap.records import Metadata, MetadataIndex
@@ -127,20 +153,21 @@ class McapFile:
         self._close_chunk()
         self._write([DataEnd(0)])
         start = self._stream.tell()
+        others = list(self._others.values())
         statistics = Statistics(
             attachment_count=len(self._attachments),
-            channel_count=1,
-            channel_message_counts={_CHANNEL: self._count} if self._count else {},
+            channel_count=1 + len(others),
+            channel_message_counts=self._counts,
             chunk_count=len(self._chunks),
-            message_count=self._count,
+            message_count=sum(self._counts.values()),
             message_end_time=self._last,
             message_start_time=self._first,
             metadata_count=len(self._metadata),
-            schema_count=1,
+            schema_count=1 + len(others),
         )
         groups = (
-            (0x03, [self._schema]),
-            (0x04, [self._channel]),
+            (0x03, [self._schema, *(other.schema for other in others)]),
+            (0x04, [self._channel, *(other.channel for other in others)]),
             (0x0B, [statistics]),
             (0x08, self._chunks),
             (0x0A, self._attachments),
@@ -159,35 +186,40 @@ class McapFile:
         self._stream.write(summary + _bytes_of([footer]) + MAGIC)
 
     def _add(self, messages: NDArray[np.void]) -> None:
-        entries = np.empty(len(messages), dtype=_INDEX_ENTRY)
-        entries["time"] = messages["log_time"]
-        entries["offset"] = self._size + _MESSAGE.itemsize * np.arange(len(messages))
-        self._entries.append(entries)
+        self._entries.append(_entries(messages, self._size))
         self._begun.append(messages.tobytes())
         self._size += messages.nbytes
-        low, high = int(entries["time"].min()), int(entries["time"].max())
-        self._first = min(self._first, low) if self._count else low
-        self._last = max(self._last, high)
-        self._count += len(messages)
 
     def _close_chunk(self) -> None:
-        if not self._entries:
-            return
+        if self._entries:
+            data, entries = b"".join(self._begun), np.concatenate(self._entries)
+            self._begun, self._size, self._entries = [], 0, []
+            self._write_chunk(data, entries, _CHANNEL)
+        for other in self._others.values():
+            if other.waiting:
+                messages, other.waiting = np.concatenate(other.waiting), []
+                entries = _entries(messages, len(other.head))
+                self._write_chunk(other.head + messages.tobytes(), entries, other.channel.id)
+                other.head = b""
+
+    def _write_chunk(self, data: bytes, entries: NDArray[np.void], channel: int) -> None:
         import zstandard
         from mcap.records import Chunk, ChunkIndex
 
-        data, entries = b"".join(self._begun), np.concatenate(self._entries)
-        self._begun, self._size, self._entries = [], 0, []
+        low, high = int(entries["time"].min()), int(entries["time"].max())
+        self._first = min(self._first, low) if self._counts else low
+        self._last = max(self._last, high)
+        self._counts[channel] = self._counts.get(channel, 0) + len(entries)
         packed = zstandard.compress(data)
         span: dict[str, Any] = {
-            "message_start_time": int(entries["time"].min()),
-            "message_end_time": int(entries["time"].max()),
+            "message_start_time": low,
+            "message_end_time": high,
             "compression": _COMPRESSION,
             "uncompressed_size": len(data),
         }
         start = self._stream.tell()
         length = self._write([Chunk(**span, data=packed, uncompressed_crc=zlib.crc32(data))])
-        index = struct.pack("<HI", _CHANNEL, entries.nbytes) + entries.tobytes()
+        index = struct.pack("<HI", channel, entries.nbytes) + entries.tobytes()
         index = HEAD.pack(0x07, len(index)) + index
         self._stream.write(index)
         self._chunks.append(
@@ -195,7 +227,7 @@ class McapFile:
                 **span,
                 chunk_start_offset=start,
                 chunk_length=length,
-                message_index_offsets={_CHANNEL: start + length},
+                message_index_offsets={channel: start + length},
                 message_index_length=len(index),
                 compressed_size=len(packed),
             )
@@ -205,6 +237,47 @@ class McapFile:
         data = _bytes_of(records)
         self._stream.write(data)
         return len(data)
+
+
+@dataclass
+class _Other:
+    """A channel of telemetry: its records, and messages that no chunk has yet.
+
+    ``head`` are the records' bytes, until a chunk has them; ``count`` messages were added.
+    """
+
+    schema: Any
+    channel: Any
+    head: bytes
+    waiting: list[NDArray[np.void]]
+    count: int = 0
+
+
+def _other(telemetry: TelemetryChannel, number: int) -> _Other:
+    from mcap.records import Channel, Schema
+
+    schema = Schema(
+        id=number,
+        data=telemetry.definition.encode(),
+        encoding=layout.SCHEMA_ENCODING,
+        name=telemetry.schema_name,
+    )
+    channel = Channel(
+        id=number,
+        topic=telemetry.topic,
+        message_encoding=layout.MESSAGE_ENCODING,
+        schema_id=number,
+        metadata=telemetry.units,
+    )
+    return _Other(schema, channel, _bytes_of([schema, channel]), [])
+
+
+def _entries(messages: NDArray[np.void], offset: int) -> NDArray[np.void]:
+    """Index entries of messages of one size that begin at an offset of their chunk."""
+    entries = np.empty(len(messages), dtype=_INDEX_ENTRY)
+    entries["time"] = messages["log_time"]
+    entries["offset"] = offset + messages.dtype.itemsize * np.arange(len(messages))
+    return entries
 
 
 def _bytes_of(records: Iterable[Any]) -> bytes:

@@ -12,6 +12,7 @@ from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.recording.scan import Attachment, Scan, Sheet, scan_file
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_note
+from scissorcal.recording.telemetry import TelemetryChannel
 
 
 def read_recording(path: str | Path) -> Recording:
@@ -44,6 +45,7 @@ def read_recording(path: str | Path) -> Recording:
         content_hash=scan.content_hash,
         notes=tuple(dict.fromkeys(notes)),
         marks=scan.marks(),
+        beside=scan.telemetry_rows(),
     )
 
 
@@ -51,6 +53,14 @@ def read_attachments(path: str | Path) -> tuple[Attachment, ...]:
     """Return the files kept within a recording, in order; raises as ``read_recording`` does."""
     events = scan_file(Path(path)).events
     return tuple(event for event in events if isinstance(event, Attachment))
+
+
+def read_telemetry(path: str | Path, channel: TelemetryChannel) -> NDArray[np.void]:
+    """Return the rows of a channel beside the samples, shape (n,); none where it has no such.
+
+    Each has its ``host_time_ns`` before the channel's own fields. Raises as ``read_recording``.
+    """
+    return scan_file(Path(path)).telemetry(channel)
 
 
 def content_hash(path: str | Path) -> str:

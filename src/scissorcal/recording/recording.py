@@ -29,7 +29,8 @@ class Recording:
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
     SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
     it found (recovered end, garbled frames, gaps), for the report. ``marks`` are facts by name, as
-    the capture wrote them; see ``stop`` and ``unloaded``.
+    the capture wrote them; see ``stop`` and ``unloaded``. ``beside`` is how many rows each channel
+    beside the samples has, by its topic (``read_telemetry`` reads them).
     """
 
     kind: Kind
@@ -43,6 +44,7 @@ class Recording:
     content_hash: str = ""
     notes: tuple[str, ...] = ()
     marks: tuple[tuple[str, str], ...] = ()
+    beside: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def stop(self) -> str:

@@ -10,7 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.recording import layout
 from scissorcal.recording.partfile import explained, is_same_file, seal, try_lock
 from scissorcal.recording.samplefile import SampleFile
-from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, scan_file
+from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
 
 KEPT_SUFFIX = ".interrupted"
 
@@ -65,17 +65,17 @@ def _recover_one(part: Path) -> Recovered | None:
             kept = _keep(part)
             return Recovered("empty", kept, None, 0, f"Nothing could be recovered: {error}")
         samples = scan.samples()
-        if not len(samples):
+        if not len(samples) and not scan.telemetry_rows():
             kept = _keep(part)
             sentence = f"{part.name} was interrupted before its first sample was written."
             return Recovered("empty", kept, None, 0, sentence)
         path = _already_recovered(part, scan) or _rewrite(part, scan)
         kept = _keep(part)
-    seconds = float(samples["device_time_us"][-1] - samples["device_time_us"][0]) * 1e-6
-    sentence = (
-        f"{path.name} was recovered from an interrupted capture: {len(samples)} samples, "
-        f"{seconds:.2f} s."
-    )
+    held = f"{sum(scan.telemetry_rows().values())} rows beside samples"
+    if len(samples):
+        seconds = float(samples["device_time_us"][-1] - samples["device_time_us"][0]) * 1e-6
+        held = f"{len(samples)} samples, {seconds:.2f} s"
+    sentence = f"{path.name} was recovered from an interrupted capture: {held}."
     return Recovered("recovered", kept, path, len(samples), sentence)
 
 
@@ -89,6 +89,9 @@ def _rewrite(part: Path, scan: Scan) -> Path:
         for event in scan.events:
             if isinstance(event, np.ndarray):
                 file.append(event)
+            elif isinstance(event, Telemetry):
+                times_ns = event.messages["log_time"].astype(np.int64)
+                file.append_telemetry(event.channel, event.messages["row"], times_ns)
             elif isinstance(event, Note):
                 file.note(event.sentence)
             elif isinstance(event, Sheet):

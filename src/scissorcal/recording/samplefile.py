@@ -10,6 +10,7 @@ from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
 from scissorcal.recording.mcapfile import McapFile
 from scissorcal.recording.schema import RecordingMetadata, to_entries
+from scissorcal.recording.telemetry import TelemetryChannel
 
 FLUSH_SPAN_NS = 125_000_000
 """Host time that samples wait in memory for their chunk: half of the promised 0.25 s, so that the
@@ -58,6 +59,25 @@ class SampleFile:
             self._flushed_at = max(int(samples["host_time_ns"][0]), 0)
         self._newest_host_time = max(int(samples["host_time_ns"][-1]), 0)
         self.flush_if_due(self._newest_host_time)
+
+    def append_telemetry(
+        self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
+    ) -> None:
+        """Add rows (n,) of another channel, with the host's times; written with the next chunk.
+
+        A recording without samples has chunks of its telemetry alone, as old.
+        """
+        if rows.dtype != channel.dtype or rows.shape != times_ns.shape:
+            raise ValueError(f"rows of {channel.topic} must have its dtype, and a time each")
+        if not len(rows):
+            return
+        self._mcap.add_telemetry(channel, rows, times_ns)
+        self.holds_data = True
+        if self._flushed_at is None:
+            self._flushed_at = max(int(times_ns[0]), 0)
+        if not self.sample_count:
+            self._newest_host_time = max(int(times_ns[-1]), 0)
+            self.flush_if_due(self._newest_host_time)
 
     def describe(self, metadata: RecordingMetadata) -> None:
         """Write the metadata anew, in the place of what was written before."""

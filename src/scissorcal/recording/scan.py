@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError
 from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
+from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
+from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
 LARGEST_CHUNK = 64 * 1024 * 1024
 _ZSTD_FIELD = b"\x04\x00\x00\x00zstd"
@@ -53,7 +55,15 @@ class Mark:
     value: str
 
 
-Event = NDArray[np.void] | Note | Sheet | Mark | Attachment
+@dataclass(frozen=True, eq=False)
+class Telemetry:
+    """Messages of a channel beside the samples, shape (n,) with its message_dtype."""
+
+    channel: TelemetryChannel
+    messages: NDArray[np.void]
+
+
+Event = NDArray[np.void] | Note | Sheet | Mark | Attachment | Telemetry
 
 
 @dataclass
@@ -71,6 +81,22 @@ class Scan:
         """All samples in one array, shape (N,)."""
         blocks = [event for event in self.events if isinstance(event, np.ndarray)]
         return np.concatenate(blocks) if blocks else layout.empty_samples()
+
+    def telemetry(self, channel: TelemetryChannel) -> NDArray[np.void]:
+        """All rows of a channel beside the samples, shape (N,), each with its ``host_time_ns``."""
+        found = [e for e in self.events if isinstance(e, Telemetry) and e.channel == channel]
+        blocks = [rows_of(channel, event.messages) for event in found]
+        none = rows_of(channel, np.zeros(0, dtype=channel.message_dtype))
+        return np.concatenate([none, *blocks])
+
+    def telemetry_rows(self) -> dict[str, int]:
+        """How many rows each channel beside the samples has, by its topic."""
+        found: dict[str, int] = {}
+        for event in self.events:
+            if isinstance(event, Telemetry):
+                topic = event.channel.topic
+                found[topic] = found.get(topic, 0) + len(event.messages)
+        return found
 
     def notes(self) -> tuple[str, ...]:
         """The sentences that the writer left."""
@@ -137,6 +163,7 @@ class _Walk:
     damage: list[str] = field(default_factory=list)
     topics: set[str] = field(default_factory=set)
     channel: int | None = None
+    others: dict[int, TelemetryChannel] = field(default_factory=dict)
     stated_count: int | None = None
     finished: bool = False
     metadata_complaint: str = ""
@@ -154,7 +181,9 @@ class _Walk:
         elif opcode == Opcode.ATTACHMENT:
             self.events.append(_open_attachment(body))
         elif opcode == Opcode.STATISTICS:
-            self.stated_count = _parse(Statistics, body).message_count
+            stated = _parse(Statistics, body)
+            others = sum(stated.channel_message_counts.get(number, 0) for number in self.others)
+            self.stated_count = stated.message_count - others
 
     def _take_metadata(self, offset: int, body: bytes) -> None:
         from mcap.records import Metadata
@@ -185,6 +214,8 @@ class _Walk:
         self.topics.add(channel.topic)
         if channel.topic == layout.TOPIC:
             self.channel = channel.id
+        elif channel.topic in CHANNELS:
+            self.others[channel.id] = CHANNELS[channel.topic]
 
     def _take_chunk(self, data: bytes) -> None:
         """Take a chunk's records; runs of sample messages in one sweep each."""
@@ -205,7 +236,26 @@ class _Walk:
                 continue
             if opcode == Opcode.CHANNEL:
                 self._take_channel(data[at + HEAD.size : at + HEAD.size + length])
+            elif opcode == Opcode.MESSAGE:
+                at += self._take_telemetry(data, at)
+                continue
             at += HEAD.size + length
+
+    def _take_telemetry(self, data: bytes, at: int) -> int:
+        """Take a run of messages of a known channel beside the samples; returns its bytes."""
+        _, length = HEAD.unpack_from(data, at)
+        channel = self.others.get(
+            int.from_bytes(data[at + HEAD.size : at + HEAD.size + 2], "little")
+        )
+        kind = None if channel is None else channel.message_dtype
+        if channel is None or kind is None or HEAD.size + length != kind.itemsize:
+            return HEAD.size + int(length)
+        view = np.frombuffer(data, kind, (len(data) - at) // kind.itemsize, at)
+        same = (view["length"] == length) & (view["channel"] == view["channel"][0])
+        same &= view["opcode"] == view["opcode"][0]
+        run = len(view) if same.all() else int(np.argmin(same))
+        self.events.append(Telemetry(channel, view[:run].copy()))
+        return run * kind.itemsize
 
 
 def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:

@@ -45,7 +45,10 @@ class StrokeSummary:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """What ``recording show`` prints; ``rate_Hz`` is from the median step of the device clock."""
+    """What ``recording show`` prints; ``rate_Hz`` is from the median step of the device clock.
+
+    ``beside`` is how many rows each channel beside the samples has.
+    """
 
     source: str
     content_hash: str
@@ -58,6 +61,7 @@ class RecordingSummary:
     strokes: tuple[StrokeSummary, ...]
     ranges: tuple[ChannelRange, ...]
     notes: tuple[str, ...]
+    beside: dict[str, int]
 
 
 def summary(recording: Recording) -> RecordingSummary:
@@ -77,6 +81,7 @@ def summary(recording: Recording) -> RecordingSummary:
         strokes=_strokes(recording),
         ranges=tuple(_range(recording, channel) for channel in MEASURED),
         notes=recording.notes,
+        beside=dict(recording.beside),
     )
 
 
@@ -125,18 +130,19 @@ def _strokes(recording: Recording) -> tuple[StrokeSummary, ...]:
     """Samples and travel of each stroke, in one pass over the samples, sorted by stroke."""
     labels = recording.samples["stroke"]
     order = np.argsort(labels, kind="stable")
-    opening, labels = recording.samples["opening"][order], labels[order]
+    moved = "advance" if recording.kind == "friction-advance" else "opening"
+    place, labels = recording.samples[moved][order], labels[order]
     numbers = [stroke.index for stroke in recording.strokes]
     first = np.searchsorted(labels, numbers, side="left")
     after = np.searchsorted(labels, numbers, side="right")
     return tuple(
-        StrokeSummary(stroke, int(end - start), _travel(opening[start:end]))
+        StrokeSummary(stroke, int(end - start), _travel(place[start:end]))
         for stroke, start, end in zip(recording.strokes, first, after, strict=True)
     )
 
 
-def _travel(opening: NDArray[np.float64]) -> float:
-    return float(opening.max() - opening.min()) if len(opening) else 0.0
+def _travel(place: NDArray[np.float64]) -> float:
+    return float(place.max() - place.min()) if len(place) else 0.0
 
 
 def _range(recording: Recording, channel: str) -> ChannelRange:

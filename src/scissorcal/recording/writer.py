@@ -16,6 +16,7 @@ from scissorcal.recording.partfile import create_locked, explained, seal
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
 from scissorcal.recording.samplefile import SampleFile
 from scissorcal.recording.schema import describe, stroke_records
+from scissorcal.recording.telemetry import TelemetryChannel
 
 
 class RecordingWriter:
@@ -71,6 +72,13 @@ class RecordingWriter:
         """Add samples, shape (n,) with SAMPLE_DTYPE, in the order of time."""
         with self._writing():
             self._file.append(samples)
+
+    def append_telemetry(
+        self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
+    ) -> None:
+        """Add rows of another channel, shape (n,), each with a time of the host's clock in ns."""
+        with self._writing():
+            self._file.append_telemetry(channel, rows, times_ns)
 
     def state_strokes(self, strokes: tuple[Stroke, ...]) -> None:
         """State all strokes anew, where they are chosen while the capture runs.

@@ -2,12 +2,17 @@
 
 from scissorcal.render.admission import Admission, admit_package
 from scissorcal.render.engine import VirtualStrokes, open_writer, render
+from scissorcal.render.plate_estimate import PlateReport
 from scissorcal.render.result import AppliedLimits, RenderResult, latency_of
 from scissorcal.render.rig_facts import RigFacts
+from scissorcal.tracking.plate_pose import PlatePose, PoseSource
 
 __all__ = [
     "Admission",
     "AppliedLimits",
+    "PlatePose",
+    "PlateReport",
+    "PoseSource",
     "RenderResult",
     "RigFacts",
     "VirtualStrokes",

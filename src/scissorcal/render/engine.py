@@ -1,5 +1,6 @@
 """Render a package on a rig within limits, record it, and judge it."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,11 +9,11 @@ import numpy as np
 from scissorcal.device.capture import rig_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import STOP_MARGIN_RAD, Motion
+from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
-from scissorcal.kernel import Capability, ConfigKey, Identity, ServoConfig
+from scissorcal.kernel import Capability, ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
@@ -24,9 +25,12 @@ from scissorcal.render.admission import (
     rendered_tables,
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
+from scissorcal.render.plate_pose import EVERY_S, PlatePlacer, plate_config
+from scissorcal.render.plate_source import plate_placer
 from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
+from scissorcal.tracking.plate_pose import PoseSource
 
 SUPERVISOR_S = 0.2
 """Time without heartbeat after which only damping is left; after five times as much it stops.
@@ -68,6 +72,7 @@ def render(
     progress: Progress | None = None,
     confirm: Confirm | None = None,
     rig: RigFacts | None = None,
+    plate: PoseSource | None = None,
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
@@ -80,14 +85,20 @@ def render(
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
 
+    Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
+    where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
+    while the pose is lost or too uncertain for the scene's tolerance
+    (`plate_pose.PlatePlacer`), and the result's ``plate`` states it. Packages with a known pose
+    take no heed of ``plate``.
+
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
     inertia, delay and the force sensor's zero, by default the package's friction fit. The result's
     ``admission`` states it.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
-    cannot render the package stably, or nobody can be asked; DeviceError where the rig fails, and
-    what was recorded is kept.
+    cannot render the package stably, or nobody can be asked; MissingError where an estimated plate
+    has no pose; DeviceError where the rig fails, and what was recorded is kept.
     """
     identity = link.identity
     _refuse_impossible(identity, seconds, confirm)
@@ -95,23 +106,31 @@ def render(
     mismatches = _mismatches(package, identity)
     admission = admit_package(package, identity, rig, applied.torque_Nm)
     warnings = package.warnings + mismatches + _admitted(admission)
-    config = _servo_config(applied, admission, identity, seconds, rig)
+    tables = rendered_tables(package.tables, admission)
+    follower = plate_placer(package, plate, tables, applied.torque_Nm, writer)
+    placed = plate_config(tables) if follower else PlateConfig()
+    config = _servo_config(applied, admission, identity, seconds, rig, placed)
     config = replace(config, motor_sign=motor_sign)
     if writer:
         for sentence in warnings:
             writer.note(sentence)
     watch = Watch(_travel(package), writer, progress or _silent, seconds)
-    with open_motion(link, config, rendered_tables(package.tables, admission)) as motion:
+    with open_motion(link, config, tables, every_s=EVERY_S if follower else BLOCK_S) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
         motion.fresh_sheet(0.0)
-        for samples in motion.render(seconds):
-            if watch.take(samples):
-                break
+        with follower or nullcontext():
+            if follower:
+                follower.follow(motion, motion.step())
+            for samples in motion.render(seconds):
+                if follower:
+                    follower.follow(motion, samples)
+                if watch.take(samples):
+                    break
         for samples in motion.idle(LOOK_EVERY_S):
             watch.record(samples)
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
-    result = _result(motion, watch, package, applied, admission, warnings)
+    result = _result(motion, watch, package, applied, admission, warnings, follower)
     if writer:
         _note(writer, result, result.warnings[len(warnings) :])
     return result
@@ -124,13 +143,17 @@ def _result(
     applied: AppliedLimits,
     admission: Admission,
     warnings: tuple[str, ...],
+    follower: PlatePlacer | None,
 ) -> RenderResult:
     """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
     report = motion.report()
+    out_s = report.counters.plate_out_frames * motion.tick_s
+    seconds = watch.frames * motion.tick_s
+    plate = follower.report(seconds, out_s) if follower else None
     latency = watch.latency
     limited = watch.limited / max(1, watch.frames)
     return RenderResult(
-        seconds=watch.frames * motion.tick_s,
+        seconds=seconds,
         frames=report.counters.frames,
         strokes=watch.strokes,
         latency=latency,
@@ -149,9 +172,13 @@ def _result(
         ledger=report.ledger,
         limits=applied,
         admission=admission,
+        plate=plate,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission),
-        warnings=warnings + _limited_warning(limited, applied) + _still_warning(watch.still_s),
+        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission, plate),
+        warnings=warnings
+        + _limited_warning(limited, applied)
+        + _still_warning(watch.still_s)
+        + (plate.sentences if plate else ()),
     )
 
 
@@ -215,6 +242,7 @@ def _servo_config(
     identity: Identity,
     seconds: float,
     rig: RigFacts | None,
+    plate: PlateConfig,
 ) -> ServoConfig:
     rest = rig.rest if rig else UNKNOWN_REST
     return ServoConfig(
@@ -232,6 +260,7 @@ def _servo_config(
         tick_us=identity.tick_us,
         passivity=passivity_config(admission, identity),
         watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s, rest),
+        plate=plate,
     )
 
 

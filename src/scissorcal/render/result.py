@@ -6,16 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from scissorcal.device.loop_verdicts import loop_verdicts
 from scissorcal.device.motion import MotionReport
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.kernel import EnergyLedger
 from scissorcal.render.admission import Admission
+from scissorcal.render.plate_estimate import PlateReport
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "render"
-MOST_MISSED = 0.01
 MOST_CREATED = 0.1
-MOST_FAULTS_PER_S = 0.1
+MOST_OUT = 0.1
+"""Chosen: a person waits for a second in ten without asking what is wrong."""
 NEGLIGIBLE_J = 5e-3
 """Below, an energy error is that of torque sensors: 1 mN m over a few radians of strokes."""
 REMEDY = (
@@ -50,7 +52,8 @@ class RenderResult:
     of more than five ticks, ``unsent`` commands that the line did not accept, ``overrun`` samples
     that this process read too late. ``limited_share`` is the share of rendering frames in which
     torque or force met its limit. ``strokes`` counts closings of the blades, ``package_hash`` is
-    the content hash of what was rendered, ``admission`` how much of its stiffness. ``warnings`` are
+    the content hash of what was rendered, ``admission`` how much of its stiffness, and
+    ``plate`` how an estimated plate was followed (None where its pose is known). ``warnings`` are
     sentences for the person at the rig.
     """
 
@@ -73,6 +76,7 @@ class RenderResult:
     ledger: EnergyLedger
     limits: AppliedLimits
     admission: Admission
+    plate: PlateReport | None
     package_hash: str
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
@@ -96,60 +100,23 @@ def latency_of(latency_ns: ArrayLike) -> Percentiles | None:
 
 
 def render_verdicts(
-    report: MotionReport, latency: Percentiles | None, tick_us: int, admission: Admission
+    report: MotionReport,
+    latency: Percentiles | None,
+    tick_us: int,
+    admission: Admission,
+    plate: PlateReport | None = None,
 ) -> tuple[Verdict, ...]:
-    """Judge a rendering: admitted, on time, complete, without faults, supervised, passive."""
+    """Judge a rendering: admitted, on time, complete, without faults, supervised, passive.
+
+    An estimated ``plate`` is judged, too, by how long it was known well enough.
+    """
     return (
         _admitted(admission),
-        _deadline(latency, tick_us),
-        _complete(report),
-        _faultless(report, tick_us),
-        _supervised(report),
+        *loop_verdicts(SCOPE, report, latency, tick_us),
         _passive(report.ledger),
         _motor_sense(report.ledger),
+        *((_plate_pose(plate),) if plate else ()),
     )
-
-
-def _deadline(latency: Percentiles | None, tick_us: int) -> Verdict:
-    if latency is None:
-        why = "Virtual time has no latency."
-        return not_evaluated(SCOPE, "deadline", why, float(tick_us))
-    why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
-    remedy = f"{why} Run 'scissorcal device doctor' to find what is slow."
-    return judge(SCOPE, "deadline", latency.p99, tick_us, why, remedy)
-
-
-def _complete(report: MotionReport) -> Verdict:
-    counters = report.counters
-    share = counters.misses / max(1, counters.frames + counters.misses)
-    why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
-    remedy = (
-        f"{why} Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
-    )
-    return judge(SCOPE, "misses", share, MOST_MISSED, why, remedy)
-
-
-def _faultless(report: MotionReport, tick_us: int) -> Verdict:
-    """Whether the device braked by itself too often."""
-    counters = report.counters
-    allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
-    why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
-    if counters.faults:
-        why += (
-            " After each the force was ramped up from zero. If nothing else caused them, commands "
-            "were too late: run 'scissorcal device doctor'."
-        )
-    return judge(SCOPE, "faults", counters.faults, allowed, why)
-
-
-def _supervised(report: MotionReport) -> Verdict:
-    count = report.counters.fallback_frames
-    never = "The supervising process never missed its heartbeat."
-    missed = (
-        f"{count} frames had damping only, because the supervising process missed its "
-        "heartbeat: close programs that load the processor."
-    )
-    return judge(SCOPE, "supervision", count, 0.0, never, missed)
 
 
 def _admitted(admission: Admission) -> Verdict:
@@ -160,6 +127,16 @@ def _admitted(admission: Admission) -> Verdict:
     allowed = admission.allowed_in_hand
     share = admission.rendered / allowed if allowed > 0.0 else math.inf
     return judge(SCOPE, "admission", share, 1.0, why)
+
+
+def _plate_pose(plate: PlateReport) -> Verdict:
+    """Whether the force was there for most of the time, for want of the plate's pose or not."""
+    share = plate.out_s / plate.seconds if plate.seconds > 0.0 else 1.0
+    why = (
+        f"For {share:.0%} of the time the plate's pose was not known well enough, and the force "
+        f"fell ({plate.falls} times, {plate.estimates} estimates)."
+    )
+    return judge(SCOPE, "plate pose", share, MOST_OUT, why, " ".join((why, *plate.sentences)))
 
 
 def _passive(ledger: EnergyLedger) -> Verdict:

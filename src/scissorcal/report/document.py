@@ -118,7 +118,8 @@ def compose(
         own += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
         own += trust_panels(fit, check, part)
     found, why = _scene(recipe, named)
-    sliding = recipe.rig.joint == "linear" or any(fit.position_unit == "m" for fit in fits)
+    opens = (fit.position_unit == "m" for fit in fits if fit.what != "friction-advance")
+    sliding = recipe.rig.joint == "linear" or any(opens)
     if sliding:
         found, why = None, "A sliding joint carries no blades, so nothing is felt."
     sheet_panels = [closing.sheet_panel(sheet) for sheet in sheets]
@@ -247,11 +248,9 @@ def _is_of(evidence: Evidence, fit: FitResult) -> bool:
 
 def _anchors(fits: Sequence[FitResult]) -> list[str]:
     """The fit's subject, numbered from the second of its kind."""
-    anchors: list[str] = []
-    for fit in fits:
-        earlier = sum(anchor.split("-")[0] == fit.what for anchor in anchors)
-        anchors.append(f"{fit.what}-{earlier + 1}" if earlier else fit.what)
-    return anchors
+    names = [fit.what for fit in fits]
+    earlier = [names[:place].count(name) for place, name in enumerate(names)]
+    return [f"{name}-{n + 1}" if n else name for name, n in zip(names, earlier, strict=True)]
 
 
 def _required(recipe: Recipe, geometry: Geometry) -> tuple[Geometry, dict[GeometryKind, str]]:

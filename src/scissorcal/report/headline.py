@@ -101,7 +101,7 @@ def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
             f"The {fit.what} fit is not verified: it {passed}, but whether its intervals hold the "
             f"truth was not tested.{error}"
         )
-        step = f"Run `scissorcal verify {fit.what}`, then `scissorcal report`."
+        step = f"Run `scissorcal verify {fit.words}`, then `scissorcal report`."
         brief = f"{passed}; {'coverage not counted' if checked else 'trust check not done'}"
         return Headline(fit.what, "unverified", sentence, brief, (step,))
     sentence = f"The {fit.what} fit can be trusted: it {passed}.{error}"
@@ -157,7 +157,7 @@ def _doubts(fit: FitResult, verdicts: Sequence[Verdict]) -> tuple[list[str], tup
         steps += _advice(fit, ["identifiability"])
     if draft:
         doubts.append("its intervals are those of a draft")
-        steps.append(f"Run `scissorcal fit {fit.what} --effort standard` for reliable intervals.")
+        steps.append(f"Run `scissorcal fit {fit.words} --effort standard` for reliable intervals.")
     return doubts, tuple(steps)
 
 
@@ -174,7 +174,7 @@ def _advice(fit: FitResult, checks: Sequence[str]) -> tuple[str, ...]:
         said = check.lower()
         known = [step for keys, step in ADVICE.items() if any(k in said for k in keys.split("|"))]
         steps += known[:1] or [f"Read why {check} failed, correct that, and fit again."]
-    again = f"Then run `scissorcal fit {fit.what}` and `scissorcal report` again."
+    again = f"Then run `scissorcal fit {fit.words}` and `scissorcal report` again."
     return (*dict.fromkeys(steps), again)
 
 

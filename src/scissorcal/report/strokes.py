@@ -19,8 +19,18 @@ KINDS: dict[str, StrokeKind] = {
     "opening": "opening",
     "excitation": "excitation",
     "press": "press",
+    "forward": "forward",
+    "backward": "backward",
 }
-"""Each kind of stroke has colour and mark of its name (doi:10.1038/nmeth.1618)."""
+LOOKS: dict[str, Look] = {
+    "closing": "closing",
+    "opening": "opening",
+    "excitation": "excitation",
+    "press": "press",
+    "forward": "opening",
+    "backward": "closing",
+}
+"""Each kind of stroke has colour and mark of a name (doi:10.1038/nmeth.1618)."""
 BETWEEN = "between strokes"
 
 
@@ -55,7 +65,7 @@ def channels_of(fit: FitResult) -> Channels:
 
 def look_of(kind: str) -> Look:
     """Colour and mark of a kind of stroke."""
-    return KINDS.get(kind) or "orange"
+    return LOOKS.get(kind, "orange")
 
 
 @dataclass(frozen=True)

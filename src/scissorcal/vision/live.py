@@ -1,7 +1,8 @@
 """Frames of a running camera or a video, and photographs selected from them."""
 
+import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,16 +24,29 @@ NEW_SHARE = 0.05
 """Shares of the picture's width: a board held still moves less from frame to frame than the first,
 one in a new place has moved farther than the second from where it was in every picture kept."""
 
+LEAST_RATE_HZ, MOST_RATE_HZ = 0.5, 2000.0
+RATE_EVERY = 10
+RATE_SHARE = 0.05
+
+_ENCODE = "write it anew with its true rate, such as 'ffmpeg -r 30 -i VIDEO NEW.mp4'"
+
 
 @dataclass(frozen=True)
 class Frame:
     """One picture of a camera or video. ``time_s`` counts from the first one; ``count`` is the
-    total, None where it is unknown."""
+    total, None where it is unknown.
+
+    ``stamp_s`` is the time by the camera's or video's own clock, NaN where it states none;
+    ``arrived_s`` by the host's monotonic clock, NaN for a video. ``rate_Hz`` is what a video says.
+    """
 
     number: int
     time_s: float
     image: Any
     count: int | None
+    stamp_s: float = math.nan
+    arrived_s: float = math.nan
+    rate_Hz: float = math.nan
 
 
 def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[Path]:
@@ -79,17 +93,51 @@ def frames_of(source: str) -> Iterator[Frame]:
                     "program uses it, and its number."
                 )
             raise InputError(f"{source} is not a readable video.")
-        rate = float(video.get(cv2.CAP_PROP_FPS)) or 30.0
+        stated = float(video.get(cv2.CAP_PROP_FPS))
+        rate = stated if _plausible(stated) else 30.0
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         count = total if number is None and total > 0 else None
         began, index = time.monotonic(), 0
         while good:
-            passed = index / rate if number is None else time.monotonic() - began
-            yield Frame(index, passed, image, count)
+            now, stamp = time.monotonic(), 1e-3 * float(video.get(cv2.CAP_PROP_POS_MSEC))
+            if number is None:
+                yield Frame(index, index / rate, image, count, stamp, rate_Hz=stated)
+            else:
+                own = stamp if stamp > 0.0 else math.nan
+                yield Frame(index, now - began, image, count, own, now)
             index += 1
             good, image = video.read()
     finally:
         video.release()
+
+
+def timed(frames: Iterable[Frame], source: str) -> Iterator[Frame]:
+    """Pass on a video's pictures, whose times count: InputError where its frame rate is wrong.
+
+    A rate is wrong where no camera has it, or where the pictures' own time stamps contradict it.
+    """
+    first = math.nan
+    for frame in frames:
+        if not math.isnan(frame.rate_Hz) and not _plausible(frame.rate_Hz):
+            raise InputError(
+                f"{source} states a frame rate of {frame.rate_Hz:g} per second, so the times of "
+                f"its pictures are not known: {_ENCODE}."
+            )
+        if frame.number == 0:
+            first = frame.stamp_s
+        passed = frame.stamp_s - first
+        if frame.number % RATE_EVERY == RATE_EVERY - 1 and passed > 0.0:
+            found = frame.number / passed
+            if not 1.0 - RATE_SHARE < found / frame.rate_Hz < 1.0 + RATE_SHARE:
+                raise InputError(
+                    f"{source} states a frame rate of {frame.rate_Hz:g} per second, and its time "
+                    f"stamps have {found:.3g}: {_ENCODE}."
+                )
+        yield frame
+
+
+def _plausible(rate_Hz: float) -> bool:
+    return LEAST_RATE_HZ <= rate_Hz <= MOST_RATE_HZ
 
 
 def _picked(

@@ -1,7 +1,7 @@
 """The pose of a target in each picture of a sequence, or why it has none."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -30,10 +30,9 @@ STATES: dict[State, str] = {
 
 @dataclass(frozen=True)
 class Tracked:
-    """One picture: its number, time and state, and the target's pose if there is one."""
+    """One picture and its state, and the target's pose if there is one."""
 
-    number: int
-    time_s: float
+    frame: Frame
     state: State
     board: MarkedBoard | None
     corners: int
@@ -60,17 +59,21 @@ def track(
         seen = look(frame.image, boards, f"picture {frame.number}")
         if seen is None:
             state: State = "blank" if _is_blank(frame) else "no target"
-            yield Tracked(frame.number, frame.time_s, state, None, 0, None)
+            yield Tracked(_without_image(frame), state, None, 0, None)
             continue
         boards = tuple(board for board in boards if board == seen.board)
         try:
             found = locate_board(Corners.of(seen), camera, priors)
         except ValueError:
             count = len(seen.ids)
-            yield Tracked(frame.number, frame.time_s, "no pose", boards[0], count, None)
+            yield Tracked(_without_image(frame), "no pose", boards[0], count, None)
             continue
         state = "seen" if found.odds >= ODDS else "ambiguous"
-        yield Tracked(frame.number, frame.time_s, state, boards[0], len(seen.ids), found)
+        yield Tracked(_without_image(frame), state, boards[0], len(seen.ids), found)
+
+
+def _without_image(frame: Frame) -> Frame:
+    return replace(frame, image=None)
 
 
 def _is_blank(frame: Frame) -> bool:

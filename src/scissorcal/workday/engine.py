@@ -5,7 +5,7 @@ recursively. A result carries the identity it was made from: where that differs 
 inputs have now, it is stale.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -21,9 +21,10 @@ from scissorcal.workday.recordings import (
     RecordingRow,
     counts_of,
     counts_used,
-    exclude_hint,
     list_recordings,
+    notes_of,
     refuse_mixed_joints,
+    why_unused,
 )
 from scissorcal.workday.remedies import remedy
 from scissorcal.workday.states import CHANGED, WAITING, State, StepState
@@ -59,14 +60,19 @@ class Engine:
         return self._states[name]
 
     def states(self) -> tuple[StepState, ...]:
-        """The states of all steps that the scene needs, in the order of the day."""
-        found = tuple(self.state(step.name) for step in STEPS if self.needed(step.name))
+        """The states of all steps that are shown, in the order of the day."""
+        found = tuple(self.state(step.name) for step in STEPS if self.shown(step.name))
         self.index.save()
         return found
 
     def needed(self, name: str) -> bool:
         """Whether the scene needs the step. Photographs may be fitted where it does not."""
         return bool(BY_NAME[name].why(self._needs))
+
+    def shown(self, name: str) -> bool:
+        """Whether the scene needs the step, or it was done on request."""
+        step = BY_NAME[name]
+        return self.needed(name) or (step.on_request and self._is_there(step))
 
     def leads_to(self, name: str) -> str:
         """The command with which to begin, so that the step of this name becomes current."""
@@ -128,8 +134,8 @@ class Engine:
         return list_recordings(self.workspace, self.recipe, kind, self.index)
 
     def _counts(self, step: Step, item: str) -> bool:
-        """Whether an input counts: the scene needs it, or it does not need the step either."""
-        return self.needed(_plain(item)) or not self.needed(step.name)
+        """Whether an input counts: it is shown, or the scene does not need the step either."""
+        return self.shown(_plain(item)) or not self.needed(step.name)
 
     def _content(self, step: Step, item: str) -> str:
         """Content of an input; nothing where it does not count, or is optional and missing."""
@@ -147,10 +153,19 @@ class Engine:
             "photographs": self._of_photographs,
             "render": self._of_render,
         }.get(step.kind, self._of_result)
-        return find(step, why or "not needed by this scene")
+        unasked = (
+            "on request: the scene does not need it"
+            if step.on_request
+            else "not needed by this scene"
+        )
+        return find(step, why or unasked)
 
     def _is_there(self, step: Step) -> bool:
-        """Whether there are photographs of something, or a fit to them."""
+        """Whether there are captures for a step that the scene may not need, or a fit to them."""
+        if step.kind == "recordings":
+            return step.on_request and bool(self.workspace.recordings(_captured(step)))
+        if step.on_request:
+            return self.file(step.name).is_file() or self._is_there(BY_NAME[step.inputs[0]])
         if step.kind == "photographs":
             return bool(self._photographs(step))
         if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "photographs":
@@ -160,7 +175,7 @@ class Engine:
     def _of_recordings(self, step: Step, why: str) -> StepState:
         kind = _captured(step)
         rows = self.recordings(kind)
-        notes = tuple(self._row_note(row) for row in rows if row.use != "used")
+        notes = tuple(why_unused(self.workspace, row) for row in rows if row.use != "used")
         broken = [row for row in rows if row.use == "unreadable"]
         used = [row for row in rows if row.use == "used"]
 
@@ -182,7 +197,7 @@ class Engine:
         except InputError as error:
             mixed = (*notes, str(error))
             return made("failed", "rotary and linear joints are mixed", notes=mixed)
-        notes = (*notes, *self._notes_of(used))
+        notes = (*notes, *notes_of(self.workspace, self.recipe, used))
         content = digest(sorted(str(row.facts["content"]) for row in used))
         files = tuple(self.workspace.relative(row.path) for row in used)
         found = f"{_count(len(used), 'recording')}, {sum(row.seconds for row in used):.0f} s"
@@ -216,25 +231,6 @@ class Engine:
                 for row, count in zip(rows, counts, strict=True)
             ]
         return completeness(counts, self.recipe, kind, used)
-
-    def _row_note(self, row: RecordingRow) -> str:
-        name = self.workspace.relative(row.path)
-        if row.use == "unreadable":
-            return f"{row.why} {exclude_hint(row.path)}"
-        reason = "recorded otherwise" if row.use == "other recipe" else row.use
-        return f"{name} is not used ({reason}): {row.why}."
-
-    def _notes_of(self, used: Sequence[RecordingRow]) -> tuple[str, ...]:
-        notes = []
-        for row in used:
-            name = self.workspace.relative(row.path)
-            if row.facts["joint"] != self.recipe.rig.joint:
-                notes.append(
-                    f"{name} is of a {row.facts['joint']} joint and the recipe states another: set "
-                    f'joint = "{row.facts["joint"]}" in its [rig].'
-                )
-            notes += [f"{name}: {sentence}" for sentence in row.facts["notes"]]
-        return tuple(notes)
 
     def _of_photographs(self, step: Step, why: str) -> StepState:
         paths = self._photographs(step)
@@ -343,6 +339,8 @@ class Engine:
             return ()
         found = self._completeness(_captured(step), self.file(step.name))
         keys = f"capture.{step.what}.speeds_rad_per_s"
+        if step.what == "friction-advance":
+            keys = "capture.friction_advance.speeds_mm_per_s"
         return tuple(
             f"{step.name}, {sentence}. The fit's notes say why; leave speeds that it cannot use "
             f"out of {keys}."
@@ -388,7 +386,8 @@ class Engine:
 
 
 def _captured(step: Step) -> CaptureKind:
-    return "friction" if step.what == "friction" else "cut"
+    kinds: tuple[CaptureKind, ...] = ("friction", "friction-advance", "cut")
+    return next(kind for kind in kinds if kind == step.what)
 
 
 def _plain(item: str) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 HASH = 8
 """Digits of the content's digest in a version's name."""
 
-_NAME = re.compile(r"^(?P<what>[a-z]+)-(?P<stamp>\d{8}T\d{6}Z)-(?P<hash>[0-9a-f]{8})$")
+_NAME = re.compile(r"^(?P<what>[a-z]+(-[a-z]+)?)-(?P<stamp>\d{8}T\d{6}Z)-(?P<hash>[0-9a-f]{8})$")
 
 
 @dataclass(frozen=True)

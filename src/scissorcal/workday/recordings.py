@@ -1,12 +1,12 @@
 """The recordings of a workspace: which a fit uses, which it does not, and why."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
@@ -210,6 +210,28 @@ def exclude_hint(path: Path) -> str:
     return f"Exclude one with 'scissorcal recording exclude {path.name} --why REASON'."
 
 
+def why_unused(workspace: Workspace, row: RecordingRow) -> str:
+    """Say why fits do not use a recording."""
+    if row.use == "unreadable":
+        return f"{row.why} {exclude_hint(row.path)}"
+    reason = "recorded otherwise" if row.use == "other recipe" else row.use
+    return f"{workspace.relative(row.path)} is not used ({reason}): {row.why}."
+
+
+def notes_of(workspace: Workspace, recipe: Recipe, used: Sequence[RecordingRow]) -> tuple[str, ...]:
+    """What the recordings that fits use say of themselves, and a joint that the recipe lacks."""
+    notes = []
+    for row in used:
+        name = workspace.relative(row.path)
+        if row.facts["joint"] != recipe.rig.joint:
+            notes.append(
+                f"{name} is of a {row.facts['joint']} joint and the recipe states another: set "
+                f'joint = "{row.facts["joint"]}" in its [rig].'
+            )
+        notes += [f"{name}: {sentence}" for sentence in row.facts["notes"]]
+    return tuple(notes)
+
+
 def recover_recordings(workspace: Workspace) -> tuple[str, ...]:
     """Finish captures that were interrupted; return a sentence for each."""
     if not any(workspace.captures_dir.glob("*.part")):
@@ -259,7 +281,7 @@ def _changed(facts: Mapping[str, Any], recipe: Recipe, kind: CaptureKind) -> str
 
 
 def _named(workspace: Workspace, name: str) -> Path:
-    there = {p.name: p for kind in ("friction", "cut") for p in workspace.recordings(kind)}
+    there = {p.name: p for kind in get_args(CaptureKind) for p in workspace.recordings(kind)}
     if Path(name).name not in there:
         raise MissingError(
             f"{workspace.captures_dir} has no recording of friction or a cut called "

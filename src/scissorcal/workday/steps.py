@@ -37,6 +37,7 @@ class Step:
     ``read`` gives its facts, ``holds`` names the type in it ("module:type"), ``run`` the module of
     a fit (`workday.runs.fit.FitModule`).
     ``verified_by`` names the step that checks it. ``optional`` steps are never what comes next.
+    Steps ``on_request`` may be done where the scene does not need them, and are then shown.
     ``photographs`` are the folders that a capture of photographs fills, the first one required;
     with ``newest_only`` earlier folders do not count.
     """
@@ -55,6 +56,7 @@ class Step:
     run: str = ""
     verified_by: str = ""
     optional: bool = False
+    on_request: bool = False
     photographs: tuple[str, ...] = ()
     newest_only: bool = False
 
@@ -97,6 +99,11 @@ def _friction_settings(recipe: Recipe) -> object:
     return recipe.fit.friction.model_dump(mode="json")
 
 
+def _friction_advance_settings(recipe: Recipe) -> object:
+    priors = recipe.fit.friction.priors.linear.model_dump(mode="json")
+    return [recipe.fit.friction_advance.model_dump(mode="json"), priors]
+
+
 def _camera_settings(recipe: Recipe) -> object:
     return recipe.fit.camera.model_dump(mode="json")
 
@@ -108,7 +115,9 @@ def _blade_settings(recipe: Recipe) -> object:
 
 def _plate_settings(recipe: Recipe) -> object:
     fit = recipe.fit.plate.model_dump(mode="json")
-    return [recipe.plate.model_dump(mode="json"), recipe.rig.moving, fit]
+    # the target is printed flat and at rest: surface, touch and tracking do not enter its fit
+    plate = recipe.plate.model_dump(mode="json", exclude={"surface", "touch", "tracking"})
+    return [plate, recipe.rig.moving, fit]
 
 
 def _cut_settings(recipe: Recipe) -> object:
@@ -128,17 +137,18 @@ def _whole(recipe: Recipe) -> object:
     return recipe.model_dump(mode="json")
 
 
-def _trust_check(what: str) -> Step:
+def _trust_check(what: str, words: str = "", *, on_request: bool = False) -> Step:
     return Step(
         f"verify {what}",
         "verify",
-        f"scissorcal verify {what}",
+        f"scissorcal verify {words or what}",
         lambda needs: _fit(what)(needs) and "whether the intervals hold",
         inputs=(f"fit {what}",),
         file=_in_fits(f"{what}.verify.json"),
         read=facts.trust_check,
         holds="scissorcal.calibration.verify.result:VerifyResult",
         optional=True,
+        on_request=on_request,
     )
 
 
@@ -148,6 +158,13 @@ STEPS: tuple[Step, ...] = (
         "recordings",
         "scissorcal capture friction --device PORT",
         _capture("friction"),
+    ),
+    Step(
+        "capture friction-advance",
+        "recordings",
+        "scissorcal capture friction --axis advance --device PORT",
+        _capture("friction-advance"),
+        on_request=True,
     ),
     Step("capture cut", "recordings", "scissorcal capture cut --device PORT", _capture("cut")),
     Step(
@@ -228,6 +245,22 @@ STEPS: tuple[Step, ...] = (
         verified_by="verify friction",
     ),
     Step(
+        "fit friction-advance",
+        "fit",
+        "scissorcal fit friction --axis advance",
+        _fit("friction-advance"),
+        inputs=("capture friction-advance",),
+        settings=_friction_advance_settings,
+        version=1,
+        by_effort=True,
+        file=_in_fits("friction-advance.nc"),
+        read=facts.fit,
+        holds="scissorcal.calibration.result:FitResult",
+        run="scissorcal.workday.runs.friction_advance",
+        verified_by="verify friction-advance",
+        on_request=True,
+    ),
+    Step(
         "fit cut",
         "fit",
         "scissorcal fit cut",
@@ -243,6 +276,7 @@ STEPS: tuple[Step, ...] = (
         verified_by="verify cut",
     ),
     _trust_check("friction"),
+    _trust_check("friction-advance", "friction --axis advance", on_request=True),
     _trust_check("cut"),
     Step(
         "report",
@@ -254,8 +288,10 @@ STEPS: tuple[Step, ...] = (
             "fit blade?",
             "fit plate?",
             "fit friction?",
+            "fit friction-advance?",
             "fit cut?",
             "verify friction?",
+            "verify friction-advance?",
             "verify cut?",
         ),
         settings=_whole,
@@ -279,7 +315,7 @@ STEPS: tuple[Step, ...] = (
         lambda needs: "what the loop renders" if needs.tables else "",
         inputs=("fit friction", "fit cut", "fit plate"),
         settings=_whole,
-        version=3,
+        version=4,
         file=lambda workspace, recipe: workspace.package_path(recipe),
         read=facts.package,
     ),

@@ -35,7 +35,7 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.model import EdgeBelief
 from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording
 from scissorcal.recording.until import UntilMark
@@ -83,7 +83,7 @@ class UntilTolerance:
 
     def __init__(
         self,
-        kind: CaptureKind,
+        kind: DesignedKind,
         recipe: Recipe,
         identity: Identity,
         earlier: Earlier,

@@ -4,7 +4,7 @@ import shutil
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
@@ -12,8 +12,8 @@ from scissorcal.files import replacing
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
 
-RecordingKind = Literal["friction", "cut", "render"]
-FitKind = Literal["friction", "cut"]
+RecordingKind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
+FitKind = Literal["friction", "friction-advance", "cut"]
 
 RECIPE_FILE = "recipe.toml"
 DEMO_MARKER = ".scissorcal-demo"
@@ -23,9 +23,9 @@ DEMO_MARKER = ".scissorcal-demo"
 class Workspace:
     """The file names of one workspace.
 
-    captures/<kind>-<UTC stamp>.mcap, fits/friction.nc and fits/cut.nc with their trust checks
-    fits/<what>.verify.json, report/report.html and report/report.json with their signature
-    report/signature.json, package/<recipe name>.zip, all below ``root``.
+    captures/<kind>-<UTC stamp>.mcap, fits/friction.nc, fits/friction-advance.nc and fits/cut.nc
+    with their trust checks fits/<what>.verify.json, report/report.html and report/report.json with
+    their signature report/signature.json, package/<recipe name>.zip, all below ``root``.
     """
 
     root: Path
@@ -90,7 +90,10 @@ class Workspace:
 
     def recordings(self, kind: RecordingKind) -> tuple[Path, ...]:
         """Return all recordings of one kind, oldest first, also those that fits do not use."""
-        return tuple(sorted(self.captures_dir.glob(f"{kind}-*.mcap"), key=lambda path: path.stem))
+        longer = tuple(f"{k}-" for k in get_args(RecordingKind) if k.startswith(f"{kind}-"))
+        found = self.captures_dir.glob(f"{kind}-*.mcap")
+        own = [path for path in found if not path.name.startswith(longer)]
+        return tuple(sorted(own, key=lambda path: path.stem))
 
     def new_recording(self, kind: RecordingKind, now: datetime | None = None) -> Path:
         """Return a file name for a new recording that no file has yet; makes the folder."""

@@ -116,6 +116,7 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
     )
     facts: dict[str, Any] = {
         "what": "friction",
+        "words": "friction",
         "effort": "standard",
         "rung": "linear",
         "structure": {},

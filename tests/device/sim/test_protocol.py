@@ -8,7 +8,7 @@ import pytest
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.protocol import ENCODER_CHECK_MS, RigProtocol
 from scissorcal.device.sim.rig import VirtualRig
-from scissorcal.device.sim.specimen import load_specimen
+from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import (
     PROTOCOL_VERSION,
     SCHEMA_HASH,
@@ -28,6 +28,7 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
+from tests.device.sim.build import specimen
 
 ENABLE = int(CommandFlag.ENABLE)
 
@@ -35,9 +36,14 @@ ENABLE = int(CommandFlag.ENABLE)
 class Host:
     """The other end: sends messages, lets ticks pass, and decodes what comes."""
 
-    def __init__(self, faults: Faults | None = None, name: str = "office-paper") -> None:
+    def __init__(
+        self,
+        faults: Faults | None = None,
+        name: str = "office-paper",
+        truth: Specimen | None = None,
+    ) -> None:
         rng = np.random.default_rng(1)
-        self.rig = VirtualRig(load_specimen(name), rng)
+        self.rig = VirtualRig(truth or load_specimen(name), rng)
         self.device = RigProtocol(self.rig, np.random.default_rng(2), faults)
         self.decoder = FrameDecoder()
 
@@ -109,7 +115,8 @@ def test_states_count_ticks_and_the_devices_own_time(host: Host) -> None:
         (ConfigKey.HAND_STROKES, 2.5, ConfigStatus.VALUE_REFUSED),
         (ConfigKey.HAND_STROKES, float("nan"), ConfigStatus.VALUE_REFUSED),
         (ConfigKey.HAND_STROKES, 3.0, ConfigStatus.OK),
-        (ConfigKey.MATERIAL, 2.0, ConfigStatus.VALUE_REFUSED),
+        (ConfigKey.MATERIAL, 2.0, ConfigStatus.OK),
+        (ConfigKey.MATERIAL, 3.0, ConfigStatus.VALUE_REFUSED),
         (ConfigKey.MATERIAL, 1.0, ConfigStatus.OK),
         (0x1234, 1.0, ConfigStatus.UNKNOWN_KEY),
     ],
@@ -146,6 +153,19 @@ def test_material_is_refused_while_the_blades_block_it(host: Host) -> None:
     echo = host.set(ConfigKey.MATERIAL, 1.0)
     assert echo.status == ConfigStatus.VALUE_REFUSED
     assert echo.value == 0.0
+
+
+def test_a_plate_is_put_in_where_the_specimen_has_one() -> None:
+    """Without one, as in test_configuration_is_echoed_with_the_value_in_force, 2 is refused."""
+    plate = {"place_mm": (0.0, 10.0, 0.0)}
+    host = Host(truth=specimen(plate=plate))
+    assert host.set(ConfigKey.MATERIAL, 2.0).status == ConfigStatus.OK
+    assert host.rig.plate is not None
+    assert host.set(ConfigKey.MATERIAL, 3.0).status == ConfigStatus.VALUE_REFUSED
+    host.rig.joint.place, host.rig.sledge.place = 0.15, -0.04
+    assert host.set(ConfigKey.MATERIAL, 2.0).status == ConfigStatus.VALUE_REFUSED
+    assert host.set(ConfigKey.MATERIAL, 0.0).status == ConfigStatus.OK
+    assert host.rig.plate is None
 
 
 def test_enabled_motors_follow_commands_and_disabled_ones_do_not(host: Host) -> None:

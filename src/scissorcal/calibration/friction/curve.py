@@ -54,7 +54,7 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
     """The law from standstill to the fastest measured rate; None for a cut or without numbers."""
     rates = np.abs(fit.series.opening_rate)
     rates = rates[np.isfinite(rates)]
-    if fit.what != "friction" or len(rates) == 0 or not np.all(np.isfinite(fit.draws)):
+    if fit.what == "cut" or len(rates) == 0 or not np.all(np.isfinite(fit.draws)):
         return None
     fastest = float(rates.max())
     if fastest <= 0:
@@ -78,7 +78,7 @@ def friction_map(fit: FitResult) -> FrictionMap | None:
     """Friction over the rates and openings that were recorded; None for a cut or no numbers."""
     series = fit.series
     known = np.isfinite(series.opening) & np.isfinite(series.opening_rate)
-    if fit.what != "friction" or not known.any() or not np.all(np.isfinite(fit.draws)):
+    if fit.what == "cut" or not known.any() or not np.all(np.isfinite(fit.draws)):
         return None
     speed = np.abs(series.opening_rate[known])
     fastest = float(speed.max())

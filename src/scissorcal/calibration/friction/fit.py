@@ -17,7 +17,7 @@ from scissorcal.calibration.between import (
     jackknife,
     widened,
 )
-from scissorcal.calibration.comparison import choose
+from scissorcal.calibration.comparison import NEGLIGIBLE, choose
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.checks import (
@@ -26,6 +26,7 @@ from scissorcal.calibration.friction.checks import (
     start_verdict,
 )
 from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
+from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
 from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.friction.noise import (
     cogging_notes,
@@ -43,7 +44,7 @@ from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer, tails_of
-from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, needs_load
+from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
@@ -96,11 +97,13 @@ def fit_friction(
     refuse_friction(recordings, settings, every, windows, sensors)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    compared, chosen = _compare(laws, stop, tell)
+    compared, chosen = _compare(laws, settings.lack_of_fit, stop, tell)
     law = next(design for design in laws if design.name == chosen.candidate.name)
     infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
     problem = chosen.candidate.problem(law.series)
     posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
+    if prior is None:  # a study simulates the law itself
+        posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
@@ -191,19 +194,24 @@ def _rms(values: NDArray[np.float64]) -> float:
 
 
 def _compare(
-    laws: list[FrictionExperiment], stop: Stop | None, tell: Progress
+    laws: list[FrictionExperiment], lack_of_fit: float, stop: Stop | None, tell: Progress
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
     """Fit every candidate law and choose one.
 
     The chosen law is fitted again with a Student-t noise where its residuals have outliers; that
-    fit takes the place of the first.
+    fit takes the place of the first. A share ``lack_of_fit`` of the drive that is stated as the
+    law's error is what makes laws differ, and residuals below it have no outliers.
     """
     compared: list[FittedCandidate] = []
     for index, law in enumerate(laws):
         tell(0.6 * index / len(laws), f"friction: trying {law.name}")
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
-    chosen = choose(compared, float(np.sqrt(np.mean(laws[0].observed ** 2))))
-    tails = tails_of(chosen.candidate.likelihood.standardised(chosen.optimum.point), chosen.share)
+    drive = _rms(laws[0].observed)
+    chosen = choose(compared, drive, lack_of_fit or NEGLIGIBLE)
+    likelihood = chosen.candidate.likelihood
+    if _rms(likelihood.residuals(chosen.optimum.point)) < lack_of_fit * drive:
+        return compared, chosen
+    tails = tails_of(likelihood.standardised(chosen.optimum.point), chosen.share)
     if tails > OUTLIERS:
         return compared, chosen
     place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
@@ -338,7 +346,7 @@ def _laws(
     explain the data alike, a linear joint gets the offset, and scissors the unequal levels: those
     are felt through the handles, and an offset of a sensor is not.
     """
-    names = [law for law in CANDIDATES if windows.bears_load or not needs_load(law)]
+    names = [law for law in settings.candidates if windows.bears_load or not needs_load(law)]
     names = names if settings.rung == "auto" else [settings.rung]
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}

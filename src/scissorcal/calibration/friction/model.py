@@ -30,6 +30,10 @@ BESIDE = 1.02
 """A search begins a little beside least squares: for the simplest law they are its optimum, and a
 parameter that has not moved is one that the data do not know."""
 
+LEAST_OFFSET = 1e-3
+"""Share of the drive's spread from which a search for the offset begins at least: beside zero it
+would end where it began."""
+
 SHORT = 0.03
 """Share of the range that is travelled, at which a search for Dahl's length begins."""
 
@@ -162,7 +166,7 @@ class FrictionExperiment:
         begin = {
             **{term.name: 0.1 * effort / self._size(term) for term in self._levels},
             "inertia": BESIDE * max(inertia, 1e-3 * least),
-            "offset": BESIDE * offset,
+            "offset": BESIDE * np.copysign(max(abs(offset), LEAST_OFFSET * effort), offset),
             "coulomb": BESIDE * max(coulomb, 1e-2 * effort),
             "viscous": BESIDE * max(viscous, 1e-2 * effort / rate),
             "noise": 0.1 * effort,

@@ -1,17 +1,17 @@
-"""A track: the plate's pose from picture to picture, one line of JSON for each."""
+"""Tracks of lines of JSON, as 'capture track' wrote them before 'track' wrote recordings.
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+They stay readable: 'scissorcal export' makes a table of one.
+"""
+
+import csv
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.track import STATES, State, Tracked
+from scissorcal.errors import InputError
+from scissorcal.files import replacing
+from scissorcal.vision.track import State
 
 
 class PoseRecord(BaseModel):
@@ -53,53 +53,6 @@ class TrackRow(BaseModel):
     other: PoseRecord | None = None
 
 
-@dataclass(frozen=True)
-class TrackSummary:
-    """How a track went. ``states`` counts pictures, ``longest_gap_s`` is the longest time between
-    two poses (or to either end); sd are medians over the poses, of their worst axis."""
-
-    path: Path
-    frame: Literal["camera", "rig"]
-    pictures: int
-    poses: int
-    states: dict[State, int]
-    longest_gap_s: float
-    seconds: float
-    travel_mm: float
-    sd_mm: float
-    sd_deg: float
-
-    @property
-    def drop_outs(self) -> int:
-        return self.pictures - self.poses
-
-
-def track_row(seen: Tracked, camera: Camera, back: Pose, rig: RigPose | None) -> TrackRow:
-    """The line of one picture; ``back`` is T_target_plate, ``rig`` takes poses to its frame."""
-    found = seen.found
-    if found is None:
-        return TrackRow(
-            number=seen.number, time_s=seen.time_s, state=seen.state, corners=seen.corners
-        )
-
-    pose = (rig.holds(found, camera) if rig else found.pose).after(back)
-    other = None
-    if found.other:
-        known = replace(rig.camera_rig, covariance=None).inverse() if rig else None
-        other = (known.after(found.other) if known else found.other).after(back)
-    return TrackRow(
-        number=seen.number,
-        time_s=seen.time_s,
-        state=seen.state,
-        target=seen.board.name if seen.board else None,
-        corners=seen.corners,
-        rms_px=found.rms_px,
-        odds=min(found.odds, 1e12) if found.other else None,
-        pose=_pose_record(pose),
-        other=_pose_record(other) if other else None,
-    )
-
-
 def track_schema() -> dict[str, Any]:
     """JSON schema of a track's lines: the first is a head, each other one a row."""
     schema: dict[str, Any] = TypeAdapter(TrackHead | TrackRow).json_schema()
@@ -107,46 +60,53 @@ def track_schema() -> dict[str, Any]:
     return {"$schema": dialect, "$id": "track.schema.json", **schema}
 
 
-def track_summary(path: Path, head: TrackHead, rows: Iterable[TrackRow]) -> TrackSummary:
-    """Count a track's drop-outs by cause, and summarise the standard deviations of its poses."""
-    rows = tuple(rows)
-    posed = [row for row in rows if row.pose]
-    marks = [rows[0].time_s, *(row.time_s for row in posed), rows[-1].time_s]
-    spread = [_worst(row.pose) for row in posed if row.pose]
-    places = np.array([row.pose.translation_m for row in posed if row.pose])
-    return TrackSummary(
-        path=path,
-        frame=head.frame,
-        pictures=len(rows),
-        poses=len(posed),
-        states={state: sum(row.state == state for row in rows) for state in STATES},
-        longest_gap_s=float(np.diff(marks).max()),
-        seconds=rows[-1].time_s - rows[0].time_s,
-        travel_mm=float(1e3 * np.linalg.norm(places - places[0], axis=1).max()),
-        sd_mm=float(np.median([mm for mm, _ in spread])),
-        sd_deg=float(np.median([deg for _, deg in spread])),
-    )
+def read_track_lines(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
+    """Read a track of lines; a last line that was cut off is left out.
+
+    Raises InputError, with file and line, where it is none.
+    """
+    try:
+        first, *lines = path.read_text(encoding="utf-8").splitlines()
+        head = TrackHead.model_validate_json(first)
+    except (OSError, UnicodeDecodeError, ValueError):
+        raise InputError(
+            f"{path} is no track: its first line must be an object with the format "
+            "scissorcal-track/1."
+        ) from None
+    rows = []
+    for number, line in enumerate(lines, start=2):
+        try:
+            rows.append(TrackRow.model_validate_json(line))
+        except ValidationError:
+            if number == len(lines) + 1:
+                break
+            raise InputError(f"{path}, line {number}: this is no row of a track.") from None
+    return head, tuple(rows)
 
 
-def why_no_pose(rows: Sequence[TrackRow]) -> str:
-    """Sentence that says why none of the pictures gave a pose."""
-    if not rows:
-        return "The camera gave no picture."
-    counts = {state: sum(row.state == state for row in rows) for state in STATES}
-    causes = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items() if n)
-    return f"None of {len(rows)} pictures gave a pose of the plate's target ({causes})."
+def export_track_lines(path: Path, table: Path, *, overwrite: bool = False) -> int:
+    """Write a track of lines as CSV, a row for each picture; returns how many.
+
+    Raises InputError where ``table`` is no .csv or exists already, and as `read_track_lines`.
+    """
+    if table.suffix.lower() != ".csv":
+        raise InputError(f"{table}: a track of lines is written as .csv. Choose that extension.")
+    if table.exists() and not overwrite:
+        raise InputError(f"{table} exists. Choose another name, or allow overwriting.")
+    _, rows = read_track_lines(path)
+    with replacing(table) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(_COLUMNS)
+        for row in rows:
+            pose = row.pose
+            numbers = (*pose.quaternion, *pose.translation_m) if pose else ("",) * 7
+            odds = "" if row.odds is None else row.odds
+            writer.writerow([row.number, row.time_s, row.state, row.corners, odds, *numbers])
+    return len(rows)
 
 
-def _worst(pose: PoseRecord) -> tuple[float, float]:
-    sd = np.sqrt(np.diag(np.array(pose.covariance)))
-    return float(1e3 * sd[3:].max()), float(np.degrees(sd[:3].max()))
-
-
-def _pose_record(pose: Pose) -> PoseRecord:
-    """A pose as files hold it."""
-    rows = pose.covariance
-    return PoseRecord(
-        quaternion=pose.quaternion,
-        translation_m=pose.translation_m,
-        covariance=None if rows is None else tuple(tuple(row) for row in rows.tolist()),
-    )
+_COLUMNS = (
+    *("number", "time_s", "state", "corners", "odds"),
+    *(f"quaternion_{part}" for part in "wxyz"),
+    *(f"translation_{part}_m" for part in "xyz"),
+)

@@ -165,7 +165,7 @@ class VerifyResult(Result):
     command = "scissorcal verify"
 
     format: Literal["scissorcal-verify/1"]
-    what: Literal["friction", "cut"]
+    what: Literal["friction", "friction-advance", "cut"]
     fit_hash: str
     rung: str
     effort: Effort

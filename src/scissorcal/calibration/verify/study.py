@@ -163,7 +163,7 @@ def unconstrained_draws(
     if missing:
         raise MissingError(
             f"The fit of {fit.what} holds no draws of {', '.join(missing)}: an earlier version "
-            f"made it. Run 'scissorcal fit {fit.what} --force' first."
+            f"made it. Run 'scissorcal fit {fit.words} --force' first."
         )
     rows = range(len(fit.draws)) if chosen is None else chosen.tolist()
     return np.stack(

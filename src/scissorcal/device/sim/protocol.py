@@ -14,7 +14,8 @@ Its behaviour, beyond the messages themselves:
   the stream.
 * Commands beyond the motors' limits are clipped and flagged TORQUE_SATURATED.
 * MATERIAL = 1 puts in a fresh sheet with its near edge at advance + contact = 0. It is refused
-  (VALUE_REFUSED) while the blades block it: open them or retract first.
+  (VALUE_REFUSED) while the blades block it: open them or retract first. MATERIAL = 2 puts in the
+  specimen's plate to touch, and is refused where it has none or the tip blocks it.
 * HAND_SPEED > 0 makes the virtual hand do HAND_STROKES strokes and then release; 0 releases now.
 * A stuck encoder is detected after ENCODER_CHECK_MS: ENCODER_FAULT, and the fault latches.
   Until then its reading is constant.
@@ -53,6 +54,8 @@ UNHEARD_S = 5.0
 TICK_US = round(TICK_S * 1e6)
 U32 = 0xFFFFFFFF
 FASTEST_HAND_rad_per_s = 5.0
+PLATE = 2.0
+"""MATERIAL that puts in the specimen's plate."""
 
 _ENABLE = int(CommandFlag.ENABLE)
 _CLEAR_FAULT = int(CommandFlag.CLEAR_FAULT)
@@ -177,10 +180,12 @@ class RigProtocol:
             return ConfigEcho(ConfigStatus.UNKNOWN_KEY, key, config.nonce, 0.0)
         accepted = self._accepts(key, value)
         if accepted and key == ConfigKey.MATERIAL:
-            if value:
+            if value == PLATE:
+                accepted = self.rig.load_plate()
+            elif value:
                 accepted = self.rig.load_sheet()
             else:
-                self.rig.remove_sheet()
+                self.rig.remove_material()
         if accepted:
             self._values[key] = value
             self._apply(key, value)
@@ -188,8 +193,10 @@ class RigProtocol:
         return ConfigEcho(status, key, config.nonce, self._values[key])
 
     def _accepts(self, key: int, value: float) -> bool:
-        if key in (ConfigKey.STREAM, ConfigKey.MATERIAL):
+        if key == ConfigKey.STREAM:
             return value in (0.0, 1.0)
+        if key == ConfigKey.MATERIAL:
+            return value in (0.0, 1.0, PLATE)
         if key == ConfigKey.BRAKE_AFTER_MS:
             return 1.0 <= value <= 1000.0
         if key == ConfigKey.HAND_STROKES:

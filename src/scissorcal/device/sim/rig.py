@@ -1,4 +1,4 @@
-"""The virtual rig: mechanism, motors, sensors, sheet and hand, simulated tick by tick.
+"""The virtual rig: mechanism, motors, sensors, sheet or plate, and hand, simulated tick by tick.
 
 The opening axis obeys
 
@@ -21,6 +21,7 @@ from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.friction import DryFriction
 from scissorcal.device.sim.hand import VirtualHand
 from scissorcal.device.sim.material import Sheet
+from scissorcal.device.sim.plate import PlateContact
 from scissorcal.device.sim.sensors import Measured, SensorSet
 from scissorcal.device.sim.specimen import Specimen
 
@@ -38,7 +39,9 @@ class EnergyBook:
     What goes in: ``motor`` and ``hand``, and ``offset`` (the constant torque). What goes out:
     ``friction``, ``stops``, ``damping`` (of the sheet), ``fracture`` (new surface) and ``arrest``
     (lost when the crack stops). ``blades`` is
-    the work of the sheet's elastic force on the blades.
+    the work of the sheet's elastic force on the blades. ``touch`` is the work of a touched plate on
+    the blades; of that, ``touch_damping`` and ``touch_friction`` are lost, and ``carried`` is what
+    the plate's own motion put in.
     """
 
     motor: float = 0.0
@@ -50,6 +53,10 @@ class EnergyBook:
     damping: float = 0.0
     fracture: float = 0.0
     arrest: float = 0.0
+    touch: float = 0.0
+    touch_damping: float = 0.0
+    touch_friction: float = 0.0
+    carried: float = 0.0
 
 
 class VirtualRig:
@@ -88,6 +95,7 @@ class VirtualRig:
         self._keep = math.exp(-step / (specimen.motor.lag_ms * 1e-3))
         self.time_s = 0.0
         self.cut: Cut | None = None
+        self.plate: PlateContact | None = None
         self._torque = 0.0
         self._force = 0.0
         self._book = EnergyBook()
@@ -132,17 +140,33 @@ class VirtualRig:
         """Put in a fresh sheet, near edge at 0; False (and no change) if the blades block it."""
         if self.blade.indentation(self.opening, -self.advance) > 0.0:
             return False
-        self.remove_sheet()
+        self.remove_material()
         self.cut = Cut(self.blade, Sheet(self.specimen.material, self._sheet_rng))
         return True
 
-    def remove_sheet(self) -> None:
-        """Take the sheet out; its stored energy is lost."""
+    def load_plate(self) -> bool:
+        """Put in the plate to touch; False (and no change) without one, or if the tip blocks it."""
+        if self.specimen.plate is None:
+            return False
+        plate = PlateContact(self.specimen.blade, self.specimen.plate, TICK_S / SUBSTEPS)
+        if plate.blocked(self.opening, self.advance):
+            return False
+        self.remove_material()
+        self.plate = plate
+        return True
+
+    def remove_material(self) -> None:
+        """Take out the sheet or the plate; its stored energy is lost."""
         if self.cut is not None:
             stored = self.cut.stored_energy(self.opening, self.advance)
             self._book.fracture += self.cut.fracture_J
             self._book.arrest += self.cut.arrest_J + stored
-        self.cut = None
+        if self.plate is not None:
+            stored = self.plate.stored_energy(self.opening, self.advance)
+            self._book.touch_damping += self.plate.damping_J + stored
+            self._book.touch_friction += self.plate.friction_J
+            self._book.carried += self.plate.carried_J
+        self.cut = self.plate = None
 
     @property
     def opening(self) -> float:
@@ -176,8 +200,11 @@ class VirtualRig:
 
     @property
     def stored_energy(self) -> float:
-        """Elastic energy in the sheet, in joules."""
-        return 0.0 if self.cut is None else self.cut.stored_energy(self.opening, self.advance)
+        """Elastic energy in the sheet or the plate, in joules."""
+        plate, cut = self.plate, self.cut
+        in_plate = 0.0 if plate is None else plate.stored_energy(self.opening, self.advance)
+        in_sheet = 0.0 if cut is None else cut.stored_energy(self.opening, self.advance)
+        return in_plate + in_sheet
 
     @property
     def energy(self) -> EnergyBook:
@@ -188,6 +215,10 @@ class VirtualRig:
         if self.cut is not None:
             book.fracture += self.cut.fracture_J
             book.arrest += self.cut.arrest_J
+        if self.plate is not None:
+            book.touch_damping += self.plate.damping_J
+            book.touch_friction += self.plate.friction_J
+            book.carried += self.plate.carried_J
         return book
 
     def _move(
@@ -200,6 +231,7 @@ class VirtualRig:
         brakes: tuple[float, float],
     ) -> None:
         joint, sledge, cut, book = self.joint, self.sledge, self.cut, self._book
+        plate = self.plate
         damping, moving = self.specimen.material.rate_damping_N_s_per_m, self.blade.moving
         keep, offset = self._keep, self.specimen.mechanism.torque_offset_Nm
         actual, actual_force = self._torque, self._force
@@ -219,12 +251,22 @@ class VirtualRig:
                     drag = damping * share * (slope * sledge.rate - lever * joint.rate / moving)
                     drag = max(drag, -on_joint / lever)
                     drag_torque, drag_force = drag * lever, -moving * drag * slope
-            turned = joint.push(motor - grip - offset + on_joint + drag_torque, brakes[0])
-            slid = sledge.push(thrust + shove + on_sledge + drag_force, brakes[1])
+            tip_torque = tip_force = 0.0
+            if plate is not None:
+                tip_torque, tip_force = plate.push(
+                    joint.place, sledge.place, joint.rate, sledge.rate
+                )
+            turned = joint.push(
+                motor - grip - offset + on_joint + drag_torque + tip_torque, brakes[0]
+            )
+            slid = sledge.push(thrust + shove + on_sledge + drag_force + tip_force, brakes[1])
+            if plate is not None:
+                plate.settle(turned, slid)
             book.motor += motor * turned + thrust * slid
             book.hand += shove * slid - grip * turned
             book.offset -= offset * turned
             book.blades += on_joint * turned + on_sledge * slid
+            book.touch += tip_torque * turned + tip_force * slid
             book.damping -= drag_torque * turned + drag_force * slid
         self._torque, self._force = actual, actual_force
 

@@ -196,6 +196,49 @@ class Material(Section):
         return self.reference_indentation_mm * 1e-3
 
 
+class TouchedPlate(Section):
+    """A plate that the upper blade's tip touches, where the wire puts it in (MATERIAL = 2).
+
+    Its frame has z out of its face and its origin on it. A level plate has x along the rig's and
+    z along the rig's y; ``pitch_deg`` turns it about the rig's z, then ``yaw_deg`` about y and
+    ``roll_deg`` about x, each in the turned frame. A cylinder's axis lies along the plate's y, it
+    and a sphere bulge towards the blades; ``extent_mm`` is where the plate begins and ends along
+    its x. Drift and sway begin when it is put in, the step ``step_at_s`` later. The turns of step
+    and sway are about the rig's z at the plate's origin.
+    """
+
+    surface: Literal["plane", "cylinder", "sphere"] = "plane"
+    radius_mm: Annotated[float, Field(ge=1, le=1e5, allow_inf_nan=False)] | None = None
+    place_mm: tuple[Finite, Finite, Finite]
+    pitch_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    yaw_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    roll_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    extent_mm: Range = (0.0, 100.0)
+    stiffness_N_per_mm: Annotated[float, Field(ge=0.1, le=200)] = 10.0
+    damping_N_s_per_m: Annotated[float, Field(ge=0, le=200)] = 10.0
+    friction: Annotated[float, Field(ge=0, le=1)] = 0.2
+    drift_mm_per_s: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    step_mm: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    step_turn_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    step_at_s: NonNegative = 1.0
+    sway_mm: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    sway_turn_deg: Annotated[float, Field(ge=-45, le=45)] = 0.0
+    sway_Hz: Annotated[float, Field(gt=0, le=10)] = 0.3
+
+    @model_validator(mode="after")
+    def _surface_is_whole(self) -> TouchedPlate:
+        if (self.radius_mm is None) != (self.surface == "plane"):
+            raise ValueError("radius_mm is needed for a cylinder or sphere, and for those alone")
+        if not self.extent_mm[0] < self.extent_mm[1]:
+            raise ValueError("plate.extent_mm must be [begin, end] with begin < end")
+        return self
+
+    @property
+    def moves(self) -> bool:
+        sways = (*self.sway_mm, self.sway_turn_deg)
+        return any((*self.drift_mm_per_s, *self.step_mm, self.step_turn_deg, *sways))
+
+
 class Hand(Section):
     """A virtual hand: springs towards smooth strokes, with tremor and limited strength.
 
@@ -232,6 +275,7 @@ class Specimen(Section):
     motor: Motor = Motor()
     sensors: Sensors = Sensors()
     material: Material
+    plate: TouchedPlate | None = None
     hand: Hand = Hand()
 
     @model_validator(mode="after")

@@ -58,6 +58,19 @@ void sc_block_reference(const sc_block *block, sc_reference *reference)
     reference->stroke = (const int32_t *)(const void *)(first + 3 * (size_t)capacity);
     const uint32_t size = __atomic_load_n(&block->reference_size, __ATOMIC_ACQUIRE);
     reference->size = size < capacity ? size : capacity;
+    reference->task = NULL;
+}
+
+void sc_block_task(const sc_block *block, sc_control_task *task)
+{
+    sc_reference path;
+    sc_block_reference(block, &path);
+    task->config = &block->control.config;
+    task->path.place = path.opening;
+    task->path.rate = path.opening_rate;
+    task->path.force = path.advance;
+    task->path.stage = path.stroke;
+    task->path.size = path.size;
 }
 
 void sc_block_order(sc_block *block, uint32_t mode)
@@ -70,6 +83,43 @@ void sc_block_fresh_sheet(sc_block *block, float crack)
 {
     __atomic_store(&block->orders.crack, &crack, __ATOMIC_RELAXED);
     __atomic_add_fetch(&block->orders.sheet, 1u, __ATOMIC_RELEASE);
+}
+
+/* Writer and reader may be at it at the same time, so that its words are atomic. */
+typedef uint32_t __attribute__((may_alias)) sc_half;
+
+enum { SC_HALVES = sizeof(sc_placing) / sizeof(sc_half) };
+
+void sc_block_place(sc_block *block, const sc_placing *placing)
+{
+    sc_half *to = (sc_half *)(void *)&block->plate.placing;
+    const sc_half *from = (const sc_half *)(const void *)placing;
+    const uint32_t turn = __atomic_load_n(&block->plate.turn, __ATOMIC_RELAXED);
+    __atomic_store_n(&block->plate.turn, turn + 1u, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_RELEASE); /* no word is seen before the odd turn */
+    for (size_t i = 0; i < SC_HALVES; i++) {
+        __atomic_store_n(&to[i], from[i], __ATOMIC_RELAXED);
+    }
+    __atomic_store_n(&block->plate.turn, turn + 2u, __ATOMIC_RELEASE);
+}
+
+int sc_block_placed(const sc_block *block, uint32_t *turn, sc_placing *placing)
+{
+    const sc_half *from = (const sc_half *)(const void *)&block->plate.placing;
+    sc_half *to = (sc_half *)(void *)placing;
+    const uint32_t now = __atomic_load_n(&block->plate.turn, __ATOMIC_ACQUIRE);
+    if (now == *turn || (now & 1u)) {
+        return 0;
+    }
+    for (size_t i = 0; i < SC_HALVES; i++) {
+        to[i] = __atomic_load_n(&from[i], __ATOMIC_RELAXED);
+    }
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    if (__atomic_load_n(&block->plate.turn, __ATOMIC_RELAXED) != now) {
+        return 0;
+    }
+    *turn = now;
+    return 1;
 }
 
 void sc_block_beat(sc_block *block)

@@ -8,11 +8,12 @@
 #ifndef SC_BLOCK_H
 #define SC_BLOCK_H
 
+#include "sc_control_block.h"
 #include "sc_servo.h"
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 6, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 7, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
     SC_TICKS_OF_A_STALL = 5,
     SC_HISTOGRAM_BINS = 192,
@@ -44,6 +45,12 @@ typedef struct {
     float value_in_force;
 } sc_mailbox;
 
+/* The newest estimate of the plate's pose, behind a sequence lock: turn is odd while it is written. */
+typedef struct {
+    uint32_t turn;
+    sc_placing placing;
+} sc_placing_lock;
+
 typedef struct {
     uint32_t magic;
     uint32_t version;
@@ -66,6 +73,8 @@ typedef struct {
     int64_t started_ns;
     sc_orders orders;
     sc_mailbox mailbox;
+    sc_placing_lock plate;
+    sc_control_block control;
     sc_servo_config config;
     sc_servo servo;
     sc_model model; /* its tables point nowhere; see sc_block_model */
@@ -88,9 +97,14 @@ int sc_block_is_sound(const sc_block *block, uint64_t size);
 int sc_block_model(const sc_block *block, sc_model *model);
 void sc_block_reference(const sc_block *block, sc_reference *reference);
 
+/* What CONTROL follows: the configuration, and the reference arrays as its path (place, its rate,
+ * force, stage). The contour stays as it is. */
+void sc_block_task(const sc_block *block, sc_control_task *task);
+
 /* The supervisor's side. */
 void sc_block_order(sc_block *block, uint32_t mode);
 void sc_block_fresh_sheet(sc_block *block, float crack);
+void sc_block_place(sc_block *block, const sc_placing *placing);
 void sc_block_beat(sc_block *block);
 void sc_block_stop(sc_block *block);
 void sc_block_set_reference_size(sc_block *block, uint32_t size); /* once the arrays are filled */
@@ -104,6 +118,10 @@ uint64_t sc_block_read(const sc_block *block, uint64_t *cursor, sc_sample *sampl
 /* The loop's side. */
 void sc_block_read_orders(const sc_block *block, sc_orders *orders);
 void sc_block_push(sc_block *block, const sc_sample *sample);
+
+/* 1, and the newest estimate, where there is one since the last call; *turn is for this function. One
+ * that is being written comes with a later call. */
+int sc_block_placed(const sc_block *block, uint32_t *turn, sc_placing *placing);
 uint32_t sc_block_wanted(const sc_block *block, uint32_t *key, float *value);
 void sc_block_answer(sc_block *block, uint32_t request, uint32_t status, float value);
 

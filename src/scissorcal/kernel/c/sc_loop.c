@@ -25,6 +25,7 @@ typedef struct {
     sc_block *block;
     const sc_model *model;
     sc_reference reference;
+    sc_control_task task;
     sc_decoder decoder;
     sc_command command;
     int64_t epoch_ns; /* CLOCK_REALTIME at the start, less CLOCK_MONOTONIC then */
@@ -36,6 +37,7 @@ typedef struct {
     int has_state; /* any since the start */
     int unanswered;
     int empty_reads;
+    uint32_t plate_turn; /* of the estimate that was taken last */
     uint32_t asked_frames;
     uint32_t asked;
     size_t pending; /* bytes of a frame that the line has not taken yet */
@@ -154,6 +156,16 @@ static void take_other(loop *self, const uint8_t *payload, size_t size)
     }
 }
 
+static void push_sample(loop *self)
+{
+    sc_block *block = self->block;
+    sc_block_push(block, &block->servo.sample);
+    if (block->servo.mode == SC_MODE_CONTROL) {
+        sc_control_block_push(&block->control, &block->servo.control.sample);
+    }
+    self->unanswered = 0;
+}
+
 static void note_interval(loop *self)
 {
     sc_block *block = self->block;
@@ -173,14 +185,23 @@ static void take_state(loop *self, const sc_state *state)
 {
     sc_block *block = self->block;
     sc_orders orders;
+    sc_placing placing;
     if (self->unanswered) {
         sc_servo_not_sent(&block->servo);
-        sc_block_push(block, &block->servo.sample);
-        self->unanswered = 0;
+        push_sample(self);
     }
     note_interval(self);
     sc_block_read_orders(block, &orders);
+    if (block->config.plate.is_estimated &&
+        sc_block_placed(block, &self->plate_turn, &placing)) {
+        sc_servo_place(&block->config, self->model, &block->servo, &placing);
+    }
     sc_block_reference(block, &self->reference);
+    if (block->control.has_config) {
+        sc_block_task(block, &self->task);
+        (void)sc_control_block_receive(&block->control, &self->task.contour);
+        self->reference.task = &self->task;
+    }
     if (sc_servo_step(&block->config, self->model, &self->reference, &orders, &block->servo, state,
                       &self->command)) {
         block->servo.sample.host_time_ns = self->epoch_ns + self->arrived_ns;
@@ -210,8 +231,7 @@ static void answer_newest(loop *self)
     if (self->unanswered) {
         block->servo.sample.latency_ns =
             latency < (int64_t)UINT32_MAX ? (uint32_t)latency : UINT32_MAX;
-        sc_block_push(block, &block->servo.sample);
-        self->unanswered = 0;
+        push_sample(self);
     }
     serve_mailbox(self);
 }
@@ -306,7 +326,8 @@ uint32_t sc_loop_run(int fd, sc_block *block)
     self.fd = fd;
     self.block = block;
     if (!sc_servo_config_is_sound(&block->config) ||
-        (block->has_model && !sc_block_model(block, &model))) {
+        (block->has_model && !sc_block_model(block, &model)) ||
+        (block->control.has_config && !sc_control_config_is_sound(&block->control.config))) {
         block->exit_reason = SC_STOP_BAD_BLOCK;
         return SC_STOP_BAD_BLOCK;
     }

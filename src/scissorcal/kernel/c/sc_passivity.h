@@ -3,11 +3,11 @@
  * The books say where the motors' work went. With the share s of the engagement ramp (0 to 1) the
  * package is the s-fold of its model, so the model's energies are booked with the ramp's share:
  *
- *   delivered + stored + fracture + arrest + friction = engaged + limited + late + injected
+ *   delivered + stored + fracture + arrest + friction = engaged + limited + late + injected + plate
  *
  * up to what sampling of the model leaves. delivered: work of the motors' torque, as measured where
  * the device measures one; engaged: what engaging in pressed material and raising the ramp there
- * put into it;
+ * put into it; plate: what who moves an estimated plate put into its material (sc_plate.h);
  * limited: work that torque and force limits keep back (negative where they do); injected: work of
  * the controller's damping (negative); late: work that the motors did beyond what was commanded at
  * each sample, by holding, delay, lag, slews and errors of gain and sign. A loop whose late work is
@@ -46,6 +46,7 @@ typedef struct {
     double late_J;
     double injected_J;
     double hand_J; /* work of the hand, where a sensor measures its force */
+    double plate_J;
 } sc_ledger;
 
 typedef struct {

@@ -1,4 +1,6 @@
 #include "sc_servo.h"
+#include "sc_servo_plate.h"
+#include "sc_servo_control.h"
 #include "sc_servo_watch.h"
 
 #include <math.h>
@@ -43,6 +45,7 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
            config->advance_rate_limit > 0.0f && isfinite(config->motor_sign) &&
            sc_passivity_is_sound(&config->passivity) &&
+           sc_plate_config_is_sound(&config->plate) &&
            sc_watch_config_is_sound(&config->watch);
 }
 
@@ -125,13 +128,13 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
         return wanted;
     }
     const sc_motion *motion = &servo->motion;
-    sc_model_step(model, &servo->crack, motion->opening, motion->opening_rate, motion->advance,
-                  &servo->step);
+    float share = servo->engaged_s < config->ramp_s ? servo->engaged_s / config->ramp_s : 1.0f;
+    if (!sc_servo_step_model(config, model, servo, &share)) {
+        return wanted;
+    }
     sc_port_friction(&config->passivity, model, &servo->port, motion->opening,
                      motion->opening_rate, &servo->step);
     servo->sample.flags |= servo->step.flags << SC_SAMPLE_STEP_SHIFT;
-    const float share =
-        servo->engaged_s < config->ramp_s ? servo->engaged_s / config->ramp_s : 1.0f;
     const sc_port_tick tick = {since->turned, since->moved,         since->delivered,
                                since->dt,     motion->opening_rate, share,
                                config->torque_limit, config->force_limit};
@@ -266,6 +269,8 @@ static effort effort_of_mode(const sc_servo_config *config, const sc_model *mode
         wanted = render(config, model, servo, since);
     } else if (servo->mode == SC_MODE_DAMP) {
         wanted.torque = -config->damping_Nm_s_per_rad * servo->motion.opening_rate;
+    } else if (servo->mode == SC_MODE_CONTROL && !servo->ending) {
+        sc_servo_control(reference, servo, since->dt, &wanted.torque, &wanted.force);
     }
     return wanted;
 }
@@ -329,6 +334,7 @@ static int step(const sc_servo_config *config, const sc_model *model,
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         since = way_since(config, servo, &before, state, dt);
         servo->engaged_s += dt;
+        sc_servo_move_plate(config, servo, dt);
         sc_servo_watch_speed(config, servo);
     } else {
         servo->invalid_frames++;
@@ -345,6 +351,7 @@ static int step(const sc_servo_config *config, const sc_model *model,
         wanted = effort_of_mode(config, model, reference, servo, &since);
     } else {
         sc_port_rest(&servo->port, &servo->ledger);
+        sc_control_rest(&servo->control);
     }
     sc_servo_watch_state(config, servo, state, since.dt, valid);
     if (servo->ending) {

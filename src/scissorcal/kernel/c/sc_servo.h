@@ -4,6 +4,7 @@
  * TRACK   opening and advance follow a reference by PID
  * RENDER  torque and force come from the model, ramped up from 0 when it engages
  * DAMP    torque = -damping * rate, no force
+ * CONTROL the tip presses on a surface and follows a path along it: sc_control.h
  *
  * All commands pass the same limits: at most torque_limit and force_limit, and from one command
  * that is sent to the next no faster than the slews; only to zero at once, on a state that is not
@@ -15,10 +16,12 @@
 #ifndef SC_SERVO_H
 #define SC_SERVO_H
 
+#include "sc_control.h"
 #include "sc_lag.h"
 #include "sc_model.h"
 #include "sc_motion.h"
 #include "sc_passivity.h"
+#include "sc_plate.h"
 #include "sc_watch.h"
 #include "sc_wire.h"
 
@@ -27,7 +30,13 @@ enum {
     SC_LEAP_RATES = 2         /* times the limit of the rate, beyond which no motion is taken */
 };
 
-enum { SC_MODE_IDLE = 0, SC_MODE_TRACK = 1, SC_MODE_RENDER = 2, SC_MODE_DAMP = 3 };
+enum {
+    SC_MODE_IDLE = 0,
+    SC_MODE_TRACK = 1,
+    SC_MODE_RENDER = 2,
+    SC_MODE_DAMP = 3,
+    SC_MODE_CONTROL = 4
+};
 
 /* Why the servo stopped; once it has, it stays stopped. */
 enum {
@@ -45,6 +54,7 @@ enum {
     SC_STOP_DEVICE_CLOCK = 11,
     SC_STOP_OVERSPEED = 12,
     SC_STOP_RESTARTED = 13,
+    SC_STOP_CONTROL = 16, /* and above: by what ended CONTROL, SC_CONTROL_... */
     SC_STOP_WATCHED = 32 /* and above: by what a watch saw, SC_WATCH_... */
 };
 
@@ -55,6 +65,7 @@ enum {
     SC_SAMPLE_FALLBACK = 0x40000,
     SC_SAMPLE_INVALID = 0x80000,
     SC_SAMPLE_AFTER_GAP = 0x100000,
+    SC_SAMPLE_PLATE_OUT = 0x800000, /* RENDER, and less than its force: for want of the plate's pose */
     SC_SAMPLE_STEP_SHIFT = 24 /* a rendered step's flags from this bit on */
 };
 
@@ -82,6 +93,7 @@ typedef struct {
     float motor_sign;          /* below 0: the motor's torque is turned round, commanded and
                                   measured; everything else here is of corrected signs */
     sc_watch_config watch;
+    sc_plate_config plate;
 } sc_servo_config;
 
 typedef struct {
@@ -90,6 +102,7 @@ typedef struct {
     const float *advance;
     const int32_t *stroke;
     uint32_t size;
+    const sc_control_task *task; /* what CONTROL follows; null: nothing */
 } sc_reference;
 
 /* The supervisor's orders. `order` and `sheet` count up: a new number engages the mode again, or
@@ -124,6 +137,8 @@ typedef struct {
     sc_watch watch;
     float aim_opening, aim_rate, aim_advance; /* of the reference at the last state */
     sc_crack crack;
+    sc_plate plate;
+    sc_control control;
     sc_ledger ledger; /* delivered in every mode; the rest while rendering */
     sc_port port;
     sc_sample sample; /* of the last frame; host time and latency are the loop's to fill */
@@ -168,6 +183,7 @@ typedef struct {
     uint64_t force_slewed;
     uint64_t device_saturated;
     uint64_t fallback_frames;
+    uint64_t plate_out_frames;
     uint64_t faults;
     sc_lag lag;
 } sc_servo;
@@ -189,6 +205,11 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command);
+
+/* Take an estimate of the plate's pose; model may be null. For a plate whose pose is known it does
+ * nothing. */
+void sc_servo_place(const sc_servo_config *config, const sc_model *model, sc_servo *servo,
+                    const sc_placing *placing);
 
 /* State that the last command was sent. Slews are from one such command to the next, and work is
  * booked for those alone. */

@@ -33,6 +33,8 @@ void sc_servo_engage(sc_servo *servo, uint32_t mode)
     servo->ledger.stored_J = 0.0;
     memset(&servo->step, 0, sizeof servo->step);
     memset(&servo->port, 0, sizeof servo->port);
+    servo->plate.share = servo->plate.usable ? 1.0f : 0.0f; /* the engagement's ramp is enough */
+    memset(&servo->control, 0, sizeof servo->control);
     servo->mode = mode;
     servo->begins = 1;
     servo->engaged_s = 0.0f;
@@ -49,7 +51,7 @@ void sc_servo_obey(const sc_orders *orders, sc_servo *servo)
     if (orders->order != servo->order) {
         servo->order = orders->order;
         servo->fallback = 0;
-        sc_servo_engage(servo, orders->mode <= SC_MODE_DAMP ? orders->mode : SC_MODE_IDLE);
+        sc_servo_engage(servo, orders->mode <= SC_MODE_CONTROL ? orders->mode : SC_MODE_IDLE);
     }
     if (orders->sheet != servo->sheet) {
         servo->sheet = orders->sheet;
@@ -98,6 +100,7 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
         watch_supervisor(config, orders, servo, elapsed_us);
     }
     sc_watch_pass(&servo->watch, elapsed_us);
+    sc_plate_pass(&servo->plate, elapsed_us);
     servo->ending_us = longer(servo->ending_us, elapsed_us);
     if (servo->ending && servo->ending_us >= LONGEST_END_US) {
         sc_servo_stop(servo, servo->ending); /* also where the device only repeats itself */

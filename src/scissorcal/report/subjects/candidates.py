@@ -97,7 +97,7 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
     if not fit.critic:
         why = (
             "The critic proposes nothing: no term recurred over resampled strokes and lowered the "
-            f"hold-out error, or the fit was made without it. `scissorcal fit {fit.what} --force` "
+            f"hold-out error, or the fit was made without it. `scissorcal fit {fit.words} --force` "
             "runs it again."
         )
         return absent(id_, part, title, str(fit.diagnostics.get("critic") or why))
@@ -129,7 +129,7 @@ def replay_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) ->
     if replay is None or not replay.rows:
         why = (
             "This fit holds no comparison with replaying one measured stroke: `scissorcal fit "
-            f"{fit.what} --force` makes it where there are strokes to compare."
+            f"{fit.words} --force` makes it where there are strokes to compare."
         )
         return absent(id_, part, title, why)
     names = {(one.name.stroke, one.name.recording): one.name for one in strokes}

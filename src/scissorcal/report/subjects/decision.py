@@ -215,7 +215,7 @@ def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult])
     for fit in fits:
         check = checks.get(fit.what)
         if check is None:
-            said = f"not done: `scissorcal verify {fit.what}`"
+            said = f"not done: `scissorcal verify {fit.words}`"
         else:
             outcome = _outcome(check)
             said = "; ".join(part for part in (outcome, coverage_found(check)) if part)

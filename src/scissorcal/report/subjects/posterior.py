@@ -101,7 +101,7 @@ def prior_panel(fit: FitResult, part: str) -> Panel:
     title, id_ = "Prior against posterior", f"{part}-prior"
     prior = fit.prior_draws
     if prior is None or len(prior) < 3 or not np.all(np.isfinite(fit.draws)):
-        why = f"This fit keeps no draws of its prior: run `scissorcal fit {fit.what} --force`."
+        why = f"This fit keeps no draws of its prior: run `scissorcal fit {fit.words} --force`."
         return absent(id_, part, title, why)
     rows = []
     for i, parameter in enumerate(fit.parameters):

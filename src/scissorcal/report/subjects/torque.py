@@ -121,7 +121,7 @@ def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -
     if finite(_rms(fit, ranked[0])) is not None:
         charts.append(_bars(fit, ranked[:MOST_BARS], rows, f"{part}-worst"))
         charts.append(_spread(fit, strokes, "opening", f"{part}-spread"))
-        if fit.what == "friction":
+        if fit.what != "cut":
             charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
     worst = ranked[0]
@@ -195,7 +195,7 @@ def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], i
 def _key(fit: FitResult, name: StrokeName, pace: Mapping[float, float]) -> tuple[str, float]:
     if against_of(name) == "time":
         return f"z {name.anchor}", 0.0
-    kind = "" if fit.what == "friction" else name.kind
+    kind = name.kind if fit.what == "cut" else ""
     return kind, np.inf if name.speed is None else pace[name.speed]
 
 

@@ -36,7 +36,7 @@ def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple
     """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
     title, id_ = "Trust check", f"{part}-verify"
     if check is None:
-        why = f"It has not been made for this fit: run `scissorcal verify {fit.what}`."
+        why = f"It has not been made for this fit: run `scissorcal verify {fit.words}`."
         return (absent(id_, part, title, why),)
     panels = []
     if check.calibration is not None:
@@ -46,7 +46,7 @@ def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple
     if check.sensitivity is not None:
         panels.append(_sensitivity(check, part, id_))
     if check.not_done or not panels:
-        why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.what}`."
+        why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.words}`."
         panels.append(absent(f"{id_}-open", part, f"{title}: not done", why))
     return tuple(panels)
 

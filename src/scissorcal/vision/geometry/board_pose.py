@@ -64,7 +64,8 @@ class BoardPose:
     1 where both explain the picture equally well. ``rms_px`` and ``sd_px`` are the rms error and
     the standard deviation that corners were found to have; ``used`` (n,) marks the corners that
     count, ``residuals_px`` (n, 2) are measured minus predicted. ``by_camera`` (6, 9) and
-    ``by_print`` (6, 2) say how the pose moves with the camera's parameters and the print's scales.
+    ``by_print`` (6, 2) say how the pose moves with the camera's parameters and the print's scales;
+    ``noise`` (6, 6) is the part of the pose's covariance that comes from the corners alone.
     """
 
     pose: Pose
@@ -77,6 +78,7 @@ class BoardPose:
     residuals_px: Array
     by_camera: Array
     by_print: Array
+    noise: Array
 
 
 def locate_board(
@@ -131,6 +133,7 @@ def locate_board(
         residuals_px=best.residuals,
         by_camera=by_camera,
         by_print=by_print,
+        noise=own,
     )
 
 

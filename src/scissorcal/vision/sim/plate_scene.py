@@ -12,6 +12,9 @@ from scissorcal.vision.targets.boards import RIG_MARKERS, MarkedBoard
 
 Array = NDArray[np.float64]
 
+LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""A level plate in the rig's frame: its upper face looks along y, in which the blades close."""
+
 
 @dataclass(frozen=True)
 class PlateScene:
@@ -52,9 +55,8 @@ def plate_scene(
     camera_rig = Pose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
     facing = np.diag([1.0, -1.0, -1.0]) @ _leaned(rng, 0.05)
     centre = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
-    card = np.array([0.03, 0.06, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
-    # the plate's upper face looks along the rig's y, in which the blades close
-    lying = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) @ _leaned(rng, 0.02)
+    card = np.array([0.03, 0.075, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
+    lying = LEVEL @ _leaned(rng, 0.02)
     near_edge = np.array([0.03, 0.0, 0.012]) + rng.normal(0.0, 1.5e-3, 3)
     pattern = about(2, turn) @ np.diag([1.0, -1.0, -1.0])
     return PlateScene(

@@ -1,7 +1,8 @@
 """Photographs for ``--camera sim``: rendered blades and targets, a plate and a rig's card."""
 
 import math
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.vision.live import Frame
+from scissorcal.recipe.library import specimen_path
 from scissorcal.vision.sim.blades import BladeShape, blade_layer, scissors_layers
-from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.lens import Lens, Pose, about
 from scissorcal.vision.sim.looks import Looks, as_jpeg
 from scissorcal.vision.sim.photograph import Layer, render
-from scissorcal.vision.sim.plate_scene import PlateScene, plate_scene
+from scissorcal.vision.sim.plate_scene import LEVEL, PlateScene, plate_scene
 from scissorcal.vision.sim.targets import target_layers
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
@@ -32,7 +33,6 @@ SIM_LENS = Lens(1900.0, (1003.2, 744.9), 2000, 1500, (-0.08, 0.03, 4e-4, -3e-4, 
 
 ADVANCES_MM = (0.0, 15.0, 30.0)
 OPENINGS_DEG = (8.0, 22.0, 36.0)
-FRAMES_PER_S = 10.0
 
 _JPEG_QUALITY = 92
 _CORNERS = ((0.4, 0.35), (-0.4, 0.35), (0.4, -0.35), (-0.4, -0.35))
@@ -86,11 +86,15 @@ def render_board_photographs(
     return tuple(paths)
 
 
-def sim_plate_scene(recipe: "Recipe", seed: int) -> PlateScene:
-    """The scene that all rendered photographs of one seed show: the true poses."""
+def sim_plate_scene(recipe: "Recipe", seed: int, rig_plate: Pose | None = None) -> PlateScene:
+    """The scene that all rendered photographs of one seed show: the true poses.
+
+    The plate stands at ``rig_plate``, such as `touched_plate`; without it, it is drawn.
+    """
     x, y = (1e-3 * value for value in recipe.plate.place_mm)
     turn = float(np.radians(recipe.plate.turn_deg))
-    return plate_scene(np.random.default_rng([seed, 9]), (x, y), turn)
+    scene = plate_scene(np.random.default_rng([seed, 9]), (x, y), turn)
+    return scene if rig_plate is None else replace(scene, rig_plate=rig_plate)
 
 
 def render_plate_photographs(
@@ -100,9 +104,13 @@ def render_plate_photographs(
     *,
     target: MarkedBoard = PLATE_BOARD,
     count: int = 5,
+    rig_plate: Pose | None = None,
 ) -> tuple[Path, ...]:
-    """Render photographs of the plate at rest into a folder; returns the files."""
-    scene = sim_plate_scene(recipe, seed)
+    """Render photographs of the plate at rest into a folder; returns the files.
+
+    It stands as `sim_plate_scene` has it.
+    """
+    scene = sim_plate_scene(recipe, seed, rig_plate)
     paths = [folder / f"plate-{n:02d}.jpg" for n in range(1, count + 1)]
     for path in paths:
         path.write_bytes(_plate_jpeg(scene, target, (0.0, OPENINGS_DEG[0]), recipe, path, seed))
@@ -110,13 +118,13 @@ def render_plate_photographs(
 
 
 def render_card_photographs(
-    recipe: "Recipe", folder: Path, seed: int
+    recipe: "Recipe", folder: Path, seed: int, rig_plate: Pose | None = None
 ) -> dict[Path, tuple[float, float]]:
     """Render photographs of the rig's card.
 
     Returns the files with the rig's stance in each: advance (mm) and opening (deg).
     """
-    scene = sim_plate_scene(recipe, seed)
+    scene = sim_plate_scene(recipe, seed, rig_plate)
     stances = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
     found = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
     for path, stance in found.items():
@@ -124,21 +132,42 @@ def render_card_photographs(
     return found
 
 
-def render_frames(recipe: "Recipe", seed: int, count: int) -> Iterator[Frame]:
-    """Render what a camera sees while the plate moves 0.3 mm per picture along its cut.
+def render_frame(
+    scene: PlateScene, recipe: "Recipe", stance: tuple[float, float], seed: int, number: int
+) -> NDArray[np.uint8]:
+    """Render one picture of a running camera, (height, width, 3).
 
-    Every eighth picture is black.
+    ``stance`` is the rig's advance (mm) and opening (deg); ``number`` gives each picture of a seed
+    another noise.
     """
-    scene = sim_plate_scene(recipe, seed)
-    start = scene.rig_plate
-    for number in range(count):
-        shift = start.shift_m + 3e-4 * number * start.rotation[:, 0]
-        moved = replace(scene, rig_plate=Pose(start.rotation, shift))
-        rng = np.random.default_rng([seed, 11, number])
-        image = _plate_picture(moved, PLATE_BOARD, (0.0, OPENINGS_DEG[0]), recipe, rng)
-        if number % 8 == 7:
-            image = np.zeros_like(image)
-        yield Frame(number, number / FRAMES_PER_S, image, count)
+    return _plate_picture(
+        scene, PLATE_BOARD, stance, recipe, np.random.default_rng([seed, 11, number])
+    )
+
+
+def standing_plate(recipe: "Recipe") -> Pose | None:
+    """Where the plate of a recipe's simulated day stands; None where it is drawn.
+
+    A plate whose pose the scene estimates is cut, and is drawn between the blades; one that is not
+    cut by its pose is there to be touched, where the specimen has it.
+    """
+    if recipe.specimen is None or recipe.scene.plate_pose == "estimated":
+        return None
+    return touched_plate(recipe.specimen)
+
+
+def touched_plate(name: str) -> Pose | None:
+    """Where a specimen's file has the plate that the blade's tip touches; None without one.
+
+    By code that the virtual rig does not share.
+    """
+    with specimen_path(name).open("rb") as file:
+        plate = tomllib.load(file).get("plate")
+    if plate is None:
+        return None
+    lean = [np.radians(plate.get(f"{angle}_deg", 0.0)) for angle in ("pitch", "yaw", "roll")]
+    turned = about(2, lean[0]) @ about(1, lean[1]) @ about(0, lean[2])
+    return Pose(turned @ LEVEL, 1e-3 * np.array(plate["place_mm"]))
 
 
 def _view_of(

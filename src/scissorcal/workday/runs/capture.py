@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import parse_recipe, read_text
-from scissorcal.recipe.requirements import CaptureKind, requirements
+from scissorcal.recipe.requirements import DesignedKind, requirements
 from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.design import designed_for
@@ -42,6 +42,8 @@ class Until:
     tell: "Callable[[UntilMark], None] | None" = None
 
 
+ADVANCE: Literal["friction-advance"] = "friction-advance"
+
 THEN = (
     "The capture follows at once: keep clear, as the motors move the blades and the sledge along "
     "the whole of its path."
@@ -63,7 +65,7 @@ class Captured:
 
 def capture_into(
     workspace: Workspace,
-    kind: CaptureKind,
+    kind: DesignedKind,
     device: str,
     *,
     hand: bool = False,
@@ -148,9 +150,54 @@ def capture_into(
         return Captured(path, report, f"{link.identity.name} {link.identity.serial}")
 
 
+def capture_advance_into(
+    workspace: Workspace,
+    device: str,
+    *,
+    seed: int = 0,
+    baud: int | None = None,
+    realtime: bool = False,
+    progress: "CaptureProgress | None" = None,
+    confirm: "Confirm | None" = None,
+    say: "Say | None" = None,
+) -> Captured:
+    """Record empty motion of the sledge into captures/friction-advance-<stamp>.mcap.
+
+    As `capture_into`; it may be done for any scene. Raises InputError for a rig without an advance
+    motor or without travel, before anything moves.
+    """
+    from scissorcal.device.advance_trajectory import advance_plan, refuse_without_motor
+    from scissorcal.device.capture import capture_friction_advance, open_writer
+
+    recipe = workspace.recipe()
+    text = read_text(workspace.recipe_path)
+    line = line_of(recipe, baud)
+    run = len(workspace.recordings(ADVANCE))
+    with open_rig(device, recipe.specimen, seed, run=run, realtime=realtime, line=line) as link:
+        refuse_without_motor(link.identity)
+        advance_plan(recipe, link.identity)
+        once = _Once(confirm) if confirm else None
+        probe = ensure_probed(workspace, link, recipe, confirm=once, say=say)
+        too_slow = sliding_below_encoder(recipe, link.identity)
+        if too_slow and say is not None:
+            say(too_slow)
+        path = workspace.new_recording(ADVANCE)
+        with open_writer(path, ADVANCE, link, recipe, text, probe=probe) as writer:
+            report = capture_friction_advance(
+                link,
+                recipe,
+                writer,
+                progress,
+                confirm=confirm,
+                probe=probe,
+                cleared=once is not None and once.asked,
+            )
+    return Captured(path, report, f"{link.identity.name} {link.identity.serial}")
+
+
 def _capture_until(
     workspace: Workspace,
-    kind: CaptureKind,
+    kind: DesignedKind,
     link: "Link",
     until: Until,
     earlier: "Earlier",
@@ -207,7 +254,7 @@ def _capture_until(
     return Captured(path, report, rig, choice.marks[-1])
 
 
-def _earlier(engine: "Engine", kind: CaptureKind) -> "Earlier":
+def _earlier(engine: "Engine", kind: DesignedKind) -> "Earlier":
     """The fits that are current and their recordings; a cut needs the fit of friction."""
     from scissorcal.calibration.design.state import fitted_cut
     from scissorcal.workday.recordings import used_recordings
@@ -215,7 +262,7 @@ def _earlier(engine: "Engine", kind: CaptureKind) -> "Earlier":
     from scissorcal.workday.runs.fit import available, load_result
     from scissorcal.workday.until import Earlier
 
-    def used(what: CaptureKind) -> "tuple[Recording, ...]":
+    def used(what: DesignedKind) -> "tuple[Recording, ...]":
         there = any(row.use == "used" for row in engine.recordings(what))
         found = used_recordings(engine.workspace, engine.recipe, what, engine.index)
         return found if there else ()
@@ -253,11 +300,7 @@ def speeds_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
     Below the rate's floor, which the encoder's step and the fit's cutoff give, the sign of the
     rate is noise.
     """
-    from scissorcal.calibration.signals.filtering import rate_floor_of_step
-    from scissorcal.calibration.signals.weak_form import RATE_BAND
-
-    band_Hz = RATE_BAND * recipe.fit.friction.cutoff_Hz
-    floor = rate_floor_of_step(identity.opening_resolution, band_Hz, 1e6 / identity.tick_us)
+    floor = _rate_floor(identity.opening_resolution, recipe.fit.friction.cutoff_Hz, identity)
     slow = [speed for speed in recipe.capture.friction.speeds_rad_per_s if speed <= floor]
     if not slow:
         return ""
@@ -267,3 +310,26 @@ def speeds_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
         f"{identity.opening_resolution:.2g} rad tells the sense of motion from {floor:.2g} rad/s "
         "on. Leave them out of capture.friction.speeds_rad_per_s, or lower fit.friction.cutoff_Hz."
     )
+
+
+def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
+    """As `speeds_below_encoder`, of the sledge."""
+    cutoff_Hz = recipe.fit.friction_advance.cutoff_Hz
+    floor = _rate_floor(identity.advance_resolution, cutoff_Hz, identity)
+    planned = recipe.capture.friction_advance.speeds_mm_per_s
+    slow = ", ".join(f"{speed:g}" for speed in planned if speed <= 1e3 * floor)
+    if not slow:
+        return ""
+    return (
+        f"Sweeps at {slow} mm/s will not be used: an encoder with a step of "
+        f"{1e6 * identity.advance_resolution:.2g} um tells the sense of motion from "
+        f"{1e3 * floor:.2g} mm/s on. Leave them out of capture.friction_advance.speeds_mm_per_s, "
+        "or lower fit.friction_advance.cutoff_Hz."
+    )
+
+
+def _rate_floor(resolution: float, cutoff_Hz: float, identity: "Identity") -> float:
+    from scissorcal.calibration.signals.filtering import rate_floor_of_step
+    from scissorcal.calibration.signals.weak_form import RATE_BAND
+
+    return rate_floor_of_step(resolution, RATE_BAND * cutoff_Hz, 1e6 / identity.tick_us)

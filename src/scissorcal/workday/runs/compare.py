@@ -72,7 +72,10 @@ def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
     from scissorcal.report import Side, document_of
 
     engine = Engine.of(workspace)
-    fits = [load_result(engine, what) for what in available(engine, ("friction", "cut"))]
+    fits = [
+        load_result(engine, what)
+        for what in available(engine, ("friction", "friction-advance", "cut"))
+    ]
     if not fits:
         raise MissingError(f"{source} has no current fit: run 'scissorcal fit' there first.")
     return Side(source, document_of(engine.recipe, fits))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.identity import digest
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def design_captures(workspace: Workspace, identity: "Identity | None" = None) ->
 
 
 def designed_for(
-    workspace: Workspace, kind: CaptureKind, identity: "Identity"
+    workspace: Workspace, kind: DesignedKind, identity: "Identity"
 ) -> tuple["Recipe", str]:
     """The recipe whose captures are designed for a rig, and a sentence about the list.
 

@@ -79,7 +79,7 @@ def fit_workspace(
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> tuple[FitOutcome, ...]:
-    """Run the fits in ``wanted`` ("camera", "blade", "plate", "friction", "cut"), or all required.
+    """Run the fits in ``wanted`` ("camera", "blade", "friction-advance", ...), or all required.
 
     A fit whose identity equals that of the stored one is read back; ``force`` does those in
     ``wanted`` again all the same. Fits that a wanted one builds on are run first where they are
@@ -113,7 +113,8 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
     needed = [step for step in steps_of("fit") if engine.needed(step.name)]
     for what in wanted:
         step = BY_NAME[f"fit {what}"]
-        if step not in needed and BY_NAME[step.inputs[0]].kind == "recordings":
+        of_rig = BY_NAME[step.inputs[0]].kind == "recordings"
+        if step not in needed and of_rig and not step.on_request:
             listed = " and ".join(step.what for step in needed)
             raise InputError(
                 f"{engine.workspace.recipe_path}: this scene requires no fit of {what}. It "
@@ -208,7 +209,7 @@ def pictures_beside(path: Path) -> tuple[Path, ...]:
 def _usable(engine: Engine, step: Step) -> bool:
     state = engine.state(step.name)
     current = state.state not in ("missing", "stale", "excluded") and bool(state.content)
-    return current and engine.needed(step.name)
+    return current and engine.shown(step.name)
 
 
 def _must_run_first(engine: Engine, item: str) -> bool:
@@ -216,7 +217,7 @@ def _must_run_first(engine: Engine, item: str) -> bool:
     return (
         step.kind == "fit"
         and not item.endswith("?")
-        and engine.needed(step.name)
+        and engine.shown(step.name)
         and engine.state(step.name).state in ("missing", "stale")
     )
 

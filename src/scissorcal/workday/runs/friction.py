@@ -7,7 +7,10 @@ from scissorcal.workday.facts import UNFINISHED
 from scissorcal.workday.recordings import used_recordings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from scissorcal.calibration.result import FitResult
+    from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.fit import Made, Request
 
@@ -17,17 +20,30 @@ STREAM = 0
 
 def fit(engine: "Engine", request: "Request") -> "Made":
     """Fit friction to the used recordings of empty motion."""
+    from scissorcal.calibration.friction.fit import fit_friction
+
+    return fitted(fit_friction, engine.recipe.fit.friction, "friction", STREAM, engine, request)
+
+
+def fitted(
+    fit_by: "Callable[..., FitResult]",
+    settings: object,
+    kind: "CaptureKind",
+    stream: int,
+    engine: "Engine",
+    request: "Request",
+) -> "Made":
+    """Fit an axis by its function and settings to the used recordings of a kind."""
     import numpy as np
 
-    from scissorcal.calibration.friction.fit import fit_friction
     from scissorcal.workday.runs.fit import Made
 
-    request.progress(0.0, "friction: reading recordings")
-    result = fit_friction(
-        used_recordings(engine.workspace, engine.recipe, "friction", engine.index),
-        engine.recipe.fit.friction,
+    request.progress(0.0, f"{kind}: reading recordings")
+    result = fit_by(
+        used_recordings(engine.workspace, engine.recipe, kind, engine.index),
+        settings,
         effort=request.effort,
-        rng=np.random.default_rng([request.seed, STREAM]),
+        rng=np.random.default_rng([request.seed, stream]),
         progress=request.progress,
         checkpoint=request.checkpoint,
         last_chosen=request.last_model or None,

@@ -19,7 +19,7 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
     from scissorcal.package import ModelPackage
-    from scissorcal.render import RenderResult, RigFacts, VirtualStrokes
+    from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
     from scissorcal.render.watch import Progress
 
 
@@ -46,14 +46,16 @@ def render_workspace(
     progress: "Progress | None" = None,
     confirm: "Confirm | None" = None,
     say: "Say | None" = None,
+    plate: "PoseSource | None" = None,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
     ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``, in
     virtual time unless ``realtime``; ``baud`` takes the place of the recipe's rate. The samples go
     to captures/render-<stamp>.mcap unless ``record`` is False. A rig without a probe that counts is
-    probed first (`ensure_probed`), and ``say`` tells so. Raises MissingError
-    where there is no package, and what opening it, the rig and the rendering raise.
+    probed first (`ensure_probed`), and ``say`` tells so. ``plate`` tracks a plate whose pose the
+    scene estimates; without it the pose fitted to photographs is taken. Raises MissingError
+    where there is no package or no pose, and what opening it, the rig and the rendering raise.
     """
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
@@ -85,6 +87,7 @@ def render_workspace(
                 progress=progress,
                 confirm=confirm,
                 rig=with_probe(_known_rig(workspace, package), probe),
+                plate=plate,
             )
     if package_path is None:
         _write_admission(workspace.package_path(recipe), done, rig)

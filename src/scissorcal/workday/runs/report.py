@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.report import Cell, Geometry
 
-RIG: "tuple[CaptureKind, ...]" = ("friction", "cut")
+RIG: "tuple[CaptureKind, ...]" = ("friction", "friction-advance", "cut")
 
 
 @dataclass(frozen=True)

@@ -1,111 +1,335 @@
-"""A workspace's track: the plate's pose from picture to picture, a line of JSON for each."""
+"""Track a workspace's plate: its pose from pictures and contacts, live, into a recording."""
 
-from collections.abc import Callable, Iterable
-from contextlib import suppress
-from datetime import UTC, datetime
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel
+import numpy as np
 
-from scissorcal.calibration.plate.fit import plate_target
-from scissorcal.calibration.plate.track import (
-    TrackHead,
-    TrackRow,
-    TrackSummary,
-    track_row,
-    track_summary,
-    why_no_pose,
-)
-from scissorcal.errors import InputError
-from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-from scissorcal.vision.track import STATES, track
+from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.recipe.load import read_text
+from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+from scissorcal.verdicts import Verdict
+from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision.live import frames_of, timed
+from scissorcal.vision.track import STATES, State
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.rigs import SIM, line_of, open_rig
 from scissorcal.workday.runs.fit import load_result
-from scissorcal.workday.runs.plate import locate_workspace_rig
+from scissorcal.workday.tracking import feeds, inputs
+from scissorcal.workday.tracking.feeds import Feed
+from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
+from scissorcal.workday.tracking.session import Tell, TrackSession
+from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.vision.live import Frame
+    from scissorcal.device.link import Link
+    from scissorcal.device.motion import Motion
+    from scissorcal.recipe.schema import Recipe
 
-Progress = Callable[[float, str], None]
+NONE = "none"
+PATIENCE_S = 10.0
+"""Without a pose to start from for so long, a track ends and says why."""
+SIM_CAMERA_S, SIM_RIG_S = 2.4, 6.0
+
+
+@dataclass(frozen=True)
+class TrackResult:
+    """A finished track: its recording (None where one was followed again), its pose at the end, and
+    what became of pictures and contacts.
+
+    ``states`` counts pictures; ``longest_gap_s`` is the longest time between two pictures with a
+    pose, or to either end. ``quaternion`` (w, x, y, z), ``translation_m`` and ``covariance`` (6, 6)
+    are the pose at the last row in ``frame``; sd are those of its worst axis.
+    """
+
+    path: Path | None
+    source: str
+    frame: Literal["rig", "camera"]
+    rig: str
+    seconds: float
+    pictures: int
+    poses: int
+    states: dict[State, int]
+    longest_gap_s: float
+    travel_mm: float
+    state: str
+    quaternion: tuple[float, float, float, float]
+    translation_m: tuple[float, float, float]
+    covariance: tuple[tuple[float, ...], ...]
+    sd_mm: float
+    sd_deg: float
+    figures: TrackFigures
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def drop_outs(self) -> int:
+        """Pictures without a pose."""
+        return self.pictures - self.poses
 
 
 def track_plate(
     workspace: Workspace,
-    frames: Iterable["Frame"],
-    source: str,
+    camera: str = NONE,
+    device: str = NONE,
     *,
     seconds: float | None = None,
-    progress: Progress | None = None,
-) -> TrackSummary:
-    """Follow the plate from picture to picture into captures/track-<stamp>.jsonl.
+    camera_delay_ms: float | None = None,
+    seed: int = 0,
+    baud: int | None = None,
+    tell: "Tell | None" = None,
+) -> TrackResult:
+    """Follow the plate by a camera, by contacts of a rig's blade tip, or by both, and record it.
 
-    A line is written, and given to the operating system, as soon as its picture is located, so that
-    a killed track ends with its last whole line. Poses are in the rig's frame where its card tells
-    all of it. Ends after ``seconds``, with the pictures, or by an interrupt from the keyboard.
-    Raises InputError, and keeps nothing, where no picture showed the target.
+    ``camera`` is a camera's number, a video file, a track's recording (which is followed again, by
+    the recipe as it is now), "sim" or "none"; ``device`` a port, "sim" or "none". The rig's motors
+    stay off: a person moves the handles (or the virtual hand does). Without a camera the pose of
+    the fit of the plate is the start. ``camera_delay_ms`` takes the place of the recipe's
+    plate.tracking.camera_delay_ms. Ends after ``seconds``, with the pictures, or by an interrupt
+    from the keyboard; "sim" ends by itself. ``tell`` is called after each picture and each block of
+    samples. Into captures/track-<stamp>.mcap go samples, pictures and the pose after each of them,
+    within a quarter of a second, so that a killed track keeps them.
+
+    Raises InputError, and keeps nothing, where no pose was found within `PATIENCE_S` or the sources
+    do not fit together; MissingError where a fit or the rig's frame is missing; DeviceError where
+    camera, rig or a clock fails.
+
+    >>> from scissorcal.workday.workspace import find_workspace
+    >>> found = track_plate(find_workspace(), "0", "/dev/ttyUSB0", seconds=10)  # doctest: +SKIP
+    >>> found.state, found.sd_mm  # doctest: +SKIP
+    ('fused', 0.08)
     """
     engine = Engine.of(workspace)
-    fitted = load_result(engine, "camera")
-    located = locate_workspace_rig(engine, fitted.camera)
-    rig = None if located is None or located.untold else located
-    back = plate_target(engine.recipe).inverse()
-    head = TrackHead(
-        source=Path(source).name,
-        started_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        frame="rig" if rig else "camera",
-        camera_inputs_hash=fitted.inputs_hash,
-    )
-    workspace.captures_dir.mkdir(parents=True, exist_ok=True)
-    path = _new_path(workspace)
-    rows: list[TrackRow] = []
-    targets, priors = (PLATE_BOARD, PLATE_STRIP), engine.recipe.fit.plate.priors
-    counted = _counted(frames, seconds, rows, progress)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            _append(file, head)
-            with suppress(KeyboardInterrupt):
-                for seen in track(counted, targets, fitted.camera, priors):
-                    rows.append(track_row(seen, fitted.camera, back, rig))
-                    _append(file, rows[-1])
-    finally:
-        if not any(row.pose for row in rows):
-            path.unlink(missing_ok=True)
-    if not any(row.pose for row in rows):
-        raise InputError(f"{source}: {why_no_pose(rows)} Nothing was kept.")
-    return track_summary(path, head, rows)
+    if camera.endswith(".mcap"):
+        return _again(engine, Path(camera), camera_delay_ms, tell)
+    feeds.refuse_strange_pairs(camera, device)
+    recipe = _with_delay(engine.recipe, camera_delay_ms)
+    with _opened(engine, recipe, camera, device, seed, baud) as opened:
+        return _follow(engine, recipe, opened, camera, seconds or opened.default_s, tell)
 
 
-def _counted(
-    frames: Iterable["Frame"],
-    seconds: float | None,
-    rows: list[TrackRow],
-    progress: Progress | None,
-) -> Iterable["Frame"]:
-    """Pictures up to the time asked for, saying now and then how it goes."""
-    for frame in frames:
-        if seconds is not None and frame.time_s >= seconds:
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """Everything that a track is fed from."""
+
+    feed: Feed
+    eye: PlateEye | None
+    link: "Link | None"
+    default_s: float | None
+
+
+@contextmanager
+def _opened(
+    engine: Engine, recipe: "Recipe", camera: str, device: str, seed: int, baud: int | None
+) -> Iterator[_Opened]:
+    """Open camera and device, or the simulated world of both."""
+    eye = inputs.plate_eye(engine, recipe, needs_rig=device != NONE) if camera != NONE else None
+    with ExitStack() as stack:
+        if SIM in (camera, device):
+            world = SimWorld(recipe, seed, rig=device == SIM)
+            if device != SIM and eye is not None:
+                yield _Opened(feeds.sim_feed(world, eye), eye, None, SIM_CAMERA_S)
+                return
+            motion = stack.enter_context(feeds.idle_rig(world.link, recipe))
+            feed = feeds.sim_rig_feed(world, motion, eye)
+            yield _Opened(feed, eye, world.link, SIM_RIG_S)
             return
-        if progress:
-            share = frame.time_s / seconds if seconds else 0.0
-            done = frame.number / frame.count if frame.count else share
-            lost = sum(row.pose is None for row in rows)
-            last = f"{STATES[rows[-1].state]}; " if rows else ""
-            progress(done, f"picture {frame.number}: {last}{lost} drop-outs so far")
-        yield frame
+        link: Link | None = None
+        on: Motion | None = None
+        if device != NONE:
+            line = line_of(recipe, baud)
+            link = stack.enter_context(open_rig(device, recipe.specimen, seed, line=line))
+            feeds.refuse_without_sledge(link)
+            on = stack.enter_context(feeds.idle_rig(link, recipe))
+        frames = frames_of(camera) if camera != NONE else None
+        if eye is not None and frames is not None and not camera.isdigit():
+            yield _Opened(feeds.video_feed(timed(frames, camera), eye), eye, None, None)
+            return
+        yield _Opened(feeds.live_feed(stack, eye, frames, on), eye, link, None)
 
 
-def _append(file: TextIO, line: BaseModel) -> None:
-    file.write(line.model_dump_json() + "\n")
-    file.flush()
+def _follow(
+    engine: Engine,
+    recipe: "Recipe",
+    opened: _Opened,
+    camera: str,
+    seconds: float | None,
+    tell: Tell | None,
+) -> TrackResult:
+    workspace, link, eye = engine.workspace, opened.link, opened.eye
+    about = inputs.track_about(engine, recipe, camera, eye)
+    known = inputs.known_pose(engine) if eye is None else None
+    recorder = TrackRecorder(
+        workspace.new_recording("track"),
+        read_text(workspace.recipe_path),
+        _facts(link, recipe),
+        link.identity.handle_radius if link else math.nan,
+        opened.feed.base_ns,
+    )
+    try:
+        session = _session(engine, recipe, about, link, recorder, opened.feed.base_ns, tell)
+        _feed(session, opened.feed, seconds, known)
+    except BaseException as error:
+        kept = recorder.close(keep=recorder.estimates > 0, note=f"The track ended early: {error}")
+        if isinstance(error, ScissorcalError) and kept is not None:
+            error.kept = (kept,)
+        raise
+    for sentence in _notes(session):
+        recorder.note(sentence)
+    path = recorder.close(keep=session.started)
+    if not session.started:
+        source = Path(camera).name if camera != NONE else "The rig"
+        raise InputError(f"{source}: {session.why_waiting()} Nothing was kept.")
+    rig = f"{link.identity.name} {link.identity.serial}" if link else ""
+    return _result(session, path, rig)
 
 
-def _new_path(workspace: Workspace) -> Path:
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-    path = workspace.captures_dir / f"track-{stamp}.jsonl"
-    number = 1
-    while path.exists():
-        number += 1
-        path = workspace.captures_dir / f"track-{stamp}-{number}.jsonl"
-    return path
+def _again(
+    engine: Engine, path: Path, camera_delay_ms: float | None, tell: Tell | None
+) -> TrackResult:
+    """Follow what a track was given once more, by the recipe as it is now; record nothing."""
+    track = read_track(path)
+    camera = load_result(engine, "camera")
+    inputs.refuse_other_camera(path, track, camera)
+    recipe = _with_delay(engine.recipe, camera_delay_ms)
+    about = replace(track.about, camera_delay_ms=recipe.plate.tracking.camera_delay_ms)
+    contacts, known = inputs.tip_contacts(engine, recipe) if len(track.samples) else (None, True)
+    session = TrackSession(
+        recipe,
+        inputs.surface_of(engine, recipe),
+        about,
+        drive=inputs.rig_drive(engine, track.handle_radius_m) if len(track.samples) else None,
+        contacts=contacts,
+        friction_known=known,
+        calibrated=camera.camera.covariance is not None,
+        base_ns=track.base_ns,
+        tell=tell,
+    )
+    feed = feeds.recorded_feed(track)
+    _feed(session, feed, None, None)
+    if not session.started:
+        raise InputError(f"{path.name}: {session.why_waiting()}")
+    return _result(session, None, str(track.device.get("name", "")))
+
+
+def _feed(
+    session: TrackSession,
+    feed: Feed,
+    seconds: float | None,
+    known: inputs.KnownPose | None,
+) -> None:
+    """Pass on events until the time is over, the stream ends, or no pose comes."""
+
+    first = math.nan
+    with suppress(KeyboardInterrupt):
+        for event in feed.events:
+            if isinstance(event, PlatePicture):
+                first = event.arrived_s if math.isnan(first) else first
+                if seconds is not None and event.arrived_s - first >= seconds:
+                    break
+                session.take_picture(event)
+            else:
+                session.take_samples(event)
+                if known is not None and not session.started:
+                    session.start_known(*known)
+            late = seconds is not None and session.elapsed_s >= seconds
+            if late or (not session.started and session.elapsed_s >= PATIENCE_S):
+                break
+    session.finish()
+
+
+def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
+
+    follower = session.follower
+    delay = session.delay
+    figures = track_figures(follower, delay)
+    found = follower.tracker.estimate()
+    pose = Pose.from_matrix(found.rotation, found.place_m)
+    sds = np.sqrt(np.diag(found.covariance))
+    pictures = sum(session.states.values())
+    return TrackResult(
+        path=path,
+        source=session.about.source,
+        frame=session.about.frame,
+        rig=rig,
+        seconds=session.elapsed_s,
+        pictures=pictures,
+        poses=session.states["seen"] + session.states["ambiguous"],
+        states={state: session.states[state] for state in STATES},
+        longest_gap_s=max(session.gaps, default=0.0),
+        travel_mm=1e3 * session.travel_m,
+        state=follower.state,
+        quaternion=pose.quaternion,
+        translation_m=pose.translation_m,
+        covariance=tuple(tuple(row) for row in found.covariance.tolist()),
+        sd_mm=float(1e3 * sds[3:].max()),
+        sd_deg=float(np.degrees(sds[:3].max())),
+        figures=figures,
+        verdicts=track_verdicts(figures),
+        notes=_notes(session),
+    )
+
+
+def _notes(session: TrackSession) -> tuple[str, ...]:
+    """Sentences on clocks, stamps and the camera's delay."""
+    follower = session.follower
+    said = [clock.sentence for clock in (follower.camera, follower.rig) if clock and clock.known]
+    if session.unstamped:
+        said.append(
+            "The camera states no time of its pictures, so times of arrival were used: what varies "
+            "in their delivery counts as motion."
+        )
+    if session.delay is not None:
+        said.append(session.delay.sentence)
+    return tuple(said)
+
+
+def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
+    if camera_delay_ms is None:
+        return recipe
+    tracking = recipe.plate.tracking.model_copy(update={"camera_delay_ms": camera_delay_ms})
+    plate = recipe.plate.model_copy(update={"tracking": tracking})
+    return recipe.model_copy(update={"plate": plate})
+
+
+def _session(
+    engine: Engine,
+    recipe: "Recipe",
+    about: TrackAbout,
+    link: "Link | None",
+    recorder: TrackRecorder,
+    base_ns: int,
+    tell: Tell | None,
+) -> TrackSession:
+
+    contacts, known, drive = None, True, None
+    if link is not None:
+        drive = inputs.rig_drive(engine, link.identity.handle_radius, link)
+        contacts, known = inputs.tip_contacts(engine, recipe)
+    calibrated = True
+    if about.camera_inputs_hash:
+        calibrated = load_result(engine, "camera").camera.covariance is not None
+    return TrackSession(
+        recipe,
+        inputs.surface_of(engine, recipe),
+        about,
+        drive=drive,
+        contacts=contacts,
+        friction_known=known,
+        calibrated=calibrated,
+        recorder=recorder,
+        base_ns=base_ns,
+        tell=tell,
+    )
+
+
+def _facts(link: "Link | None", recipe: "Recipe") -> dict[str, Any]:
+    from scissorcal.device.capture import rig_facts
+
+    return {} if link is None else rig_facts(link.identity, recipe.rig.motor_sign, None)

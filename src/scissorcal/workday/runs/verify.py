@@ -117,7 +117,7 @@ def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
     """What is checked: the wanted fits, or those of the rig that are current."""
     if wanted:
         return list(wanted)
-    kinds: tuple[FitKind, ...] = ("friction", "cut")
+    kinds: tuple[FitKind, ...] = ("friction", "friction-advance", "cut")
     there = available(engine, kinds)
     if not there:
         raise MissingError("There is no fit to check yet: run 'scissorcal fit' first.")
@@ -129,6 +129,7 @@ def _experiment(
 ) -> "tuple[Experiment, Simulator, dict[int, int]]":
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
     from scissorcal.calibration.cut import cut_experiment
+    from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
     from scissorcal.calibration.friction.fit import friction_experiment
     from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
 
@@ -138,6 +139,11 @@ def _experiment(
         settings = recipe.fit.friction
         empty = friction_experiment(recordings, settings, fit)
         return empty, friction_simulator(recordings, settings, fit, empty.layout), {}
+    if kind == "friction-advance":
+        own = recipe.fit.advance
+        slid = sliding_joints(recordings, actuation_of(fit), own.lack_of_fit)
+        empty = friction_experiment(slid, own, fit)
+        return empty, friction_simulator(slid, own, fit, empty.layout), {}
     edge, _ = edge_of_photographs(engine)
     friction: FitResult = load_result(engine, "friction")
     design = cut_experiment(recordings, recipe, friction, fit, edge)

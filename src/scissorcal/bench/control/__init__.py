@@ -1,0 +1,1 @@
+"""What contact adds to a camera: the pose's errors and the control's, measured in simulation."""

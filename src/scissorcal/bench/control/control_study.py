@@ -1,0 +1,321 @@
+"""Control by force and by place, with the pose from vision, from the fused filter, and as it is."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.bench.control import arm as true_arm
+from scissorcal.bench.control.arm import Arm
+from scissorcal.bench.control.objects import Plate
+from scissorcal.bench.control.traps import settings_for
+from scissorcal.bench.control.world import (
+    COMPLIANCE,
+    COMPLIANCE_SPREAD,
+    CONTACT_HZ,
+    FORCE_N,
+    FORCE_NOISE_N,
+    FORCE_ZERO_N,
+    SLOW_M,
+    SLOW_S,
+    WHITE_M,
+    Scenario,
+    Seen,
+    pictures_of,
+    plate_motion,
+    slow_process,
+)
+from scissorcal.control.contact_loop import ContactLoop
+from scissorcal.control.gains import HybridGains, choose_gains
+from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inputs
+from scissorcal.tracking.rotation import cross
+from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.tracker import PoseEstimate, PoseTracker
+
+Array = NDArray[np.float64]
+
+LAWS = ("hybrid", "stiff position", "soft position")
+POSES = ("vision", "fused", "true")
+SECONDS = 12.0
+SETTLED_S = 6.0
+"""Errors count from then on: the tip has touched, and has been all along its path once."""
+LEARN_S = 1.0
+"""Time of pictures before the tip moves."""
+START_ABOVE_M = 3e-3
+RATE_CUTOFF_HZ = 400.0
+TOUCH_TICKS = 100
+SOFTNESS = 0.04
+"""Stiffness of soft position control, as a share of the stiff one's."""
+FORCE_MOST_N = 6.0
+EFFORT_N = 40.0
+PEAK_N = 1.0
+FRICTION, ASSUMED_FRICTION = (0.1, 0.2), 0.15
+APPROACH_M_PER_S = 8e-3
+"""Speed at which the wanted gap of control by place falls to its aim."""
+
+
+@dataclass(frozen=True)
+class ControlRun:
+    """One run, after it has settled: errors as rms, along the path in metres, of the force in N.
+
+    ``touch_N`` is the largest force beyond the wanted one within 0.1 s of the first touch,
+    ``touch_bound_N`` the approach's speed times sqrt(k m) on top of the force at which touching
+    begins.
+    """
+
+    force_rms_N: float
+    path_rms_m: float
+    touch_N: float
+    touch_bound_N: float
+    contact_share: float
+    restarts: int
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """What control works with: rotation, place, their rates, compliance, the contact's offset."""
+
+    rotation: Array
+    place: Array
+    rates: Array
+    compliance: float
+    offset: float
+
+
+def control_run(scenario: Scenario, plate: Plate, law: str, source: str, seed: int) -> ControlRun:
+    """Follow the plate's path at 2.5 N for 12 s and judge it by the truth.
+
+    Control at 1 kHz in C, pose and contact rows at 100 Hz, pictures at 33 Hz and late. The same
+    seed draws the same plate, camera and sensors for every law and source.
+    """
+    scenario = replace(scenario, seconds=SECONDS)
+    rng = np.random.default_rng([seed, 3])
+    motion_rng, picture_rng, own = rng.spawn(3)
+    motion = plate_motion(scenario, motion_rng)
+    pictures = pictures_of(scenario, motion, picture_rng)
+    run = _Run(scenario, plate, law, source, motion, pictures, own)
+    for tick in range(round(scenario.seconds / true_arm.TICK_S)):
+        run.tick(tick)
+    return run.judge()
+
+
+class _Run:
+    """A control run from tick to tick."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        plate: Plate,
+        law: str,
+        source: str,
+        motion: Callable[[Array], tuple[Array, Array]],
+        pictures: Sequence[Seen],
+        rng: np.random.Generator,
+    ) -> None:
+        self.plate, self.source, self.pictures = plate, source, list(pictures)
+        self.tracker = PoseTracker(plate.surface, settings_for(scenario))
+        count = round(scenario.seconds / true_arm.TICK_S)
+        self.times: Array = true_arm.TICK_S * np.arange(count + 1, dtype=np.float64)
+        self.rotation, self.place = motion(self.times)
+        self.compliance = COMPLIANCE * (1.0 + COMPLIANCE_SPREAD * rng.standard_normal())
+        phase, rate = rng.uniform(0.0, 2.0 * np.pi), 2.0 * np.pi * rng.uniform(0.25, 0.35)
+        path = plate.path(np.maximum(self.times - LEARN_S, 0.0), phase, rate)
+        self.wanted, self.outward = plate.shape(*path)
+        start = self.wanted[0] + START_ABOVE_M * self.outward[0]
+        self.arm = Arm(
+            self.place[0] + self.rotation[0] @ start, self.compliance, rng.uniform(*FRICTION)
+        )
+        slow = slow_process(count + 1, true_arm.TICK_S, SLOW_S, rng) * SLOW_M
+        self.slow, self.white = slow, WHITE_M * rng.standard_normal((count + 1, 3))
+        self.noise = FORCE_ZERO_N * rng.standard_normal() + FORCE_NOISE_N * rng.standard_normal(
+            count + 1
+        )
+        self.gains = gains_of()
+        self.hybrid = Hybrid(config_of(self.gains, law))
+        self.mass = contact_loops()[0].mass_kg
+        self.given = hybrid_inputs(
+            dt=true_arm.TICK_S,
+            inertia=np.diag(true_arm.MASS_KG),
+            dry_friction=true_arm.COULOMB_N,
+            jacobian=true_arm.AXES,
+            force_wanted=FORCE_N,
+            surface_friction=ASSUMED_FRICTION,
+        )
+        self.before = self.arm.measured
+        self.seen_rate = np.zeros(3)
+        self.pose: _Pose | None = None
+        self.forces, self.errors, self.aims = np.zeros(count), np.zeros(count), np.zeros(count + 1)
+
+    def tick(self, tick: int) -> None:
+        time, arm = float(self.times[tick]), self.arm
+        rotation, place = self.rotation[tick], self.place[tick]
+        after_place = self.place[tick + 1] + self.rotation[tick + 1] @ (
+            rotation.T @ (arm.tip - place)
+        )
+        carried = (after_place - arm.tip) / true_arm.TICK_S
+        local = rotation.T @ (arm.tip - place)
+        assert self.plate.probe is not None
+        distance, normal = self.plate.probe(local)
+        normal = rotation @ normal
+        measured, force = self._measure(tick, normal)
+        if tick % round(1.0 / CONTACT_HZ / true_arm.TICK_S) == 0:
+            self._look(time, tick, measured + self.white[tick], force)
+        effort = self._effort(tick, measured, force)
+        arm.tick(effort, -distance, normal, carried)
+        self.forces[tick] = arm.reaction_N
+        apart = arm.tip - self.place[tick + 1] - self.rotation[tick + 1] @ self.wanted[tick + 1]
+        aside = self.rotation[tick + 1] @ self.outward[tick + 1]
+        apart = apart - aside * (aside @ apart)
+        if self.plate.axis is not None:
+            along = self.rotation[tick + 1] @ self.plate.axis
+            apart = apart - along * (along @ apart)
+        self.errors[tick] = float(np.linalg.norm(apart))
+
+    def judge(self) -> ControlRun:
+        ticks = round(SETTLED_S / true_arm.TICK_S)
+        late = self.forces[ticks:]
+        touched = np.flatnonzero(self.forces > 0.0)
+        first = int(touched[0]) if len(touched) else 0
+        bound = self.gains.approach_speed * math.sqrt(self.mass / self.compliance)
+        started = self.tracker.started
+        return ControlRun(
+            force_rms_N=float(np.sqrt(np.mean((late - FORCE_N) ** 2))),
+            path_rms_m=float(np.sqrt(np.mean(self.errors[ticks:] ** 2))),
+            touch_N=float((self.forces - self.aims[:-1])[first : first + TOUCH_TICKS].max()),
+            touch_bound_N=bound + self.hybrid.config.touch_force,
+            contact_share=float(np.mean(late > 0.0)),
+            restarts=self.tracker.estimate().counts.restarts if started else 0,
+        )
+
+    def _measure(self, tick: int, normal: Array) -> tuple[Array, float]:
+        """The tip by encoders, off by the slow error, and the measured force."""
+        joints = self.arm.measured
+        rate = (joints - self.before) / true_arm.TICK_S
+        self.before = joints
+        passed = 2.0 * math.pi * RATE_CUTOFF_HZ * true_arm.TICK_S
+        self.seen_rate = self.seen_rate + passed / (1.0 + passed) * (rate - self.seen_rate)
+        point = true_arm.AXES @ joints + normal * self.slow[tick]
+        return point, self.arm.reaction_N + float(self.noise[tick])
+
+    def _look(self, time: float, tick: int, point: Array, force: float) -> None:
+        """The outer loop: pictures that have arrived, a contact row, and the pose for control."""
+        while self.pictures and self.pictures[0].arrives_s <= time:
+            seen = self.pictures.pop(0)
+            self.tracker.picture(
+                CameraPose(
+                    seen.exposed_s, seen.rotation, seen.place_m, seen.covariance, seen.certain
+                )
+            )
+        if self.source == "true":
+            ahead = min(tick + 10, len(self.times) - 1)
+            moved = (self.place[ahead] - self.place[tick]) / 10e-3
+            turn = _turn_between(self.rotation[tick], self.rotation[ahead]) / 10e-3
+            rates = np.concatenate([turn, moved])
+            self.pose = _Pose(
+                self.rotation[tick], self.place[tick], rates, self.compliance, self.slow[tick]
+            )
+            return
+        if self.source == "fused" and self.hybrid.touching:
+            self.tracker.contact(time, point, force)
+        if self.tracker.started:
+            self.pose = _pose_of(self.tracker.estimate(time))
+
+    def _effort(self, tick: int, point: Array, force: float) -> Array:
+        pose = self.pose
+        if pose is None or self.times[tick] < LEARN_S:
+            return np.zeros(3)
+        away = point - pose.place
+        here = self.plate.surface.at(pose.rotation.T @ away)
+        steep = float(np.linalg.norm(here.gradient))
+        normal = pose.rotation @ here.gradient / steep
+        spin, speed = pose.rates[:3], pose.rates[3:]
+        carried = speed + cross(spin, away)
+        rate = true_arm.AXES @ self.seen_rate
+        slide = pose.rotation.T @ (rate - carried)
+        target = [self._target(tick + ahead, pose) for ahead in (-1, 0, 1)]
+        path_rate = (target[2] - target[0]) / (2.0 * true_arm.TICK_S) + carried
+        bend = (target[2] - 2.0 * target[1] + target[0]) / true_arm.TICK_S**2
+        given = self.given[0]
+        given["rate"] = self.seen_rate
+        given["bias"] = true_arm.VISCOUS_N_S_PER_M * self.seen_rate
+        given["point"], given["normal"], given["gap"] = point, normal, here.level / steep
+        given["surface_velocity"] = carried
+        given["surface_acceleration"] = -float(slide @ here.hessian @ slide) / steep
+        given["force"] = force
+        # Control by place gives way to the contact's force; its aim lies so much deeper.
+        softness = 1.0 / (self.mass * self.hybrid.config.normal_kp)
+        aim = pose.offset - (pose.compliance + softness) * FORCE_N
+        fallen = START_ABOVE_M - APPROACH_M_PER_S * (float(self.times[tick]) - LEARN_S)
+        given["gap_wanted"] = max(aim, fallen)
+        given["gap_rate_wanted"] = -APPROACH_M_PER_S if fallen > aim else 0.0
+        given["path"], given["path_rate"], given["path_acceleration"] = target[1], path_rate, bend
+        found = self.hybrid.step(self.given)[0]
+        self.mass = float(found["mass"]) or self.mass
+        self.aims[tick + 1] = found["force_aim"]
+        return np.asarray(found["effort"], dtype=np.float64)
+
+    def _target(self, tick: int, pose: _Pose) -> Array:
+        at = min(max(tick, 0), len(self.wanted) - 1)
+        return np.asarray(pose.place + pose.rotation @ self.wanted[at])
+
+
+def contact_loops() -> list[ContactLoop]:
+    """What the law meets along a normal of any direction: the lightest and the heaviest mass."""
+    mobilities = np.linalg.eigvalsh(
+        true_arm.AXES @ np.diag(1.0 / true_arm.MASS_KG) @ true_arm.AXES.T
+    )
+    return [
+        ContactLoop(
+            stiffness_N_per_m=1.0 / COMPLIANCE,
+            mass_kg=1.0 / float(mobility),
+            viscous_N_s_per_m=0.0,
+            delay_s=true_arm.TICK_S,
+            motor_lag_s=true_arm.MOTOR_LAG_S,
+            tick_s=true_arm.TICK_S,
+            rate_cutoff_Hz=RATE_CUTOFF_HZ,
+            step_m=true_arm.STEP_M,
+            stiffness_factor=1.5,
+        )
+        for mobility in (mobilities[0], mobilities[-1])
+    ]
+
+
+@cache
+def gains_of() -> HybridGains:
+    """Gains for the benchmark's arm and material."""
+    return choose_gains(contact_loops(), peak_N=PEAK_N)
+
+
+def config_of(gains: HybridGains, law: str) -> HybridConfig:
+    """The law of a name; soft position control has a 25th of the stiff one's stiffness."""
+    chosen = gains.settings()
+    if law == "soft position":
+        chosen["normal_kp"] *= SOFTNESS
+        chosen["normal_kd"] *= math.sqrt(SOFTNESS)
+    return HybridConfig(
+        axes=3,
+        normal_law=NormalLaw.FORCE if law == "hybrid" else NormalLaw.POSITION,
+        force_most=FORCE_MOST_N,
+        friction_rate=(2e-3, 2e-3, 2e-3),
+        effort_limit=(EFFORT_N, EFFORT_N, EFFORT_N),
+        **chosen,
+    )
+
+
+def _pose_of(found: PoseEstimate) -> _Pose:
+    return _Pose(
+        found.rotation,
+        found.place_m,
+        found.rates,
+        found.compliance_m_per_N,
+        found.contact_offset_m,
+    )
+
+
+def _turn_between(before: Array, after: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(after @ before.T).as_rotvec())

@@ -1,0 +1,114 @@
+"""``scissorcal control``"""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.output import Answer, command, note, table
+
+if TYPE_CHECKING:
+    from scissorcal.workday.runs.control import Controlled
+
+
+@command
+def control(
+    device: Device,
+    path_file: Annotated[
+        Path,
+        typer.Option(
+            "--path",
+            metavar="PATH.csv",
+            help="Points on the plate: x_mm, and y_mm, force_N, speed_mm_per_s where stated.",
+        ),
+    ],
+    force: Annotated[
+        float, typer.Option(callback=positive, metavar="N", help="Force along the normal.")
+    ] = 2.0,
+    speed: Annotated[
+        float, typer.Option(callback=positive, metavar="MM_PER_S", help="Along the path.")
+    ] = 10.0,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X_MM,Y_MM,PITCH_DEG",
+            help="Where the plate stands in the rig's plane; as it was fitted if not given.",
+        ),
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
+    realtime: Realtime = False,
+    yes: Yes = False,
+    seed: Seed = 0,
+    baud: Baud = None,
+    folder: Folder = None,
+) -> Answer:
+    """Press with the upper blade's tip on the plate, and follow a path on its surface.
+
+    Both motors move the tip; nobody holds the handles. Friction of both axes must be fitted
+    ('scissorcal capture friction', with --axis advance too), and the recipe states the plate's
+    surface and stiffness. With --device sim the specimen's plate is pressed on.
+
+    \b
+    Example:
+      $ scissorcal control --device sim --path path.csv --force 2 --pose 20,10,3
+      followed 40.0 mm of path with 2 N on scissorcal-sim office-paper
+      force 0.05 N rms and 0.10 N in 95 % off (known to 0.02 N), path 0.15 mm rms and ...
+      ...
+    """
+    from scissorcal.cli.live_view import LiveView
+    from scissorcal.workday.runs.control import control_workspace
+
+    workspace = open_workspace(folder)
+    with LiveView(ask=not yes) as view:
+        controlled = control_workspace(
+            workspace,
+            device,
+            path_file,
+            force_N=force,
+            speed_mm_per_s=speed,
+            pose=pose,
+            record=not no_record,
+            seed=seed,
+            baud=baud,
+            realtime=realtime,
+            progress=view.show,
+            confirm=view.confirm,
+            say=note,
+        )
+    result = asdict(controlled.result)
+    del result["verdicts"]
+    files = [controlled.recording] if controlled.recording else []
+    verdicts = controlled.result.verdicts
+    return Answer({**result, "rig": controlled.rig}, _text(controlled), verdicts, files)
+
+
+def _text(controlled: "Controlled") -> str:
+    done = controlled.result
+    figures = done.figures
+    peak = max(figures.peaks_N, default=float("nan"))
+    lines = [
+        f"followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N on {controlled.rig}",
+        f"force {figures.force_rms_N:.2f} N rms and {figures.force_95_N:.2f} N in 95 % off (known "
+        f"to {figures.force_sd_N:.2f} N), path {figures.path_rms_mm:.2f} mm rms and "
+        f"{figures.path_95_mm:.2f} mm in 95 %",
+        f"{figures.touches} touches, the hardest {peak:.2f} N; contact lost {figures.losses} "
+        f"times, let go of {figures.let_goes} times; {100 * figures.limited_share:.1f} % of the "
+        "ticks at a limit",
+        "",
+    ]
+    rows = [["gain", "", ""]]
+    rows += [
+        ["damping along the normal", f"{done.gains.contact_kd:.0f}", "1/s"],
+        ["integral of the force", f"{done.gains.force_ki:.0f}", "1/s"],
+        ["slowest decay", f"{done.gains.decay_per_s:.1f}", "1/s"],
+        ["path", f"{done.gains.path_kp:.0f}", "1/s^2"],
+    ]
+    lines += [table(rows, right=[1]), "", done.report.lag.sentence]
+    if done.report.rights is not None:
+        lines.append(done.report.rights.sentence)
+    if done.warnings:
+        lines += ["", *(f"note: {warning}" for warning in done.warnings)]
+    return "\n".join(lines)

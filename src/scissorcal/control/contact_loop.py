@@ -1,0 +1,212 @@
+"""The hybrid law pressing on elastic material as a sampled loop: phase, poles, decay. Pure.
+
+Along the normal the law (sc_hybrid.c) acts on
+
+    m x'' + b x' + k x = u(t - delay) behind a motor of first order, u held from tick to tick,
+
+x the indentation, by u = -m kd (estimated x') + h, where h holds k_I T times the sum of the errors
+of the measured force k x, behind its sensor's low-pass. Held efforts and a delay that is no whole
+number of ticks are exact (Astrom and Wittenmark, Computer-Controlled Systems, 1997, section 3.2).
+Without delay, lag and filters, and with b as all the damping, its characteristic polynomial is
+m s^3 + b s^2 + k s + k k_I, which is stable for k_I < b / m alone.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.control import rate_weight
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactLoop:
+    """What the law meets along the normal, in SI units.
+
+    ``mass_kg`` is 1 / (n^T J D^-1 J^T n) (``HYBRID_OUTPUT_DTYPE``'s ``mass``); it may be wrong by
+    ``mass_factor`` either way, and ``stiffness_N_per_m`` of the material by ``stiffness_factor``.
+    ``viscous_N_s_per_m`` is damping that the law's bias does not compensate. ``delay_s`` passes
+    from a measurement to the effort that answers it, without the time for which an effort is held;
+    ``motor_lag_s`` is the motor's time constant. The filters' cutoffs are 0 where there is none.
+    ``step_m`` is a count of the encoder, along the normal, which may change the force by
+    ``most_per_count_N`` (chosen: less than half of the 0.12 N by which a force may be off).
+    """
+
+    stiffness_N_per_m: float
+    mass_kg: float
+    viscous_N_s_per_m: float
+    delay_s: float
+    motor_lag_s: float
+    tick_s: float
+    rate_cutoff_Hz: float
+    force_cutoff_Hz: float = 0.0
+    step_m: float = 0.0
+    most_per_count_N: float = 0.05
+    stiffness_factor: float = 1.25
+    mass_factor: float = 1.15
+
+    @property
+    def phase_deg(self) -> float:
+        """By how much the damping lags where mass and material swing: sqrt(k/m) times its delays.
+
+        At 90 degrees damping gives no damping any more, and beyond it excites.
+        """
+        filtered = 0.0
+        if self.rate_cutoff_Hz > 0.0:
+            filtered = 1.0 / (2.0 * math.pi * self.rate_cutoff_Hz)
+        late = 0.5 * self.tick_s + self.delay_s + self.motor_lag_s + filtered
+        return math.degrees(math.sqrt(self.stiffness_N_per_m / self.mass_kg) * late)
+
+    @property
+    def corners(self) -> tuple[tuple[float, float], ...]:
+        """Stiffness and mass, as stated and wrong by their factors."""
+        return tuple(
+            (self.stiffness_N_per_m * stiffer, self.mass_kg * heavier)
+            for stiffer, heavier in product(
+                (1.0, 1.0 / self.stiffness_factor, self.stiffness_factor),
+                (1.0, 1.0 / self.mass_factor, self.mass_factor),
+            )
+        )
+
+
+@dataclass(frozen=True)
+class ContactGains:
+    """Damping along the normal and the force's integral, both 1/s; ``HybridConfig``'s names."""
+
+    contact_kd: float
+    force_ki: float
+
+
+def contact_poles(
+    loop: ContactLoop, gains: ContactGains, normal_kp: float = 0.0
+) -> NDArray[np.complex128]:
+    """Poles of the sampled loop at the stated stiffness and mass.
+
+    It settles where all are inside the unit circle. With ``force_ki = 0`` there is no integral;
+    with ``normal_kp`` (1/s^2) as well it is the loop of ``NormalLaw.POSITION`` while it presses.
+
+    >>> loop = ContactLoop(1e4, 0.05, 1.0, 0.0, 1.5e-3, 1e-3, rate_cutoff_Hz=400.0)
+    >>> float(np.abs(contact_poles(loop, ContactGains(200.0, 20.0))).max().round(4))
+    0.9791
+    """
+    return np.asarray(np.linalg.eigvals(_matrices(loop, loop.corners[0], [gains], normal_kp)[0]))
+
+
+def contact_decay(loop: ContactLoop, gains: ContactGains, normal_kp: float = 0.0) -> float:
+    """Slowest decay of the loop, 1/s, stiffness and mass wrong by their factors; unstable below 0.
+
+    Minus infinity where mass and material swing faster than half the ticks, which none can see.
+    """
+    return float(contact_decays(loop, [gains], normal_kp)[0])
+
+
+def contact_decays(
+    loop: ContactLoop, gains: Sequence[ContactGains], normal_kp: float = 0.0
+) -> Array:
+    """`contact_decay` (n,) with each of the gains, all with an integral or all without."""
+    worst = np.full(len(gains), math.inf)
+    for corner in loop.corners:
+        if math.sqrt(corner[0] / corner[1]) * loop.tick_s >= math.pi:
+            return np.full(len(gains), -math.inf)
+        poles = np.linalg.eigvals(_matrices(loop, corner, gains, normal_kp))
+        worst = np.minimum(worst, -np.log(np.abs(poles).max(axis=1)) / loop.tick_s)
+    return worst
+
+
+def _matrices(
+    loop: ContactLoop,
+    corner: tuple[float, float],
+    gains: Sequence[ContactGains],
+    normal_kp: float,
+) -> Array:
+    """The loops from tick to tick (n, size, size); without the sum of errors where none is used."""
+    weights = [(1.0, one.contact_kd, one.force_ki, normal_kp) for one in gains]
+    parts, total = _parts(loop, *corner)
+    if not any(one.force_ki for one in gains):
+        parts = np.delete(np.delete(parts, total, axis=1), total, axis=2)
+    return np.tensordot(weights, parts, 1)
+
+
+def _parts(loop: ContactLoop, stiffness: float, mass: float) -> tuple[Array, int]:
+    """The loop from tick to tick (4, n, n): without gains, and what a unit of each gain adds.
+
+    The second is the place of the sum of errors.
+
+    States: what moves (`_moving`), the estimated rate, the last place, the sum of the force's
+    errors, and the efforts on their way. The law knows the stated mass.
+    """
+    free, fresh, stale, seen, ticks = _sampled(loop, stiffness, mass)
+    moving = len(free)
+    size = moving + 3 + ticks + 1
+    estimate, last, total, late = range(moving, moving + 4)
+    weight, tick = rate_weight(loop.rate_cutoff_Hz, loop.tick_s), loop.tick_s
+    rate, error = np.zeros(size), np.zeros(size)
+    rate[estimate], rate[0], rate[last] = 1.0 - weight, weight / tick, -weight / tick
+    error[total], error[:moving] = 1.0, -tick * seen
+    place = np.eye(size)[0]
+    efforts = np.stack([np.zeros(size), -loop.mass_kg * rate, error, -loop.mass_kg * place])
+    parts = np.zeros((4, size, size))
+    parts[0, :moving, :moving] = free
+    parts[0, estimate], parts[0, last, 0], parts[0, total] = rate, 1.0, error
+    parts[0, late + 1 :, late : late + ticks] = np.eye(ticks)
+    parts[:, late] = efforts
+    if ticks == 0:
+        parts[:, :moving] += fresh[:, None] * efforts[:, None, :]
+    else:
+        parts[0, :moving, late + ticks - 1] += fresh
+    parts[0, :moving, late + ticks] += stale
+    return parts, total
+
+
+def _sampled(
+    loop: ContactLoop, stiffness: float, mass: float
+) -> tuple[Array, Array, Array, Array, int]:
+    """From tick to tick: what moves by itself (n, n), what the efforts of ``ticks`` and of one more
+    tick ago add to it (n,), and the row (n,) of the force that is measured."""
+    slope, push, seen = _moving(loop, stiffness, mass)
+    ticks = int(loop.delay_s / loop.tick_s + 1e-9)
+    part = max(0.0, loop.delay_s - ticks * loop.tick_s)
+    free, _ = _over(slope, push, loop.tick_s)
+    rest, fresh = _over(slope, push, loop.tick_s - part)
+    stale = rest @ _over(slope, push, part)[1]
+    return free, fresh, stale, seen, ticks
+
+
+def _moving(loop: ContactLoop, stiffness: float, mass: float) -> tuple[Array, Array, Array]:
+    """Slopes (n, n) of place, rate, motor and force sensor, by a unit of effort (n,), and the row
+    of the measured force."""
+    lags, filters = loop.motor_lag_s > 0.0, loop.force_cutoff_Hz > 0.0
+    size = 2 + lags + filters
+    slope, push, seen = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+    slope[0, 1] = 1.0
+    slope[1, :2] = -stiffness / mass, -loop.viscous_N_s_per_m / mass
+    if lags:
+        slope[1, 2], slope[2, 2], push[2] = (
+            1.0 / mass,
+            -1.0 / loop.motor_lag_s,
+            1.0 / loop.motor_lag_s,
+        )
+    else:
+        push[1] = 1.0 / mass
+    if filters:
+        corner = 2.0 * math.pi * loop.force_cutoff_Hz
+        slope[-1, 0], slope[-1, -1], seen[-1] = corner * stiffness, -corner, 1.0
+    else:
+        seen[0] = stiffness
+    return slope, push, seen
+
+
+def _over(slope: Array, push: Array, time_s: float) -> tuple[Array, Array]:
+    """What a state becomes in a time (n, n), and what a held unit of effort adds (n,)."""
+    from scipy.linalg import expm
+
+    size = len(slope)
+    whole = np.zeros((size + 1, size + 1))
+    whole[:size, :size], whole[:size, size] = slope * time_s, push * time_s
+    done = expm(whole)
+    return done[:size, :size], done[:size, size]

@@ -1,0 +1,62 @@
+"""Verdicts of a loop on a rig: on time, complete, without faults, supervised."""
+
+from scissorcal.device.motion import MotionReport
+from scissorcal.device.timing import Percentiles
+from scissorcal.verdicts import Verdict, judge, not_evaluated
+
+MOST_MISSED = 0.01
+MOST_FAULTS_PER_S = 0.1
+
+
+def loop_verdicts(
+    scope: str, report: MotionReport, latency: Percentiles | None, tick_us: int
+) -> tuple[Verdict, ...]:
+    """Judge how a loop ran; ``latency`` is in microseconds, None in virtual time."""
+    return (
+        _deadline(scope, latency, tick_us),
+        _complete(scope, report),
+        _faultless(scope, report, tick_us),
+        _supervised(scope, report),
+    )
+
+
+def _deadline(scope: str, latency: Percentiles | None, tick_us: int) -> Verdict:
+    if latency is None:
+        why = "Virtual time has no latency."
+        return not_evaluated(scope, "deadline", why, float(tick_us))
+    why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
+    remedy = f"{why} Run 'scissorcal device doctor' to find what is slow."
+    return judge(scope, "deadline", latency.p99, tick_us, why, remedy)
+
+
+def _complete(scope: str, report: MotionReport) -> Verdict:
+    counters = report.counters
+    share = counters.misses / max(1, counters.frames + counters.misses)
+    why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
+    remedy = (
+        f"{why} Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
+    )
+    return judge(scope, "misses", share, MOST_MISSED, why, remedy)
+
+
+def _faultless(scope: str, report: MotionReport, tick_us: int) -> Verdict:
+    """Whether the device braked by itself too often."""
+    counters = report.counters
+    allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
+    why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
+    if counters.faults:
+        why += (
+            " After each the force was ramped up from zero. If nothing else caused them, commands "
+            "were too late: run 'scissorcal device doctor'."
+        )
+    return judge(scope, "faults", counters.faults, allowed, why)
+
+
+def _supervised(scope: str, report: MotionReport) -> Verdict:
+    count = report.counters.fallback_frames
+    never = "The supervising process never missed its heartbeat."
+    missed = (
+        f"{count} frames had damping only, because the supervising process missed its "
+        "heartbeat: close programs that load the processor."
+    )
+    return judge(scope, "supervision", count, 0.0, never, missed)

@@ -1,0 +1,142 @@
+"""The plate's upper surface: its recipe table, and the surface that follows from it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.priors import Section
+
+if TYPE_CHECKING:
+    from scissorcal.model.surface import ProbedSurface, Surface
+
+SMALLEST_RADIUS_MM = 2.0
+"""Contact with a surface that bends more is no longer at one point; :mod:`scissorcal.model.surface`
+refuses probed surfaces by the same figure."""
+
+_COLUMNS = ("x_mm", "y_mm", "z_mm")
+_LARGEST_FILE = 5_000_000
+
+
+class PlateSurface(Section):
+    """The shape of the upper face, in the plate's frame: it passes level through the origin.
+
+    ``cylinder``: ``axis_deg`` turns its axis from x towards y; 0 lays it along the cut.
+    ``radius_mm`` is positive where the face bulges, negative where it is hollow. ``spline``: a
+    height field through the probed points of ``file``, a CSV file with the columns x_mm, y_mm and
+    z_mm beside the recipe; ``probe_sd_mm`` is their standard deviation along the normal.
+    """
+
+    kind: Literal["plane", "cylinder", "sphere", "spline"] = "plane"
+    radius_mm: Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)] | None = None
+    axis_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)] = 0.0
+    file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    probe_sd_mm: Annotated[float, Field(ge=1e-4, le=1, allow_inf_nan=False)] = 0.02
+
+    @model_validator(mode="after")
+    def _keys_fit_the_kind(self) -> PlateSurface:
+        round_ = self.kind in ("cylinder", "sphere")
+        if round_ and self.radius_mm is None:
+            raise ValueError(f'kind = "{self.kind}" needs radius_mm, such as radius_mm = 50')
+        if round_ and abs(self.radius_mm or 0.0) < SMALLEST_RADIUS_MM:
+            raise ValueError(
+                f"radius_mm = {self.radius_mm:g} must be at least {SMALLEST_RADIUS_MM:g}, or at "
+                f'most -{SMALLEST_RADIUS_MM:g} for a hollow face; a flat one has kind = "plane"'
+            )
+        if self.kind == "spline" and self.file is None:
+            raise ValueError(
+                'kind = "spline" needs file, the probed points, such as file = "heights.csv"'
+            )
+        wanted = {
+            "radius_mm": ("cylinder", "sphere"),
+            "axis_deg": ("cylinder",),
+            "file": ("spline",),
+            "probe_sd_mm": ("spline",),
+        }
+        for key, kinds in wanted.items():
+            stated = getattr(self, key) != type(self).model_fields[key].default
+            if stated and self.kind not in kinds:
+                named = " or ".join(f'"{kind}"' for kind in kinds)
+                raise ValueError(f'{key} needs kind = {named}; here kind = "{self.kind}"')
+        return self
+
+
+def plate_surface(settings: PlateSurface, folder: Path) -> Surface:
+    """The surface of a recipe's plate; ``folder`` is the one of the recipe, for ``file``.
+
+    Raises InputError, with file and line, where the probed points are no height field.
+
+    >>> plate_surface(PlateSurface(kind="sphere", radius_mm=40.0), Path())
+    Sphere(radius_m=0.04)
+    """
+    from scissorcal.model.surface import Cylinder, Plane, Sphere
+
+    radius_m = (settings.radius_mm or 0.0) * 1e-3
+    if settings.kind == "plane":
+        return Plane()
+    if settings.kind == "cylinder":
+        return Cylinder(radius_m, math.radians(settings.axis_deg))
+    if settings.kind == "sphere":
+        return Sphere(radius_m)
+    return probed_surface(folder / (settings.file or ""), settings.probe_sd_mm).surface
+
+
+def probed_surface(path: Path, probe_sd_mm: float) -> ProbedSurface:
+    """Fit a height field to the probed points of a CSV file with the columns x_mm, y_mm, z_mm.
+
+    Raises InputError with the file, and the line or the place in mm, for what is no number and for
+    what :func:`scissorcal.model.surface.fit_height_field` refuses.
+    """
+    from scissorcal.model.surface import fit_height_field
+
+    lines, points = _read(path)
+    try:
+        return fit_height_field(points, probe_sd_mm * 1e-3, [f"line {line}" for line in lines])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _read(path: Path) -> tuple[list[int], list[list[float]]]:
+    """Lines and points in metres."""
+    import csv
+
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError(
+                f"{path} is larger than {_LARGEST_FILE // 10**6} MB: probe fewer points."
+            )
+        rows = csv.reader(path.read_text("utf-8-sig").splitlines())
+    except FileNotFoundError:
+        raise InputError(
+            f"{path} does not exist: plate.surface.file in the recipe names it. Put the probed "
+            f"points there, with the columns {', '.join(_COLUMNS)}."
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read: {error}.") from None
+    head = [name.strip() for name in next(rows, [])]
+    if sorted(head) != sorted(_COLUMNS):
+        raise InputError(
+            f"{path}, line 1: the columns must be {','.join(_COLUMNS)}, with one point on each "
+            "line below them."
+        )
+    order = [head.index(name) for name in _COLUMNS]
+    lines, points = [], []
+    for row in rows:
+        if not row:
+            continue
+        try:
+            values = [float(row[place]) * 1e-3 for place in order]
+        except (IndexError, ValueError):
+            values = []
+        if len(row) != len(_COLUMNS) or not all(map(math.isfinite, values)) or not values:
+            raise InputError(
+                f"{path}, line {rows.line_num}: '{','.join(row)[:60]}' is no probed point; write "
+                "three finite numbers in mm, such as '10,-5,0.02'."
+            )
+        lines.append(rows.line_num)
+        points.append(values)
+    return lines, points

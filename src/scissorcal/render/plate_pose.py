@@ -1,0 +1,237 @@
+"""Follow a plate whose pose is estimated while a package renders: judge it, and place it."""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.device.motion import Samples
+from scissorcal.kernel import ModelTables, PlateConfig, Section
+from scissorcal.render import plate_sentences as sentences
+from scissorcal.render.plate_estimate import PlateReport
+from scissorcal.render.plate_record import PlateRecord
+from scissorcal.render.plate_section import PlateSection, plate_section
+from scissorcal.render.plate_torque import PoseTorque, TorqueSpread
+from scissorcal.tracking.plate_pose import PlatePose, PoseSource
+
+Array = NDArray[np.float64]
+
+EVERY_S = 0.01
+"""Between two looks at the source: its rate is about 100 Hz."""
+MOVE_S = 0.015
+"""One and a half intervals of estimates, so that one that comes half an interval late finds the
+section still on its way (docs/decisions/141-an-estimated-plate-is-a-section.md)."""
+STALE_S = 0.1
+FALL_S = 0.1
+"""As long as the servo takes at most to let go of the blades when a watch ends it."""
+BACK_SHARE = 0.8
+"""Of the tolerance, below which a force that fell for its uncertainty returns."""
+MOST_SPEED_m_per_s = 1.0
+"""No hand moves a plate faster between the blades: a pose that does has leapt."""
+LEAP_SDS = 6.0
+MOST_PITCH_RAD = math.radians(10.0)
+MOST_HEIGHT_M = 0.01
+"""Between two moving blades; docs/decisions/142-a-plate-between-two-blades.md."""
+FACES = 9
+FACE_REACH_M = 0.02
+"""Heights about the model's at which it is checked that the release falls along the blade."""
+
+
+class Placing(Protocol):
+    """What a plate is placed on: a Motion."""
+
+    @property
+    def now_s(self) -> float: ...
+
+    def place(self, section: Section, usable: bool, age_s: float) -> None: ...
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A section and, where it is not used, the kind of reason and a sentence."""
+
+    placed: PlateSection | None
+    kind: str = ""
+    sentence: str = ""
+
+
+class PlatePlacer:
+    """Asks a source for the plate's pose and places it; the servo moves it there.
+
+    ``tolerance`` and ``confidence`` are the scene's, as shares: where half of the interval that the
+    pose leaves to the torque is wider than the tolerance, the force falls until it is below 0.8 of
+    it. The servo lets the force fall by itself where estimates stop coming. Leaving the context
+    closes the ``record`` of what was placed.
+    """
+
+    def __init__(
+        self,
+        source: PoseSource,
+        tables: ModelTables,
+        *,
+        tolerance: float,
+        confidence: float,
+        torque_limit_Nm: float,
+        record: PlateRecord | None = None,
+    ) -> None:
+        self._source = source
+        self._record = record
+        self._tables = tables
+        self._tolerance = tolerance
+        self._confidence = confidence
+        self._torque = PoseTorque(tables, confidence, torque_limit_Nm)
+        self._leaps = _Leaps()
+        self._state = (0.5 * (tables.opening_min + tables.opening_max), 0.0)
+        self._begun_s = math.nan
+        self._time = -math.inf
+        self._kind = "none yet"
+        self._refused: Counter[str] = Counter()
+        self._told: dict[str, str] = {}
+        self._estimates = self._falls = 0
+        self._widest = 0.0
+
+    def follow(self, motion: Placing, samples: Samples) -> None:
+        """Take the source's newest estimate, if there is one, and place the plate by it."""
+        now = motion.now_s
+        if math.isnan(self._begun_s):
+            self._begun_s = now
+        if len(samples):
+            place = float(samples["opening"][-1]), float(samples["advance"][-1])
+            self._state = place if np.all(np.isfinite(place)) else self._state
+        estimate = self._source(now, samples)
+        if estimate is None or not estimate.time > self._time:
+            self._notice_silence(now)
+            return
+        self._time = estimate.time
+        self._estimates += 1
+        age = now - estimate.time
+        found = self._judge(estimate)
+        if not found.kind and age > STALE_S:
+            found = replace(found, kind="late", sentence=sentences.late(age))
+        section = found.placed.section if found.placed else Section(0.0, 0.0)
+        motion.place(section, not found.kind, age)
+        if found.placed and self._record:
+            self._record.add(estimate.time, found.placed, not found.kind)
+        self._refused[found.kind] += 1
+        self._become(found.kind, found.sentence, now)
+
+    def report(self, seconds: float, out_s: float) -> PlateReport:
+        """What came and what was done in a rendering; ``out_s`` of it were below the force."""
+        return PlateReport(
+            estimates=self._estimates,
+            lost=self._refused["lost"],
+            uncertain=self._refused["uncertain"],
+            leapt=self._refused["leapt"],
+            unreachable=self._refused["unreachable"],
+            falls=self._falls,
+            seconds=seconds,
+            out_s=out_s,
+            widest=self._widest,
+            sentences=tuple(self._told.values()),
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._record:
+            self._record.flush()
+
+    def _judge(self, estimate: PlatePose) -> _Judged:
+        if not estimate.tracked:
+            return _Judged(None, "lost", sentences.lost(estimate.why))
+        upper, blades = self._tables.upper_face, self._tables.moving_blades
+        placed = plate_section(estimate.rotation, estimate.translation, upper, blades)
+        if placed is None or not placed.section.is_sound(blades):
+            return _Judged(None, "unreachable", sentences.ACROSS)
+        height = self._height(placed)
+        if abs(placed.pitch_rad) > self._most_pitch or abs(height) > MOST_HEIGHT_M:
+            limits = (MOST_HEIGHT_M, MOST_PITCH_RAD)
+            far = sentences.beside(height, placed.pitch_rad, *limits)
+            return _Judged(placed, "unreachable", far)
+        covariance = placed.slopes @ np.asarray(estimate.covariance) @ placed.slopes.T
+        by_m = self._leaps.take(estimate.time, placed.section, covariance)
+        if by_m is not None:
+            return _Judged(placed, "leapt", sentences.leapt(by_m))
+        spread = self._torque.spread(placed.section, covariance, *self._state)
+        allowed = self._tolerance * (BACK_SHARE if self._kind == "uncertain" else 1.0)
+        if not spread.half_width <= allowed:
+            return _Judged(placed, "uncertain", self._uncertain(placed, covariance, spread))
+        self._widest = max(self._widest, spread.half_width)
+        return _Judged(placed)
+
+    def _uncertain(self, placed: PlateSection, covariance: Array, spread: TorqueSpread) -> str:
+        if "uncertain" in self._told:
+            return self._told["uncertain"]
+        worst = self._torque.largest_share(placed.section, covariance, *self._state)
+        allowed = (self._confidence, self._tolerance)
+        return sentences.uncertain(covariance, spread.half_width, worst, *allowed)
+
+    @property
+    def _most_pitch(self) -> float:
+        return MOST_PITCH_RAD if self._tables.moving_blades == 2 else math.inf
+
+    def _height(self, placed: PlateSection) -> float:
+        """How far from their middle two moving blades would have to hold the plate, at most."""
+        if self._tables.moving_blades == 1:
+            return 0.0
+        along = max(self._state[1] + self._tables.contact_max - placed.section.edge_x, 0.0)
+        far = placed.height_m + math.tan(placed.pitch_rad) * along
+        return max(placed.height_m, far, key=abs)
+
+    def _notice_silence(self, now: float) -> None:
+        if self._time == -math.inf:
+            if now - self._begun_s > STALE_S:
+                self._become("none yet", sentences.NONE_YET, now)
+        elif now - self._time > STALE_S:
+            self._become("late", sentences.late(now - self._time), now)
+
+    def _become(self, kind: str, sentence: str, now: float) -> None:
+        """Count a change of state; the sentence of each kind is kept once."""
+        self._falls += bool(kind) and not self._kind
+        self._kind = kind
+        if kind and kind not in self._told:
+            after = now - self._begun_s
+            self._told[kind] = f"After {after:.1f} s there was no force. {sentence}"
+
+
+class _Leaps:
+    """Sees an edge that goes farther between two estimates than a plate moves.
+
+    After a leap nothing is used until the force has fallen, so that it returns at the new place.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[float, float, float, float] | None = None  # time, x, y, sd
+        self._at = -math.inf
+        self._by_m = 0.0
+
+    def take(self, time: float, section: Section, covariance: Array) -> float | None:
+        """By how much it leapt, None where it did not."""
+        sd = math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0))
+        last, self._last = self._last, (time, section.edge_x, section.edge_y, sd)
+        if last is not None:
+            moved = math.hypot(section.edge_x - last[1], section.edge_y - last[2])
+            if moved > MOST_SPEED_m_per_s * (time - last[0]) + LEAP_SDS * math.hypot(sd, last[3]):
+                self._at, self._by_m = time, moved
+        return self._by_m if time - self._at <= FALL_S else None
+
+
+def plate_config(tables: ModelTables) -> PlateConfig:
+    """How the servo follows an estimated plate, for the tables that it renders."""
+    low, high = tables.upper_face - FACE_REACH_M, tables.upper_face + FACE_REACH_M
+    if tables.moving_blades == 2:
+        low, high = 0.9 * tables.upper_face, 1.5 * tables.upper_face
+    faces = np.linspace(low, high, FACES)
+    falls = all(replace(tables, upper_face=float(face)).release_falls for face in faces)
+    return PlateConfig(
+        is_estimated=True,
+        stale_us=round(STALE_S * 1e6),
+        move_s=MOVE_S,
+        fall_s=FALL_S,
+        face_low=low if falls else 0.0,
+        face_high=high if falls else 0.0,
+    )

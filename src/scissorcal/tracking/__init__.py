@@ -1,0 +1,84 @@
+"""The plate's pose while rig and plate work: a filter over pictures and contacts.
+
+Arrays in, arrays out: no files, no ports, no clocks. `PoseTracker` is the filter;
+`PlateFollower` feeds it from a camera and a rig whose clocks it measures. 'scissorcal track' and
+`scissorcal.workday.runs.track.track_plate` connect it to a workspace.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
+    from scissorcal.tracking.consistency import mean_band, nees, pose_error, share_held
+    from scissorcal.tracking.contacts import TipContact, TipContacts
+    from scissorcal.tracking.delay import DelayFit, measure_delay
+    from scissorcal.tracking.follow import FollowedRow, PlateFollower, SeenPose
+    from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+    from scissorcal.tracking.rows import CameraPose
+    from scissorcal.tracking.settings import (
+        CameraErrors,
+        ContactErrors,
+        ForceErrors,
+        PlateMotion,
+        TrackingSettings,
+        settings_of,
+    )
+    from scissorcal.tracking.tracker import Counts, Outcome, PoseEstimate, PoseTracker
+
+_HOMES = {
+    "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
+    "consistency": ("mean_band", "nees", "pose_error", "share_held"),
+    "contacts": ("TipContact", "TipContacts"),
+    "delay": ("DelayFit", "measure_delay"),
+    "follow": ("FollowedRow", "PlateFollower", "SeenPose"),
+    "judge": ("TrackFigures", "track_figures", "track_verdicts"),
+    "rows": ("CameraPose",),
+    "settings": (
+        "CameraErrors",
+        "ContactErrors",
+        "ForceErrors",
+        "PlateMotion",
+        "TrackingSettings",
+        "settings_of",
+    ),
+    "tracker": ("Counts", "Outcome", "PoseEstimate", "PoseTracker"),
+}
+
+__all__ = [
+    "CameraErrors",
+    "CameraPose",
+    "ClockFit",
+    "ClockWatch",
+    "ContactErrors",
+    "Counts",
+    "DelayFit",
+    "FollowedRow",
+    "ForceErrors",
+    "Outcome",
+    "PlateFollower",
+    "PlateMotion",
+    "PoseEstimate",
+    "PoseTracker",
+    "SeenPose",
+    "TipContact",
+    "TipContacts",
+    "TrackFigures",
+    "TrackingSettings",
+    "fit_clock",
+    "mean_band",
+    "measure_delay",
+    "nees",
+    "pose_error",
+    "settings_of",
+    "share_held",
+    "track_figures",
+    "track_verdicts",
+]
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,179 @@
+"""How a track went: rows by outcome, consistency, clocks, delay; and its verdicts."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.tracking.clocks import DRIFT_LIMIT_PPM, ClockWatch
+from scissorcal.tracking.delay import DelayFit
+from scissorcal.tracking.follow import PlateFollower
+from scissorcal.tracking.tracker import Outcome
+from scissorcal.verdicts import Verdict, judge, not_evaluated
+
+SCOPE = "track"
+REFUSED_PICTURES = 0.1
+REFUSED_CONTACTS = 0.2
+NIS_RATIO = 2.0
+"""Mean NIS over its degrees of freedom: above, errors are larger than they are said to be."""
+FEWEST = 20
+"""Rows from which on shares and means are judged."""
+
+_FREEDOM = {"picture": 6, "contact": 1}
+
+
+@dataclass(frozen=True)
+class RowCounts:
+    """Rows of one source: used (restarts among them), refused, too late, without a pose to start
+    from; ``mean_nis`` over used and refused ones, of ``freedom`` degrees of freedom."""
+
+    used: int
+    refused: int
+    late: int
+    waiting: int
+    mean_nis: float
+    freedom: int
+
+    @property
+    def refused_share(self) -> float:
+        """Of those that were judged."""
+        judged = self.used + self.refused
+        return self.refused / judged if judged else math.nan
+
+
+@dataclass(frozen=True)
+class ClockFigures:
+    """A clock against the host's: drift with its standard deviation, how well times are known."""
+
+    drift_ppm: float
+    drift_sd_ppm: float
+    sd_ms: float
+    jumps: int
+    sentence: str
+
+
+@dataclass(frozen=True)
+class TrackFigures:
+    """A whole track in numbers. ``away_mm`` is by how much the last refused contact was outside of
+    where the pressed surface was expected, ``away_sd_mm`` what was expected (NaN without one)."""
+
+    pictures: RowCounts
+    contacts: RowCounts
+    restarts: int
+    camera: ClockFigures | None
+    rig: ClockFigures | None
+    delay: DelayFit | None
+    away_mm: float
+    away_sd_mm: float
+
+
+def track_figures(follower: PlateFollower, delay: DelayFit | None = None) -> TrackFigures:
+    """Sum up what a follower was given and did."""
+    away, sd = follower.away or (math.nan, math.nan)
+    restarts = follower.tracker.estimate().counts.restarts if follower.tracker.started else 0
+    return TrackFigures(
+        pictures=_counts(follower, "picture"),
+        contacts=_counts(follower, "contact"),
+        restarts=restarts,
+        camera=_clock(follower.camera),
+        rig=_clock(follower.rig),
+        delay=delay,
+        away_mm=1e3 * away,
+        away_sd_mm=1e3 * sd,
+    )
+
+
+def track_verdicts(figures: TrackFigures) -> tuple[Verdict, ...]:
+    """Judge a track: clocks, refused pictures and contacts, consistency."""
+    return (
+        _judge_clocks(figures),
+        _judge_pictures(figures.pictures),
+        _judge_contacts(figures),
+        _judge_nis("picture consistency", figures.pictures, "plate.tracking's speeds and bias"),
+        _judge_nis("contact consistency", figures.contacts, "plate.tracking's contact errors"),
+    )
+
+
+def _judge_clocks(figures: TrackFigures) -> Verdict:
+    clocks = [clock for clock in (figures.camera, figures.rig) if clock is not None]
+    if not clocks:
+        return not_evaluated(SCOPE, "clock jumps", "No clock was compared.", 0.0)
+    jumps = sum(clock.jumps for clock in clocks)
+    said = " ".join(clock.sentence for clock in clocks)
+    return judge(
+        SCOPE, "clock jumps", jumps, 0.0, f"{said} {DRIFT_LIMIT_PPM:g} ppm are the limit.", said
+    )
+
+
+def _judge_pictures(counts: RowCounts) -> Verdict:
+    if counts.used + counts.refused < FEWEST:
+        why = f"{counts.used + counts.refused} pictures are too few to judge ({FEWEST})."
+        return not_evaluated(SCOPE, "refused pictures", why, REFUSED_PICTURES)
+    why = f"{100 * counts.refused_share:.1f} % of the pictures were refused."
+    remedy = (
+        " Either the plate moves faster than plate.tracking says (speed_mm_per_s, "
+        "turn_deg_per_s), or pictures show its mirrored pose: tilt it more, or move closer."
+    )
+    value = counts.refused_share
+    return judge(SCOPE, "refused pictures", value, REFUSED_PICTURES, why, why + remedy)
+
+
+def _judge_contacts(figures: TrackFigures) -> Verdict:
+    counts = figures.contacts
+    if counts.used + counts.refused < FEWEST:
+        why = f"{counts.used + counts.refused} contacts are too few to judge ({FEWEST})."
+        return not_evaluated(SCOPE, "refused contacts", why, REFUSED_CONTACTS)
+    why = f"{100 * counts.refused_share:.1f} % of the contacts were refused"
+    where = "."
+    if math.isfinite(figures.away_mm):
+        side = "outside of" if figures.away_mm > 0.0 else "inside of"
+        where = (
+            f": the last was {abs(figures.away_mm):.2g} mm {side} the surface, where "
+            f"{figures.away_sd_mm:.2g} mm (sd) were expected."
+        )
+    remedy = (
+        " Check plate.surface, the blade's length and edge, the fit of friction, and that it is "
+        "the tip that touches."
+    )
+    value = counts.refused_share
+    return judge(
+        SCOPE, "refused contacts", value, REFUSED_CONTACTS, why + where, why + where + remedy
+    )
+
+
+def _judge_nis(check: str, counts: RowCounts, settings: str) -> Verdict:
+    if counts.used + counts.refused < FEWEST:
+        return not_evaluated(SCOPE, check, f"Fewer than {FEWEST} rows were judged.", NIS_RATIO)
+    ratio = counts.mean_nis / counts.freedom
+    why = f"The mean NIS is {counts.mean_nis:.2g}, where {counts.freedom} are expected."
+    remedy = f" The errors are larger than they are stated to be: widen {settings}."
+    return judge(SCOPE, check, ratio, NIS_RATIO, why, why + remedy)
+
+
+def _counts(follower: PlateFollower, source: str) -> RowCounts:
+    def count(*outcomes: Outcome) -> int:
+        return sum(follower.outcomes[source, outcome] for outcome in outcomes)
+
+    found = follower.nis[source]
+    return RowCounts(
+        used=count(Outcome.USED, Outcome.RESTARTED),
+        refused=count(Outcome.REFUSED),
+        late=count(Outcome.TOO_LATE),
+        waiting=count(Outcome.WAITING),
+        mean_nis=float(np.mean(found)) if found else math.nan,
+        freedom=_FREEDOM[source],
+    )
+
+
+def _clock(watch: ClockWatch | None) -> ClockFigures | None:
+    if watch is None or not watch.known:
+        return None
+    fit = watch.fit
+    newest = fit.own_s + 0.5 * fit.span_s
+    return ClockFigures(
+        drift_ppm=fit.drift_ppm,
+        drift_sd_ppm=fit.drift_sd_ppm,
+        sd_ms=1e3 * fit.sd_s(newest),
+        jumps=len(watch.jumps),
+        sentence=watch.sentence,
+    )

@@ -1,0 +1,263 @@
+"""Follow a path on a plate with a workspace's rig, and record it."""
+
+import math
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.load import read_text
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.runs.cut import edge_of_photographs
+from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.probe import Say, ensure_probed
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.result import FitResult
+    from scissorcal.control.follow import Progress
+    from scissorcal.control.mechanics import AxisFacts, RigMechanics
+    from scissorcal.control.result import ControlResult
+    from scissorcal.device.link import Link
+    from scissorcal.device.loading import Confirm
+    from scissorcal.model.edge import Edge
+    from scissorcal.recipe.schema import Recipe
+    from scissorcal.recording import RecordingWriter
+    from scissorcal.recording.probe import ProbeResult
+    from scissorcal.tracking.plate_pose import PoseSource
+
+LATE_TICKS = 2.0
+"""Where no probe measured the delay: one tick for line and host, one for the motor."""
+LACK_OF_FIT = 0.03
+"""Of dry friction, by which a fitted law may be wrong beyond its posterior: friction of virtual
+days differs by 0.25 mN m between speeds where 15 are fitted."""
+SLOW = 0.05
+"""Of the tabulated rates, at which the uncertainty of sliding friction is taken."""
+UNMEASURED_NOISE_Nm = 1e-3
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """A path that was followed: its result, its recording (None if not wanted), and the rig."""
+
+    result: "ControlResult"
+    recording: Path | None
+    rig: str
+
+
+def control_workspace(
+    workspace: Workspace,
+    device: str,
+    path_file: Path,
+    *,
+    force_N: float = 2.0,
+    speed_mm_per_s: float = 10.0,
+    pose: str | None = None,
+    source: "PoseSource | None" = None,
+    record: bool = True,
+    seed: int = 0,
+    baud: int | None = None,
+    realtime: bool = False,
+    progress: "Progress | None" = None,
+    confirm: "Confirm | None" = None,
+    say: "Say | None" = None,
+) -> Controlled:
+    """Press on the plate and follow the path in ``path_file`` (CSV) with the rig on ``device``.
+
+    ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. The plate stands
+    where ``source`` says, or ``pose`` ("X_MM,Y_MM,PITCH_DEG": its origin in the rig's plane and its
+    turn about the pivot's axis), or where the fit of its photographs found it. Mass, inertia and
+    friction are those of the fits of both axes; the surface and what it is made of are the recipe's
+    (plate.surface, plate.touch). Samples and telemetry go to captures/control-<stamp>.mcap unless
+    ``record`` is False. Otherwise as `render_workspace`.
+
+    Raises MissingError where a fit or the pose is missing, and what
+    `scissorcal.control.follow.control` raises.
+    """
+    from scissorcal.control.follow import Job, control
+    from scissorcal.control.path_file import read_path
+    from scissorcal.control.settings import Material
+    from scissorcal.recipe.plate_surface import plate_surface
+
+    recipe = workspace.recipe()
+    engine = Engine.of(workspace)
+    points = read_path(path_file).stated(force_N, 1e-3 * speed_mm_per_s)
+    known = source or _pose_source(engine, pose)
+    touch = recipe.plate.touch
+    job = Job(
+        points=points,
+        surface=plate_surface(recipe.plate.surface, workspace.root),
+        source=known,
+        material=Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
+        length_m=1e-3 * recipe.material.sheet_length_mm,
+    )
+    fits = _fits(engine)
+    edge = blade_edge(engine, recipe)
+    line = line_of(recipe, baud)
+    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
+        rig = f"{link.identity.name} {link.identity.serial}"
+        probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
+        path = workspace.new_recording("control") if record else None
+        writer = _open_writer(path, link, workspace, path_file, probe) if path else nullcontext()
+        with writer as recording:
+            done = control(
+                link,
+                recipe,
+                _mechanics(fits, edge, recipe, link, probe),
+                job,
+                writer=recording,
+                progress=progress,
+                confirm=confirm,
+                probe=probe,
+            )
+            if recording is not None:
+                recording.note(_note(done, pose))
+    return Controlled(done, path, rig)
+
+
+def stated_pose(text: str) -> "PoseSource":
+    """A pose as it is typed: the plate's origin in the rig's plane (mm), and its pitch (deg).
+
+    >>> stated_pose("20,10,4")(0.0, None).translation.tolist()
+    [0.02, 0.01, 0.0]
+    """
+    from scissorcal.tracking.plate_pose import fixed_pose, level_plate
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
+        raise InputError(
+            f"The pose '{text[:60]}' is none: give X_MM,Y_MM,PITCH_DEG, such as 20,10,4, the place "
+            "of the plate's origin in the rig's plane and its turn about the pivot's axis."
+        )
+    x, y, pitch = (*numbers, 0.0)[:3]
+    return fixed_pose(*level_plate((x, y, 0.0), pitch))
+
+
+def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
+    import numpy as np
+
+    from scissorcal.tracking.plate_pose import fixed_pose
+
+    if pose is not None:
+        return stated_pose(pose)
+    try:
+        fit = load_result(engine, "plate")
+    except MissingError as error:
+        raise MissingError(f"{error} Or state where the plate stands with --pose.") from None
+    if fit.rig_plate is None:
+        raise MissingError(
+            "The fit of the plate has no pose in the rig's frame: photograph the rig's card too "
+            "('scissorcal capture plate --help'), or state where the plate stands with --pose."
+        )
+    found = fit.rig_plate
+    return fixed_pose(found.matrix, np.asarray(found.translation_m), found.covariance)
+
+
+def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":
+    """The fits of friction of both axes; MissingError with what to run."""
+    return load_result(engine, "friction"), load_result(engine, "friction-advance")
+
+
+def blade_edge(engine: Engine, recipe: "Recipe") -> "Edge":
+    """The edge of photographs, else the recipe's."""
+    from scissorcal.model.edge import Edge
+
+    belief, _ = edge_of_photographs(engine)
+    if belief is not None:
+        return belief.edge
+    stated = recipe.rig.edge
+    return Edge(
+        stated.family,
+        offset_m=1e-3 * stated.offset_mm,
+        taper_rad=math.radians(stated.taper_deg),
+        length_m=1e-3 * stated.length_mm,
+        curvature_per_m=stated.curvature_per_m,
+    )
+
+
+def _mechanics(
+    fits: "tuple[FitResult, FitResult]",
+    edge: "Edge",
+    recipe: "Recipe",
+    link: "Link",
+    probe: "ProbeResult",
+) -> "RigMechanics":
+    from scissorcal.control.mechanics import FASTEST_m_per_s, FASTEST_rad_per_s, RigMechanics
+    from scissorcal.model.blade_point import BladePoint
+
+    tick_s = link.identity.tick_us * 1e-6
+    zero = probe.torque_zero_Nm
+    return RigMechanics(
+        tip=BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades),
+        opening=axis_of_fit(fits[0], SLOW * FASTEST_rad_per_s, "kg m^2"),
+        advance=axis_of_fit(fits[1], SLOW * FASTEST_m_per_s, "kg"),
+        delay_s=LATE_TICKS * tick_s if probe.delay_s is None else max(probe.delay_s.mean, 0.0),
+        torque_sd=probe.rest.torque_noise_Nm or UNMEASURED_NOISE_Nm,
+        torque_zero_Nm=0.0 if zero is None else zero.mean,
+        handle_zero_N=probe.rest.handle_zero_N,
+    )
+
+
+def axis_of_fit(fit: "FitResult", slow: float, unit: str) -> "AxisFacts":
+    """One axis from its fit of friction, at the medians of the posterior."""
+    import numpy as np
+
+    from scissorcal.control.mechanics import AxisFacts
+    from scissorcal.model.friction import FrictionLaw, friction_torque
+
+    values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
+    sds = {p.name: p.sd for p in fit.parameters}
+    if not values.get("inertia", 0.0) > 0.0:
+        raise MissingError(
+            f"The fit of {fit.what} has no inertia in {unit}: capture friction with an excitation "
+            f"('scissorcal capture {fit.words}'), then 'scissorcal fit {fit.words}'."
+        )
+    centre = float(fit.structure.get("angle_center", float("nan")))
+    centre = centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))
+    law = FrictionLaw.of_fit(values, centre)
+    names = [p.name for p in fit.parameters]
+    drawn = {name: fit.draws[:, [i]] for i, name in enumerate(names)}
+    sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, np.array([-slow, slow]))
+    level = float(np.abs(friction_torque(law, centre, np.array([-slow, slow]))).max())
+    return AxisFacts(
+        inertia=values["inertia"],
+        inertia_sd=sds.get("inertia", 0.0),
+        friction=law,
+        offset=values.get("offset", 0.0),
+        friction_sd=math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level),
+        source=f"the fit of {fit.what}",
+    )
+
+
+def _open_writer(
+    path: Path, link: "Link", workspace: Workspace, path_file: Path, probe: "ProbeResult"
+) -> "RecordingWriter":
+    from scissorcal.device.capture import rig_facts
+    from scissorcal.recording import Joint, RecordingWriter
+
+    recipe = workspace.recipe()
+    writer = RecordingWriter(
+        path,
+        "control",
+        Joint("rotary"),
+        read_text(workspace.recipe_path),
+        rig_facts(link.identity, recipe.rig.motor_sign, probe),
+        link.identity.handle_radius,
+    )
+    writer.attach("path.csv", path_file.read_bytes(), "text/csv")
+    return writer
+
+
+def _note(done: "ControlResult", pose: str | None) -> str:
+    figures = done.figures
+    where = "as it was stated" if pose else "as it was fitted"
+    return (
+        f"Followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N, the plate standing "
+        f"{where}: force off by {figures.force_rms_N:.3f} N (rms), path by "
+        f"{figures.path_rms_mm:.3f} mm (rms)."
+    )

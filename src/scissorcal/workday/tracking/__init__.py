@@ -1,0 +1,1 @@
+"""What 'scissorcal track' is fed from and writes: pictures, rigs, a simulated world, recordings."""

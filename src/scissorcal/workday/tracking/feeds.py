@@ -1,0 +1,153 @@
+"""Where a track's pictures and samples come from, as one stream in the order of their arrival."""
+
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, closing
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import DeviceError, InputError
+from scissorcal.workday.tracking.camera_thread import CameraThread
+from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
+from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_recorder import RecordedTrack
+
+if TYPE_CHECKING:
+    from scissorcal.device.link import Link
+    from scissorcal.device.motion import Motion
+    from scissorcal.recipe.schema import Recipe
+
+Event = PlatePicture | NDArray[np.void]
+"""A picture, or a block of the rig's samples."""
+
+BLOCK_S = 0.05
+NO_PICTURE_S = 5.0
+"""A camera that gives none for so long has stopped."""
+
+
+@dataclass(frozen=True, eq=False)
+class Feed:
+    """A stream of events; ``base_ns`` is the computer's clock at 0 s of the pictures' times."""
+
+    events: Iterator[Event]
+    base_ns: int
+
+
+def recorded_feed(track: RecordedTrack) -> Feed:
+    """What a track was given, again."""
+    return Feed(_recorded(track), track.base_ns)
+
+
+def video_feed(frames: Iterator[object], eye: PlateEye) -> Feed:
+    """The pictures of a video, one after the other."""
+    found = (eye.picture(one) for one in eye.locate(frames))  # type: ignore[arg-type]
+    return Feed(found, time.time_ns())
+
+
+def sim_feed(world: SimWorld, eye: PlateEye) -> Feed:
+    """What the rendered camera of a simulated world sees, without a rig."""
+    found = (eye.picture(one) for one in eye.locate(world.frames()))
+    return Feed(found, time.time_ns())
+
+
+def sim_rig_feed(world: SimWorld, motion: "Motion", eye: PlateEye | None) -> Feed:
+    """A virtual rig in virtual time, and what the camera of the same world sees."""
+    return Feed(_sim_rig(world, motion, eye), 0)
+
+
+def live_feed(
+    stack: ExitStack, eye: PlateEye | None, frames: Iterator[object] | None, motion: "Motion | None"
+) -> Feed:
+    """A running camera, a rig on a port, or both, in real time. ``stack`` closes the camera."""
+    base_ns, begun = time.time_ns(), time.monotonic()
+    camera = None
+    if eye is not None and frames is not None:
+        camera = CameraThread(frames, eye.locate)  # type: ignore[arg-type]
+        stack.enter_context(closing(camera))
+    return Feed(_live(camera, eye, motion, begun), base_ns)
+
+
+def idle_rig(link: "Link", recipe: "Recipe") -> AbstractContextManager["Motion"]:
+    """Start the servo with the motors off: the rig only tells where it is."""
+    from scissorcal.device.capture import servo_config
+    from scissorcal.device.open_motion import open_motion
+
+    return open_motion(link, servo_config(recipe, link.identity))
+
+
+def refuse_without_sledge(link: "Link") -> None:
+    """DeviceError where the tip's place along the cut is not measured."""
+    identity = link.identity
+    if identity.advance_min < identity.advance_max:
+        return
+    raise DeviceError(
+        f"The device {identity.name} has no sledge: it states no range of advance, so the tip's "
+        "place along the cut is not known. Track without it (--device none), or with a rig that "
+        "has one."
+    )
+
+
+def refuse_strange_pairs(camera: str, device: str) -> None:
+    """InputError where camera and device do not show one plate, or nothing is named."""
+    if camera == "none" and device == "none":
+        raise InputError("Name a camera (--camera), a device (--device), or both.")
+    if (camera == "sim") != (device == "sim") and "none" not in (camera, device):
+        raise InputError(
+            f"--camera {camera} and --device {device} do not show the same plate: the simulated "
+            "camera goes with the simulated rig. Give both as sim, or one of them as none."
+        )
+    if device != "none" and camera not in ("none", "sim") and not camera.isdigit():
+        raise InputError(
+            f"{camera} was recorded at another time than the rig on {device} is: its pictures "
+            "cannot be put at the rig's time. Give a camera's number, or --device none."
+        )
+
+
+def _recorded(track: RecordedTrack) -> Iterator[Event]:
+    samples, pictures = track.samples, list(track.pictures)
+    host = 1e-9 * (samples["host_time_ns"] - track.base_ns).astype(np.float64)
+    first, last = (host[0], host[-1]) if len(host) else (0.0, 0.0)
+    edges = np.arange(first + BLOCK_S, last + BLOCK_S, BLOCK_S)
+    for block in np.split(samples, np.searchsorted(host, edges)):
+        if not len(block):
+            continue
+        yield block
+        until = 1e-9 * float(block["host_time_ns"][-1] - track.base_ns)
+        while pictures and pictures[0].arrived_s <= until:
+            yield pictures.pop(0)
+    yield from pictures
+
+
+def _sim_rig(world: SimWorld, motion: "Motion", eye: PlateEye | None) -> Iterator[Event]:
+    world.begin(motion)
+    while True:
+        yield motion.step()
+        if eye is not None:
+            for found in eye.locate(world.frames(world.link.virtual_time)):
+                yield eye.picture(found)
+
+
+def _live(
+    camera: CameraThread | None, eye: PlateEye | None, motion: "Motion | None", begun: float
+) -> Iterator[Event]:
+    last = time.monotonic()
+    while True:
+        if motion is not None:
+            yield motion.step()
+        if camera is None or eye is None:
+            continue
+        found = camera.due(0.0 if motion is not None else BLOCK_S)
+        last = time.monotonic() if found else last
+        for one in found:
+            picture = eye.picture(one)
+            yield replace(picture, arrived_s=picture.arrived_s - begun)
+        if camera.ended and motion is None:
+            return
+        if time.monotonic() - last > NO_PICTURE_S:
+            raise DeviceError(
+                f"The camera has given no picture for {NO_PICTURE_S:g} s: check its cable, and "
+                "that no other program uses it."
+            )

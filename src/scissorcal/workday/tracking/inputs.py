@@ -1,0 +1,130 @@
+"""What a track builds on: the camera's fit, the rig's frame, the tip, and where the plate was."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.tracking.session import RigDrive
+from scissorcal.workday.tracking.track_recorder import RecordedTrack, TrackAbout
+
+if TYPE_CHECKING:
+    from scissorcal.device.link import Link
+    from scissorcal.model.surface import Surface
+    from scissorcal.recipe.schema import Recipe
+    from scissorcal.tracking.contacts import TipContacts
+    from scissorcal.workday.tracking.pictures import PlateEye
+
+Array = NDArray[np.float64]
+KnownPose = tuple[Array, Array, Array]
+"""Rotation (3, 3), place (3,) in m and covariance (6, 6) in the rig's frame."""
+
+REST_RATE_RAD_PER_S = 0.02
+"""Below it blades are taken to stand, and dry friction to hold a share of its level."""
+
+
+def plate_eye(engine: Engine, recipe: "Recipe", *, needs_rig: bool) -> "PlateEye":
+    """The fitted camera, and the rig's frame if its card tells all of it.
+
+    MissingError where there is no camera's fit, or where contacts need a frame that is not known.
+    """
+    from scissorcal.calibration.plate.fit import plate_target
+    from scissorcal.workday.runs.plate import locate_workspace_rig
+    from scissorcal.workday.tracking.pictures import PlateEye
+
+    fitted = load_result(engine, "camera")
+    located = locate_workspace_rig(engine, fitted.camera)
+    rig = None if located is None or located.untold else located
+    if rig is None and needs_rig:
+        told = f" ({', '.join(located.untold)} is not determined)" if located else ""
+        raise MissingError(
+            f"The camera's place in the rig's frame is not known{told}, so contacts and pictures "
+            "cannot be told together: photograph the rig card at several advances and openings "
+            "('scissorcal capture plate --image rig-*.jpg --stances stances.csv'), or track with "
+            "--device none."
+        )
+    back = plate_target(recipe).inverse()
+    return PlateEye(fitted.camera, back, rig, recipe.fit.plate.priors)
+
+
+def track_about(
+    engine: Engine, recipe: "Recipe", camera: str, eye: "PlateEye | None"
+) -> TrackAbout:
+    return TrackAbout(
+        source=Path(camera).name,
+        frame="rig" if eye is None or eye.rig else "camera",
+        camera_inputs_hash=load_result(engine, "camera").inputs_hash if eye else "",
+        width=eye.camera.width if eye else 0,
+        height=eye.camera.height if eye else 0,
+        camera_delay_ms=recipe.plate.tracking.camera_delay_ms,
+    )
+
+
+def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]":
+    """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
+    from scissorcal.model.blade_point import BladePoint
+    from scissorcal.model.mechanism import AxisLaw
+    from scissorcal.tracking.contacts import TipContacts
+    from scissorcal.workday.runs.control import axis_of_fit, blade_edge
+
+    edge = blade_edge(engine, recipe)
+    tip = BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades)
+    if "friction" not in available(engine, ("friction",)):
+        return TipContacts(tip), False
+    axis = axis_of_fit(load_result(engine, "friction"), 0.5, "kg m^2")
+    law = AxisLaw(axis.inertia, axis.friction, axis.offset, REST_RATE_RAD_PER_S)
+    return TipContacts(tip, law), True
+
+
+def rig_drive(engine: Engine, radius_m: float, link: "Link | None" = None) -> RigDrive:
+    """Zeros of the sensors are those that the last probe of this rig found."""
+    from scissorcal.workday.runs.probe import last_probe
+
+    probe = last_probe(engine.workspace, link)
+    if probe is None:
+        return RigDrive(radius_m)
+    zero = probe.torque_zero_Nm
+    return RigDrive(radius_m, 0.0 if zero is None else zero.mean, probe.rest.handle_zero_N)
+
+
+def surface_of(engine: Engine, recipe: "Recipe") -> "Surface":
+    from scissorcal.recipe.plate_surface import plate_surface
+
+    return plate_surface(recipe.plate.surface, engine.workspace.root)
+
+
+def known_pose(engine: Engine) -> KnownPose:
+    """The fitted pose of the plate in the rig's frame; MissingError where there is none."""
+    fit = load_result(engine, "plate")
+    if fit.rig_plate is None or fit.rig_plate.covariance is None:
+        raise MissingError(
+            "Without a camera a track starts from the fit of the plate, which has no pose in the "
+            "rig's frame: photograph the rig card too ('scissorcal capture plate --help'), or name "
+            "a camera."
+        )
+    found = fit.rig_plate
+    return found.matrix, np.array(found.translation_m), found.covariance
+
+
+def refuse_other_camera(path: Path, track: RecordedTrack, fitted: Any) -> None:
+    """InputError where a track's pictures were located by another camera than the present fit's."""
+    about, camera = track.about, fitted.camera
+    if not about.camera_inputs_hash:
+        raise InputError(f"{path.name} was recorded without a camera: there is nothing to locate.")
+    if (about.width, about.height) != (camera.width, camera.height):
+        raise InputError(
+            f"{path.name} has pictures of {about.width} x {about.height}, and the camera was "
+            f"fitted at {camera.width} x {camera.height}: its poses are of another camera. Restore "
+            "that camera's fit ('scissorcal fit log camera'), or track anew."
+        )
+    if about.camera_inputs_hash != fitted.inputs_hash:
+        raise InputError(
+            f"{path.name} holds poses by another fit of the camera "
+            f"({about.camera_inputs_hash[:8]}) than the present one ({fitted.inputs_hash[:8]}): "
+            "restore that fit ('scissorcal fit log camera', 'scissorcal fit restore'), or track "
+            "anew."
+        )

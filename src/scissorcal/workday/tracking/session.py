@@ -1,0 +1,248 @@
+"""A track while it runs: what is fed to the follower, recorded, counted and told."""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.model.surface import Surface
+from scissorcal.recipe.schema import Recipe
+from scissorcal.tracking.delay import DelayFit, measure_delay
+from scissorcal.tracking.follow import ContactSource, FollowedRow, PlateFollower, SeenPose
+from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
+from scissorcal.tracking.tracker import Outcome, PoseEstimate
+from scissorcal.vision.track import STATES, State
+from scissorcal.workday.tracking.pictures import PlatePicture
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
+
+Array = NDArray[np.float64]
+
+UNKNOWN_FRICTION_N = 1.0
+"""Least force of a contact where friction of the pivot was not fitted: three times what 13 mN m of
+it make at half a blade's lever."""
+
+
+@dataclass(frozen=True)
+class RigDrive:
+    """What turns samples into the drive of the opening, in N m: handle radius and sensor zeros."""
+
+    handle_radius_m: float
+    torque_zero_Nm: float = 0.0
+    handle_zero_N: float = 0.0
+
+    def of(self, samples: NDArray[np.void]) -> Array:
+        """Torque that opens the blades, shape (n,)."""
+        radius = 0.0 if math.isnan(self.handle_radius_m) else self.handle_radius_m
+        motor = samples["motor_torque"] - self.torque_zero_Nm
+        return np.asarray(motor - radius * (samples["handle_force"] - self.handle_zero_N))
+
+
+@dataclass(frozen=True, eq=False)
+class TrackMark:
+    """How a track is, for a person who watches: after each picture and each block of samples."""
+
+    seconds: float
+    done: float
+    state: str
+    picture: State | None
+    estimate: PoseEstimate | None
+    nis: float
+    outcomes: Counter[tuple[str, Outcome]]
+
+
+Tell = Callable[[TrackMark], None]
+
+
+class TrackSession:
+    """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
+
+    ``about`` is completed by the first picture with a pose: what all pictures share is known from
+    then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        surface: Surface,
+        about: TrackAbout,
+        *,
+        drive: RigDrive | None = None,
+        contacts: ContactSource | None = None,
+        friction_known: bool = True,
+        calibrated: bool = True,
+        recorder: TrackRecorder | None = None,
+        base_ns: int = 0,
+        tell: Tell | None = None,
+    ) -> None:
+        self.about = about
+        self.states: Counter[State] = Counter()
+        self.gaps: list[float] = []
+        self.travel_m = 0.0
+        self.elapsed_s = 0.0
+        self.unstamped = 0
+        self.delay: DelayFit | None = None
+        self._recipe = recipe
+        self._drive = drive
+        self._recorder = recorder
+        self._base_ns = base_ns
+        self._tell = tell
+        self._calibrated = calibrated
+        self._least_N = 0.0 if friction_known else UNKNOWN_FRICTION_N
+        self._picture: State | None = None
+        self._nis = math.nan
+        self._begun_s = self._seen_s = math.nan
+        self._first: Array | None = None
+        self._surface = surface
+        self._used = self._settings(None)
+        self.follower = PlateFollower(
+            surface,
+            self._used,
+            camera_delay_s=1e-3 * about.camera_delay_ms,
+            rig=drive is not None,
+            contacts=contacts,
+        )
+
+    @property
+    def started(self) -> bool:
+        """Whether there is a pose."""
+        return self.follower.tracker.started
+
+    def take_samples(self, samples: NDArray[np.void]) -> None:
+        """Record samples of the rig, and follow the contacts in them."""
+        if self._drive is None or not len(samples):
+            return
+        if self._recorder is not None:
+            self._recorder.samples(samples)
+        host = 1e-9 * (samples["host_time_ns"] - self._base_ns).astype(np.float64)
+        self._pass(float(host[-1]))
+        rows = self.follower.samples(
+            1e-6 * samples["device_time_us"].astype(np.float64),
+            host,
+            samples["opening"],
+            samples["advance"],
+            self._drive.of(samples),
+        )
+        for row in rows:
+            self._keep(row, float(host[-1]))
+        self._say(math.nan)
+
+    def take_picture(self, picture: PlatePicture) -> None:
+        """Record a picture, and follow the pose in it."""
+        self._pass(picture.arrived_s)
+        self.states[picture.state] += 1
+        self._picture = picture.state
+        stamp = picture.stamp_s
+        if math.isnan(stamp):
+            stamp, self.unstamped = picture.arrived_s, self.unstamped + 1
+        row = None
+        if picture.seen is not None:
+            self._look(picture)
+            pose = picture.seen.pose
+            row = self.follower.picture(
+                SeenPose(
+                    stamp,
+                    picture.arrived_s,
+                    pose.matrix,
+                    np.array(pose.translation_m),
+                    picture.seen.noise,
+                    certain=picture.state == "seen",
+                )
+            )
+            self._gap(picture.arrived_s)
+        if self._recorder is not None:
+            self._recorder.picture(picture, math.nan if row is None else row.time_s)
+        if row is not None:
+            self._keep(row, picture.arrived_s)
+        self._say(picture.done)
+
+    def start_known(self, rotation: Array, place_m: Array, covariance: Array) -> None:
+        """Begin with a pose from elsewhere; nothing while the rig has sent no time."""
+        if not self.started:
+            self._used = replace(self._used, camera=CameraErrors(0.0, 0.0))
+            self.follower.assume(self._used)
+            if self._recorder is not None:
+                self._recorder.about(self.about)
+        row = self.follower.start(rotation, place_m, covariance)
+        if row is not None:
+            self._keep(row, self.elapsed_s)
+
+    def finish(self) -> None:
+        """Close the last gap between pictures with a pose, and measure the camera's delay."""
+        if self.started and self.states.total():
+            self._gap(self._begun_s + self.elapsed_s)
+        follower = self.follower
+        if self._drive is not None and follower.pictures:
+            touched = [
+                row for row in follower.contacts if row.force_N >= self._used.contact.least_force_N
+            ]
+            self.delay = measure_delay(self._surface, self._used, list(follower.pictures), touched)
+
+    def why_waiting(self) -> str:
+        """Why there is no pose, as a sentence."""
+        count = self.states.total()
+        if not count:
+            return "The camera gave no picture."
+        seen = {state: self.states[state] for state in STATES if self.states[state]}
+        causes = ", ".join(f"in {n} {STATES[state]}" for state, n in seen.items())
+        return (
+            f"None of {count} pictures gave a pose of the plate's target to start from ({causes})."
+        )
+
+    def _look(self, picture: PlatePicture) -> None:
+        """Take from the first picture with a pose what all pictures share."""
+        seen = picture.seen
+        if seen is None or self.started or self.about.shared is not None:
+            return
+        # corners' errors that repeat from picture to picture are as large as their noise at most
+        shared = seen.shared + seen.noise
+        self.about = replace(self.about, shared=tuple(tuple(row) for row in shared.tolist()))
+        self._used = self._settings(shared)
+        self.follower.assume(self._used)
+        if self._recorder is not None:
+            self._recorder.about(self.about)
+
+    def _settings(self, shared: Array | None) -> TrackingSettings:
+        if shared is None and self.about.shared is not None:
+            shared = np.array(self.about.shared)
+        found = settings_of(self._recipe, shared if self._calibrated else None)
+        least = max(found.contact.least_force_N, self._least_N)
+        return replace(found, contact=replace(found.contact, least_force_N=least))
+
+    def _keep(self, row: FollowedRow, host_s: float) -> None:
+        if row.outcome in (Outcome.USED, Outcome.REFUSED):
+            self._nis = row.nis
+        if row.estimate is not None:
+            place = row.estimate.place_m
+            self._first = place if self._first is None else self._first
+            self.travel_m = max(self.travel_m, float(np.linalg.norm(place - self._first)))
+        if self._recorder is not None:
+            self._recorder.estimate(row, host_s)
+
+    def _pass(self, host_s: float) -> None:
+        if math.isnan(self._begun_s):
+            self._begun_s = self._seen_s = host_s
+        self.elapsed_s = max(self.elapsed_s, host_s - self._begun_s)
+
+    def _gap(self, host_s: float) -> None:
+        self.gaps.append(host_s - self._seen_s)
+        self._seen_s = host_s
+
+    def _say(self, done: float) -> None:
+        if self._tell is None:
+            return
+        follower = self.follower
+        estimate = follower.tracker.estimate() if self.started else None
+        self._tell(
+            TrackMark(
+                self.elapsed_s,
+                done,
+                follower.state,
+                self._picture,
+                estimate,
+                self._nis,
+                follower.outcomes,
+            )
+        )

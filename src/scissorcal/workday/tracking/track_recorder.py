@@ -1,0 +1,207 @@
+"""A track in a recording: samples, pictures and estimates, as they come; and read back."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.errors import InputError
+from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
+from scissorcal.recording.plate_channels import (
+    FRAME,
+    OUTCOMES,
+    PICTURE,
+    PICTURE_STATES,
+    POSE,
+    SOURCES,
+    STATES,
+    frame_rows,
+)
+from scissorcal.tracking.follow import FollowedRow
+from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision.geometry.seen_plate import SeenPlate
+from scissorcal.workday.tracking.pictures import TARGETS, PlatePicture
+
+Array = NDArray[np.float64]
+
+TRACK_MARK = "track"
+
+
+@dataclass(frozen=True)
+class TrackAbout:
+    """What a track is of, as its recording states it in the mark "track".
+
+    ``frame`` is the one that poses map the plate's frame into; ``shared`` (6, 6) the covariance of
+    what all pictures share.
+    """
+
+    source: str
+    frame: Literal["rig", "camera"]
+    camera_inputs_hash: str
+    width: int
+    height: int
+    camera_delay_ms: float
+    shared: tuple[tuple[float, ...], ...] | None = None
+
+
+class TrackRecorder:
+    """Writes what a track was given and what it found into captures/track-<stamp>.mcap.
+
+    ``base_ns`` is the computer's clock at 0 s of the times that rows are given with.
+    """
+
+    def __init__(
+        self, path: Path, recipe_toml: str, device: Mapping[str, Any], radius_m: float, base_ns: int
+    ) -> None:
+        self.path = path
+        self._writer = RecordingWriter(
+            path, "track", Joint("rotary"), recipe_toml, device, radius_m
+        )
+        self._base_ns = base_ns
+        self._rows = 0
+        self._frame = "camera"
+
+    def about(self, facts: TrackAbout) -> None:
+        """State what the track is of; before the first estimate."""
+        self._frame = facts.frame
+        self._writer.mark(TRACK_MARK, json.dumps(asdict(facts)))
+
+    def samples(self, samples: NDArray[np.void]) -> None:
+        """Add samples of the rig."""
+        self._writer.append(samples)
+
+    def picture(self, picture: PlatePicture, time_s: float) -> None:
+        """Add a picture, exposed at ``time_s`` of the filter's clock."""
+        row = np.zeros(1, dtype=PICTURE.dtype)
+        row["sequence"], row["corners"] = picture.number, picture.corners
+        row["state"] = PICTURE_STATES.index(picture.state)
+        row["target"] = TARGETS.index(picture.target)
+        row["camera_time_s"], row["time_s"] = picture.stamp_s, time_s
+        row["odds"], row["rms_px"] = picture.odds, picture.rms_px
+        for name in ("quaternion", "translation", "noise", "other_quaternion", "other_translation"):
+            row[name] = np.nan
+        if picture.seen is not None:
+            seen = picture.seen
+            row["quaternion"], row["translation"] = seen.pose.quaternion, seen.pose.translation_m
+            row["noise"] = seen.noise.ravel()
+            if seen.other is not None:
+                row["other_quaternion"] = seen.other.quaternion
+                row["other_translation"] = seen.other.translation_m
+        self._writer.append_telemetry(PICTURE, row, self._times(picture.arrived_s))
+
+    def estimate(self, followed: FollowedRow, host_s: float) -> None:
+        """Add what the filter knows after a row that came at ``host_s``; nothing without a pose."""
+        found = followed.estimate
+        if found is None:
+            return
+        row = np.zeros(1, dtype=POSE.dtype)
+        row["sequence"] = self._rows
+        row["source"] = SOURCES.index(followed.source)
+        row["outcome"] = OUTCOMES.index(followed.outcome.name.lower().replace("_", " "))
+        row["state"] = STATES.index(followed.state)
+        row["time_s"], row["row_time_s"] = found.time_s, followed.time_s
+        pose = Pose.from_matrix(found.rotation, found.place_m)
+        row["quaternion"], row["translation"] = pose.quaternion, pose.translation_m
+        row["covariance"], row["rates"] = found.covariance.ravel(), found.rates
+        row["nis"], row["contact_offset"] = followed.nis, found.contact_offset_m
+        row["compliance"] = found.compliance_m_per_N
+        row["compliance_sd"] = found.compliance_sd_m_per_N
+        row["contact_point"], row["contact_force"] = np.nan, np.nan
+        if followed.contact is not None:
+            row["contact_point"] = followed.contact.point_m
+            row["contact_force"] = followed.contact.force_N
+        times = self._times(host_s)
+        self._writer.append_telemetry(POSE, row, times)
+        self._writer.append_telemetry(FRAME, frame_rows(self._frame, row, times), times)
+        self._rows += 1
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence."""
+        self._writer.note(sentence)
+
+    @property
+    def estimates(self) -> int:
+        """Rows of the pose so far."""
+        return self._rows
+
+    def close(self, *, keep: bool, note: str = "") -> Path | None:
+        """Finish the file, with a last sentence; with ``keep`` False it is removed."""
+        if note:
+            self._writer.note(note)
+        path = self._writer.close()
+        if keep:
+            return path
+        path.unlink()
+        return None
+
+    def _times(self, host_s: float) -> NDArray[np.int64]:
+        return np.array([self._base_ns + round(1e9 * host_s)], dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedTrack:
+    """What a track was given: its pictures, the rig's samples (none without a rig), and facts."""
+
+    about: TrackAbout
+    pictures: tuple[PlatePicture, ...]
+    samples: NDArray[np.void]
+    device: Mapping[str, Any]
+    handle_radius_m: float
+    base_ns: int
+
+
+def read_track(path: Path) -> RecordedTrack:
+    """Read what a track was given, to follow it again with other settings.
+
+    Raises InputError where the file is no track, and what `read_recording` does.
+    """
+    recording = read_recording(path)
+    stated = [value for name, value in recording.marks if name == TRACK_MARK]
+    rows = read_telemetry(path, PICTURE)
+    if not stated:
+        raise InputError(f"{path} is not the recording of a track: name one that 'track' wrote.")
+    facts = json.loads(stated[-1])
+    shared = facts["shared"]
+    about = TrackAbout(**{**facts, "shared": tuple(map(tuple, shared)) if shared else None})
+    times = [*rows["host_time_ns"][:1].tolist(), *recording.samples["host_time_ns"][:1].tolist()]
+    base = min(times, default=0)
+    common = np.zeros((6, 6)) if about.shared is None else np.array(about.shared)
+    return RecordedTrack(
+        about,
+        tuple(_picture(row, base, common, len(rows)) for row in rows),
+        recording.samples,
+        recording.device,
+        recording.handle_radius_m,
+        base,
+    )
+
+
+def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePicture:
+    seen = None
+    if np.isfinite(row["quaternion"]).all():
+        noise = row["noise"].reshape(6, 6)
+        pose = Pose(tuple(row["quaternion"].tolist()), tuple(row["translation"].tolist()))
+        other = None
+        if np.isfinite(row["other_quaternion"]).all():
+            turned = tuple(row["other_quaternion"].tolist())
+            other = Pose(turned, tuple(row["other_translation"].tolist()))
+        seen = SeenPlate(
+            Pose(pose.quaternion, pose.translation_m, noise + shared), other, noise, shared
+        )
+    number = int(row["sequence"])
+    return PlatePicture(
+        number=number,
+        stamp_s=float(row["camera_time_s"]),
+        arrived_s=1e-9 * (int(row["host_time_ns"]) - base_ns),
+        state=PICTURE_STATES[int(row["state"])],  # type: ignore[arg-type]
+        corners=int(row["corners"]),
+        target=TARGETS[int(row["target"])],
+        odds=float(row["odds"]),
+        rms_px=float(row["rms_px"]),
+        seen=seen,
+        done=number / max(count, 1),
+    )

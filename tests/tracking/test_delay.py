@@ -1,0 +1,74 @@
+"""The camera's delay from replays of pictures and contacts, and when it cannot be seen."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from scissorcal.bench.control.traps import settings_for
+from scissorcal.bench.control.world import Scenario, circle, make_world, plane
+from scissorcal.model.surface import Plane
+from scissorcal.tracking.contacts import TipContact
+from scissorcal.tracking.delay import DelayFit, _last, measure_delay
+from scissorcal.tracking.rows import CameraPose
+
+
+def measured(scenario: Scenario, seed: int, late_s: float) -> DelayFit:
+    """Pictures that are taken for ``late_s`` earlier than they were exposed."""
+    world = make_world(scenario, plane, circle(10e-3), np.random.default_rng(seed))
+    pictures = [
+        CameraPose(p.exposed_s - late_s, p.rotation, p.place_m, p.covariance, p.certain)
+        for p in world.pictures
+    ]
+    contacts = [
+        TipContact(time, point, force)
+        for time, point, force in zip(
+            world.times_s.tolist(), world.point_m, world.force_N.tolist(), strict=True
+        )
+    ]
+    return measure_delay(Plane(), settings_for(scenario), pictures, contacts)
+
+
+@pytest.mark.parametrize(("seed", "late_s"), [(8, 0.0), (12, 0.03)])
+def test_a_moving_plate_that_is_touched_shows_the_delay(seed: int, late_s: float) -> None:
+    found = measured(Scenario("moving", moving=True, seconds=8.0), seed, late_s)
+    assert found.known
+    assert found.later_s == pytest.approx(late_s, abs=3.0 * found.sd_s)
+    assert 1e-3 < found.sd_s < 8e-3
+    assert "ms later than camera_delay_ms says" in found.sentence
+
+
+@pytest.mark.slow
+def test_its_standard_deviation_is_honest() -> None:
+    """Mean square of 24 z-scores below the 99.9 % quantile of a chi-square."""
+    scenario = Scenario("moving", moving=True, seconds=8.0)
+    scores = []
+    for seed in range(100, 124):
+        late = 0.02 * (seed % 3 - 1)
+        found = measured(scenario, seed, late)
+        if found.known:
+            scores.append((found.later_s - late) / found.sd_s)
+    assert len(scores) > 18
+    assert np.mean(np.square(scores)) < chi2.ppf(0.999, len(scores)) / len(scores)
+
+
+def test_a_plate_at_rest_shows_none() -> None:
+    found = measured(Scenario("fixed", seconds=4.0), 1, 0.02)
+    assert not found.known
+    assert "was not measured" in found.sentence
+
+
+def test_a_long_track_is_measured_by_its_end() -> None:
+    contacts = [TipContact(0.01 * number, np.zeros(3), 2.0) for number in range(5000)]
+    pictures = [
+        CameraPose(0.1 * number, np.eye(3), np.zeros(3), np.eye(6)) for number in range(500)
+    ]
+    kept, touched = _last(pictures, contacts)
+    assert len(touched) == 2000
+    assert kept[0].time_s == pytest.approx(touched[0].time_s - 1.0)
+    assert _last(pictures, contacts[:100]) == (pictures, contacts[:100])
+
+
+def test_pictures_without_contacts_show_none() -> None:
+    found = measure_delay(Plane(), settings_for(Scenario("fixed")), [], [])
+    assert not found.known
+    assert "20 of each are needed" in found.sentence

@@ -1,0 +1,136 @@
+"""A path followed with a workspace's rig: what it needs, what it keeps, what it says."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recording import read_attachments, read_recording, read_telemetry
+from scissorcal.recording.telemetry import CONTROL
+from scissorcal.verdicts import failed
+from scissorcal.workday.runs.capture import capture_advance_into, capture_into
+from scissorcal.workday.runs.control import control_workspace, stated_pose
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.workspace import Workspace, create_workspace
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A workspace with draft fits of both axes."""
+    folder = tmp_path_factory.mktemp("day")
+    workspace = create_workspace(folder / "paper", "paper-80gsm")
+    capture_into(workspace, "friction", "sim", designed=False)
+    capture_advance_into(workspace, "sim")
+    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    (workspace.root / "path.csv").write_text("x_mm,force_N\n10,2\n30,2\n20,3\n")
+    return workspace
+
+
+def path_of(workspace: Workspace) -> Path:
+    return workspace.root / "path.csv"
+
+
+def test_a_path_is_followed_with_what_was_fitted(fitted: Workspace) -> None:
+    """The recipe's specimen has its plate at 20, 10 mm, pitched by 3 degrees."""
+    done = control_workspace(fitted, "sim", path_of(fitted), pose="20,10,3")
+    figures = done.result.figures
+    assert failed(done.result.verdicts) == ()
+    assert figures.force_rms_N < 0.12
+    assert figures.path_95_mm < 0.3
+    assert figures.way_mm == pytest.approx(30.0, abs=0.1)
+    assert done.result.wanted_N == 3.0
+    assert done.recording is not None
+    recording = read_recording(done.recording)
+    assert recording.kind == "control"
+    assert "Followed 30.0 mm of path" in recording.notes[-1]
+    (attached,) = read_attachments(done.recording)
+    assert attached.name == "path.csv"
+    assert attached.data == path_of(fitted).read_bytes()
+    rows = read_telemetry(done.recording, CONTROL)
+    assert rows["force_wanted"].max() == pytest.approx(3.0, abs=0.01)
+    assert np.all(np.diff(rows["host_time_ns"]) > 0)
+    assert fitted.recordings("control") == (done.recording,)
+
+
+def test_without_fits_it_says_what_to_run(tmp_path: Path) -> None:
+    workspace = create_workspace(tmp_path / "paper", "paper-80gsm")
+    path = workspace.root / "path.csv"
+    path.write_text("x_mm\n10\n30\n")
+    with pytest.raises(MissingError, match="scissorcal capture friction"):
+        control_workspace(workspace, "sim", path, pose="20,10,3")
+
+
+def test_without_a_pose_it_says_what_to_do(fitted: Workspace) -> None:
+    with pytest.raises(MissingError, match=r"--pose"):
+        control_workspace(fitted, "sim", path_of(fitted))
+
+
+def test_without_friction_of_the_sledge_it_says_what_to_run(
+    fitted: Workspace, tmp_path: Path
+) -> None:
+    import shutil
+
+    other = Workspace(tmp_path / "paper")
+    shutil.copytree(fitted.root, other.root)
+    (other.root / "fits" / "friction-advance.nc").unlink()
+    with pytest.raises(MissingError, match="--axis advance"):
+        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+
+
+def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -> None:
+    from scissorcal.device.lockstep import LockstepLink
+
+    made = LockstepLink.configure
+
+    def refuse(self: LockstepLink, key: int, value: float) -> float:
+        self.rig.specimen = self.rig.specimen.model_copy(update={"plate": None})
+        return made(self, key, value)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(LockstepLink, "configure", refuse)
+        with pytest.raises(Exception, match="give the virtual rig's specimen a plate"):
+            control_workspace(fitted, "sim", path_of(fitted), pose="20,10,3", record=False)
+
+
+@pytest.mark.parametrize("text", ["", "1", "1,2,3,4", "a,b", "1,nan", "1;2"])
+def test_a_pose_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="X_MM,Y_MM,PITCH_DEG"):
+        stated_pose(text)
+
+
+def test_the_surface_and_its_material_are_the_recipes(fitted: Workspace, tmp_path: Path) -> None:
+    import shutil
+
+    other = Workspace(tmp_path / "paper")
+    shutil.copytree(fitted.root, other.root)
+    recipe = other.recipe_path
+    recipe.write_text(recipe.read_text() + "\n[plate.touch]\nstiffness_N_per_mm = 900\n")
+    with pytest.raises(InputError, match="No gains hold a force against 900 N/mm"):
+        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+    text = re.sub(r"stiffness.*", "peak_N = 1.0", recipe.read_text())
+    recipe.write_text(text + '[plate.surface]\nkind = "sphere"\nradius_mm = 20.0\n')
+    with pytest.raises(InputError, match="line 3: x = 30 mm leaves the surface"):
+        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+
+
+def test_the_command_tells_and_keeps(fitted: Workspace, capsys: pytest.CaptureFixture[str]) -> None:
+    from scissorcal.cli.root import run
+
+    words = ["control", "--device", "sim", "--path", str(path_of(fitted)), "--pose", "20,10,3"]
+    with pytest.raises(SystemExit) as ended:
+        run([*words, "--force", "2", "--json", "-w", str(fitted.root)])
+    out, err = capsys.readouterr()
+    assert ended.value.code == 0, err
+    envelope = json.loads(out)
+    assert envelope["result"]["figures"]["losses"] == 0
+    assert envelope["files"][0].endswith(".mcap")
+    assert {verdict["check"] for verdict in envelope["verdicts"]} >= {"force", "path", "touch"}
+    with pytest.raises(SystemExit) as ended:
+        run([*words, "-w", str(fitted.root), "--no-record"])
+    out, err = capsys.readouterr()
+    assert ended.value.code == 0, err
+    assert "followed 30.0 mm of path" in out
+    assert "following the path" in err

@@ -1,0 +1,127 @@
+"""Tracks in simulated worlds whose camera and rig frame are off as their covariances say."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.plate.fit import plate_target
+from scissorcal.device.motion import Motion
+from scissorcal.model.blade_point import BladePoint
+from scissorcal.model.surface import Plane
+from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe.load import parse_recipe, read_text
+from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.schema import Recipe
+from scissorcal.tracking.consistency import nees, pose_error
+from scissorcal.tracking.contacts import TipContacts
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision.geometry.rig_frame import RigPose
+from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
+from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
+from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
+from scissorcal.workday.tracking.session import RigDrive, TrackSession
+from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
+
+Array = NDArray[np.float64]
+
+CAMERA_SDS = np.array([0.8, 0.8, 0.6, 0.6, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3])
+RIG_SDS = np.array([5e-4, 5e-4, 5e-4, 1e-4, 1e-4, 2e-4])
+TEXT = read_text(recipe_path("paper-80gsm"))
+
+
+def a_recipe(*lines: str) -> Recipe:
+    """The recipe for paper with lines of plate.tracking."""
+    return parse_recipe("\n".join([TEXT, "[plate.tracking]", *lines]))
+
+
+def an_eye(recipe: Recipe, seed: int) -> PlateEye:
+    """A fitted camera and rig frame for the rendered scene, off by draws of their covariances."""
+    rng = np.random.default_rng([seed, 77])
+    lens = SIM_LENS
+    true = np.array([lens.focal_px, lens.focal_px, *lens.centre_px, *lens.distortion])
+    camera = Camera.of(
+        true + CAMERA_SDS * rng.standard_normal(9), lens.width, lens.height, np.diag(CAMERA_SDS**2)
+    )
+    scene = sim_plate_scene(recipe, seed).camera_rig
+    away = RIG_SDS * rng.standard_normal(6)
+    turn = Pose.from_rotation_vector(away[:3], np.zeros(3)).matrix
+    seen = Pose.from_matrix(turn @ scene.rotation, scene.shift_m + away[3:], np.diag(RIG_SDS**2))
+    rig = RigPose(seen, seen, 0.1, (), np.zeros((6, 9)))
+    priors = PlatePriors(print_scale_sd_percent=0.0)
+    return PlateEye(camera, plate_target(recipe).inverse(), rig, priors)
+
+
+def tip_of(recipe: Recipe) -> BladePoint:
+    """The true tip of the specimen, from its numbers."""
+    offset = -8e-3 + 75e-3 * np.tan(np.radians(2.0))
+    return BladePoint(75e-3, float(offset), recipe.rig.moving_blades)
+
+
+def a_session(
+    recipe: Recipe, *, rig: bool, recorder: TrackRecorder | None = None, surface: object = None
+) -> TrackSession:
+    delay = recipe.plate.tracking.camera_delay_ms
+    about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
+    return TrackSession(
+        recipe,
+        Plane(),
+        about,
+        drive=RigDrive(0.06) if rig else None,
+        contacts=TipContacts(tip_of(recipe)) if rig else None,
+        friction_known=False,
+        recorder=recorder,
+    )
+
+
+def tracked(
+    recipe: Recipe, seed: int, seconds: float, *, rig: bool
+) -> tuple[TrackSession, SimWorld, float]:
+    """Follow a world for so long; the session, the world, and the host's time at the end."""
+    world, eye = SimWorld(recipe, seed, rig=rig), an_eye(recipe, seed)
+    session = a_session(recipe, rig=rig)
+    if not rig:
+        last = 0.0
+        for picture in sim_feed(world, eye).events:
+            assert isinstance(picture, PlatePicture)
+            if picture.arrived_s > seconds:
+                break
+            session.take_picture(picture)
+            last = picture.arrived_s
+        return session, world, last
+    with idle_rig(world.link, recipe) as motion:
+        run_rig(session, world, motion, eye, seconds)
+    return session, world, world.link.virtual_time
+
+
+def run_rig(
+    session: TrackSession, world: SimWorld, motion: Motion, eye: PlateEye, seconds: float
+) -> None:
+    for event in sim_rig_feed(world, motion, eye).events:
+        if isinstance(event, PlatePicture):
+            session.take_picture(event)
+        else:
+            session.take_samples(event)
+        if session.elapsed_s >= seconds:
+            return
+
+
+def score(session: TrackSession, world: SimWorld, host_s: float) -> tuple[float, Array]:
+    """NEES and error (6,) of the pose at the last row, against the world's truth."""
+    found = session.follower.tracker.estimate()
+    clock = session.follower.rig
+    if clock is not None:
+        at = clock.fit.host(found.time_s)
+    else:
+        from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S
+
+        delay = 1e-3 * session.about.camera_delay_ms
+        at = (found.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
+    error = pose_error(found.rotation, found.place_m, *world.truth(at))
+    return nees(error, found.covariance), error
+
+
+def recorder_at(path: Path) -> TrackRecorder:
+    return TrackRecorder(path, TEXT, {"name": "sim"}, 0.06, 0)
