@@ -123,6 +123,19 @@ def test_a_flipped_bit_never_changes_a_sample(whole: Whole, at: float, bit: int)
     assert np.count_nonzero(~kept) <= 2 * max(whole.chunk_counts)
 
 
+def test_a_wrong_length_costs_no_chunk_but_its_own(whole: Whole) -> None:
+    """A length that runs past the following chunks hides none of them."""
+    heads = [8, *whole.chunk_starts[:4]]
+    for place, bit in (
+        (head + byte, bit) for head in heads for byte in range(1, 9) for bit in range(8)
+    ):
+        path = whole.with_bytes(place, bytes([whole.data[place] ^ (1 << bit)]))
+        found = read_recording(path)
+        kept = np.isin(whole.samples["sequence"], found.samples["sequence"])
+        np.testing.assert_array_equal(found.samples, whole.samples[kept])
+        assert np.count_nonzero(~kept) <= max(whole.chunk_counts)
+
+
 def test_a_damaged_chunk_is_left_out_with_its_place(whole: Whole) -> None:
     place = whole.chunk_starts[3] + 500
     found = read_recording(whole.with_bytes(place, b"\0\0\0\0"))

@@ -26,7 +26,7 @@ SLOWEST = 0.01
 SOFTER = tuple(0.5**step for step in range(1, 11))
 SOONER = (0.75, 0.5, 0.25, 0.0)
 """Shares of stiffness and of delay that a refusal tries."""
-HALVINGS = 5
+STEPS, HALVINGS = 16, 2
 
 
 @dataclass(frozen=True)
@@ -238,12 +238,19 @@ def _refusal(loops: Sequence[ContactLoop], within_s: float) -> str:
 
 
 def _largest(shares: Sequence[float], holds: Callable[[float], bool]) -> float | None:
-    """About the largest share below 1 at which something holds; None where it holds at none."""
+    """About the share up to which something holds from one of ``shares`` on; None for no such.
+
+    Damping that lags by more than a half turn damps again, so that what holds lies in several
+    ranges: only the lowest that joins the share found is counted.
+    """
     low = next((share for share in shares if holds(share)), None)
     if low is None:
         return None
     high = min((share for share in (1.0, *shares) if share > low), default=1.0)
+    step = (high - low) / STEPS
+    while low + step < high and holds(low + step):
+        low += step
     for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
+        step *= 0.5
+        low += step if holds(low + step) else 0.0
     return low

@@ -268,7 +268,7 @@ def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
         if offset + HEAD.size <= len(data):
             opcode, length = HEAD.unpack_from(data, offset)
             end = offset + HEAD.size + length
-        if 1 <= opcode <= 15 and end <= len(data):
+        if _may_be_record(opcode) and end <= len(data) and not _too_long(data, offset, end):
             yield offset, opcode, data[offset + HEAD.size : end]
             walk.finished = opcode == 2
             offset = end
@@ -284,6 +284,22 @@ def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
         walk.damage.append(f"The bytes from {offset} to {resume} cannot be read; left out.")
         offset = resume
     walk.finished = False
+
+
+def _may_be_record(opcode: int) -> bool:
+    return 1 <= opcode <= 15
+
+
+def _too_long(data: bytes, offset: int, end: int) -> bool:
+    """Whether a record's length is wrong: no record follows it, and a chunk begins within it."""
+    if data[end:] in (b"", MAGIC):
+        return False
+    if end + HEAD.size <= len(data):
+        opcode, length = HEAD.unpack_from(data, end)
+        if _may_be_record(opcode) and end + HEAD.size + length <= len(data):
+            return False
+    within = _next_chunk(data, offset + 1)
+    return within is not None and within < end
 
 
 def _next_chunk(data: bytes, start: int) -> int | None:

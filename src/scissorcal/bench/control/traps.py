@@ -19,7 +19,7 @@ AT_REST = PlateMotion(0.01e-3, math.radians(0.002), 0.5)
 """A clamped plate: it creeps by less than the camera sees."""
 MOVING = PlateMotion(SPEED_M_PER_S, SPIN_RAD_PER_S, 0.5)
 FIXED_PLATE = Scenario("fixed")
-FIXED_LONG = Scenario("fixed, 20 s", seconds=20.0)
+FIXED_LONG = Scenario("fixed, 40 s", seconds=40.0)
 MOVING_PLATE = Scenario("moving", moving=True)
 BLACKOUT = Scenario("1 s without pictures", moving=True, blackout_s=1.0)
 FLIPS = Scenario("flips in bursts", flips=0.2)
