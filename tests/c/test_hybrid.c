@@ -17,6 +17,8 @@ typedef struct {
 
 static const member CONFIG[] = {
     OF(sc_hybrid_config, contact_kd),      OF(sc_hybrid_config, force_ki),
+    OF(sc_hybrid_config, approach_rate),
+    OF(sc_hybrid_config, force_kp),        OF(sc_hybrid_config, surface_cutoff_Hz),
     OF(sc_hybrid_config, normal_kp),       OF(sc_hybrid_config, normal_kd),
     OF(sc_hybrid_config, path_kp),         OF(sc_hybrid_config, path_kd),
     OF(sc_hybrid_config, path_ki),
@@ -43,6 +45,7 @@ static const member INPUT[] = {
     OF(sc_hybrid_input, surface_acceleration),
     OF(sc_hybrid_input, surface_friction),
     OF(sc_hybrid_input, force),
+    OF(sc_hybrid_input, compliance),
     OF(sc_hybrid_input, force_wanted),
     OF(sc_hybrid_input, gap_wanted),
     OF(sc_hybrid_input, gap_rate_wanted),

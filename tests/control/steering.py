@@ -35,6 +35,8 @@ class Known:
     viscous: float = 1.0
     curvature: bool = True
     surface_friction: float = 0.0
+    rising: float = 1.0
+    compliance: float = 1.0
 
 
 @dataclass
@@ -96,6 +98,7 @@ class Steering:
         sine, cosine = math.sin(opening), math.cos(opening)
         x, y = advance + blade.length * cosine, blade.length * sine
         raised, rising = disc.raised(plant.time)
+        rising *= known.rising
         cx, cy = disc.centre[0] + known.off[0], disc.centre[1] + known.off[1] + raised
         away = math.hypot(x - cx, y - cy)
         nx, ny = (x - cx) / away, (y - cy) / away
@@ -121,7 +124,8 @@ class Steering:
         into["normal"][:2] = [nx, ny]
         into["gap"] = away - disc.radius
         into["surface_velocity"][:2] = [0.0, rising]
-        heave = -((2.0 * math.pi * disc.swing_Hz) ** 2) * raised
+        heave = -known.rising * (2.0 * math.pi * disc.swing_Hz) ** 2 * raised
+        into["compliance"] = known.compliance / disc.stiffness
         into["surface_acceleration"] = ny * heave - known.curvature * along * along / away
         into["surface_friction"] = known.surface_friction
         into["force"] = plant.sensed()

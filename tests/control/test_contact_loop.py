@@ -37,6 +37,44 @@ def test_a_fast_tick_gives_the_printed_equations_poles(damping: float) -> None:
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(printed), rel=2e-3)
 
 
+def test_a_proportional_answer_stiffens_the_printed_equation() -> None:
+    """m s^3 + b s^2 + k (1 + k_P) s + k k_I."""
+    poles = contact_poles(FAST, ContactGains(40.0, 30.0, 1.5))
+    found = np.log(poles[np.abs(poles) > 0.5]) / FAST.tick_s
+    whole = FAST.viscous_N_s_per_m + FAST.mass_kg * 40.0
+    printed = np.roots([FAST.mass_kg, whole, 2.5 * 3e3, 3e3 * 30.0])
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(printed), rel=2e-3)
+
+
+@pytest.mark.parametrize("stated", [0.67, 1.0, 1.5])
+def test_a_felt_surface_changes_the_damping_by_the_error_of_the_compliance(stated: float) -> None:
+    """Far below its cutoff the damping is kd times stated over true compliance."""
+    loop = replace(FAST, surface_cutoff_Hz=3e3)
+    loop = replace(loop, stiffness_N_per_m=3e3 / stated)
+    told = replace(loop, stiffness_factor=1.0, mass_factor=1.0)
+    found = contact_decay(told, ContactGains(40.0, 2.0))
+    same = contact_decay(replace(told, surface_cutoff_Hz=0.0), ContactGains(40.0, 2.0))
+    assert found == pytest.approx(same, rel=1e-3)
+    wrong = replace(loop, stiffness_factor=stated if stated >= 1.0 else 1.0 / stated)
+    ratios = (1.0, wrong.stiffness_factor, 1.0 / wrong.stiffness_factor)
+    each = [
+        contact_decay(
+            replace(
+                loop,
+                stiffness_N_per_m=ratio * loop.stiffness_N_per_m,
+                surface_cutoff_Hz=0.0,
+                stiffness_factor=1.0,
+                mass_factor=1.0,
+            ),
+            ContactGains(40.0 * ratio, 2.0),
+        )
+        for ratio in ratios
+    ]
+    assert contact_decay(replace(wrong, mass_factor=1.0), ContactGains(40.0, 2.0)) == (
+        pytest.approx(min(each), rel=0.02)
+    )
+
+
 def test_the_printed_law_is_stable_below_damping_over_mass_alone() -> None:
     onset = brentq(lambda gain: contact_decay(alone(FAST), ContactGains(0.0, gain)), 1.0, 500.0)
     assert onset == pytest.approx(FAST.viscous_N_s_per_m / FAST.mass_kg, rel=1e-3)
@@ -101,29 +139,42 @@ CASES = {
     ),
     "late, slow filter": (0.2, Disc(stiffness=1e3), Blade(delay_s=2.3e-3, lag_s=1e-3), 100.0),
 }
+FELT = {
+    "no delay": (200.0, 0.0),
+    "a tick late": (100.0, 0.1),
+    "part of a tick, slow sensor": (100.0, 0.1),
+}
+"""Cutoff (Hz) of a surface's rate that is felt, and force_kp."""
 
 
-@pytest.mark.parametrize("title", CASES)
-def test_the_c_law_becomes_unstable_where_the_poles_say(title: str) -> None:
+@pytest.mark.parametrize(
+    ("title", "felt"),
+    [*((title, (0.0, 0.0)) for title in CASES), *FELT.items()],
+)
+def test_the_c_law_becomes_unstable_where_the_poles_say(
+    title: str, felt: tuple[float, float]
+) -> None:
     """On the plant in substeps, at 5 % below and above the integral gain of the unit circle."""
     opening, disc, blade, cutoff = CASES[title]
     blade = replace(blade, dry=(0.0, 0.0), viscous=(0.0, 0.0), step=(0.0, 0.0))
-    loop = alone(loop_of(blade, disc, mass_at(blade, opening), rate_cutoff_Hz=cutoff))
-    damping = contact_gains([loop])[0].contact_kd
+    mass, (surface, force_kp) = mass_at(blade, opening), felt
+    loop = alone(loop_of(blade, disc, mass, rate_cutoff_Hz=cutoff, surface_cutoff_Hz=surface))
+    chosen = contact_gains([loop], force_kp=force_kp)[0]
 
     def growth(gain: float) -> float:
-        return -contact_decay(loop, ContactGains(damping, gain))
+        return -contact_decay(loop, replace(chosen, force_ki=gain))
 
-    onset = brentq(growth, contact_gains([loop])[0].force_ki, 500.0)
+    onset = brentq(growth, chosen.force_ki, 500.0)
     for share in (0.95, 1.05):
-        rate = swing_growth(blade, disc, opening, ContactGains(damping, share * onset), cutoff)
+        gains = replace(chosen, force_ki=share * onset)
+        rate = swing_growth(blade, disc, opening, gains, (cutoff, surface))
         assert (rate > 0.0) == (share > 1.0), (share, rate)
         if opening == 0.0 and share < 1.0:  # axes that do not meet: nothing but this loop
             assert rate == pytest.approx(growth(share * onset), rel=0.03)
 
 
 def swing_growth(
-    blade: Blade, disc: Disc, opening: float, gains: ContactGains, cutoff: float
+    blade: Blade, disc: Disc, opening: float, gains: ContactGains, cutoffs: tuple[float, float]
 ) -> float:
     """Growth (1/s) of the force's swing, pressing at 2 N on a disc so large that it is flat."""
     lever, radius = blade.length * math.cos(opening), 20.0
@@ -137,7 +188,9 @@ def swing_growth(
     plant.state[3] = plant.state[2] * blade.length * math.sin(opening)
     config = hybrid_config(
         contact_kd=gains.contact_kd,
+        force_kp=gains.force_kp,
         force_ki=gains.force_ki,
+        surface_cutoff_Hz=cutoffs[1],
         force_slew=1e6,
         friction_share=0.0,
         path_kp=400.0,
@@ -146,6 +199,6 @@ def swing_growth(
         integral_most=100.0,
         effort_limit=(50.0, 50.0),
     )
-    run = Steering(plant, config, Known(rate_cutoff_Hz=cutoff)).run(2.0, resting())
+    run = Steering(plant, config, Known(rate_cutoff_Hz=cutoffs[0])).run(2.0, resting())
     off = np.abs(run["force"] - 2.0)
     return math.log(off[-400:].max() / off[600:1000].max()) / 1.0

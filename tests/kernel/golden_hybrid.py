@@ -97,6 +97,7 @@ def motion(axes: int, seed: int, jacobian: float = 0.3) -> Inputs:
         surface_acceleration=wave(0.5),
         surface_friction=0.25,
         force=force,
+        compliance=2.0**-13,
         force_wanted=np.repeat([2.0, 0.125, 6.0, 3.0], STEPS // 4),
         gap_wanted=wave(1e-3),
         gap_rate_wanted=wave(1e-2),
@@ -134,6 +135,7 @@ def cases() -> dict[str, tuple[HybridConfig, Inputs]]:
     position = {**CONFIG, "normal_law": NormalLaw.POSITION}
     weak = {**CONFIG, "effort_limit": (0.03, 1.0), "force_ki": 100.0}
     tight = {**CONFIG, "integral_most": 0.0625, "force_ki": 100.0}
+    felt = {**CONFIG, "surface_cutoff_Hz": 100.0, "force_kp": 0.75, "integral_most": 1.0}
     return {
         "two axes": (HybridConfig(**CONFIG), _near(motion(2, 1))),
         "a path far away": (HybridConfig(**CONFIG), motion(2, 2)),
@@ -144,6 +146,9 @@ def cases() -> dict[str, tuple[HybridConfig, Inputs]]:
         "an integral at its end": (HybridConfig(**tight), _near(motion(2, 7))),
         "broken inputs": (HybridConfig(**CONFIG), _broken(motion(2, 8))),
         "irregular ticks": (HybridConfig(**THREE), _irregular(motion(3, 9))),
+        "from afar": (HybridConfig(**{**CONFIG, "approach_rate": 16.0}), _near(motion(2, 12))),
+        "a surface that is felt": (HybridConfig(**felt), _irregular(motion(2, 10))),
+        "a felt surface, weak motors": (HybridConfig(**{**felt, **weak}), motion(2, 11)),
     }
 
 

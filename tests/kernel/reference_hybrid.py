@@ -28,6 +28,8 @@ class State:
     speed: float = 0.0
     force_aim: float = 0.0
     integral: float = 0.0
+    surface_rate: float | None = None
+    force_before: float = 0.0
     below_s: float = 0.0
     gathered: Array = field(default_factory=lambda: np.zeros(3))
 
@@ -54,14 +56,18 @@ class ReferenceHybrid:
         moved = jacobian @ np.linalg.solve(inertia, jacobian.T @ normal)  # by a newton
         flags, pressed = self._watch(given)
         velocity = jacobian @ given["rate"]
-        gap_rate = float(normal @ (velocity - given["surface_velocity"]))
         dt = min(float(given["dt"]), 0.01)
+        felt = self._felt(given, pressed, float(normal @ velocity), dt)
+        gap_rate = float(normal @ velocity) - felt
         before = self.state.integral
-        pressing, wanted, grown, fall = 0.0, 0.0, 0.0, 0.0
+        pressing, wanted, answer, grown, fall = 0.0, 0.0, 0.0, 0.0, 0.0
         if pressed and config.normal_law == NormalLaw.FORCE:
             wanted, flags = self._ramped(given, dt, flags)
-            pressing = wanted + before
-            grown = before + config.force_ki * (wanted - float(given["force"])) * dt
+            missing = wanted - float(given["force"])
+            answer = config.force_kp * missing
+            answer = min(max(answer, -config.integral_most), config.integral_most)
+            pressing = wanted + answer + before
+            grown = before + config.force_ki * missing * dt
             grown = min(max(grown, -config.integral_most), config.integral_most)
             a_n = -config.contact_kd * gap_rate
         elif config.normal_law == NormalLaw.FORCE:
@@ -82,18 +88,18 @@ class ReferenceHybrid:
         bent = np.concatenate([[normal @ given["jacobian_rate"]], along @ given["jacobian_rate"]])
         stay = np.concatenate([[given["surface_acceleration"] + a_n], np.zeros(axes - 1)])
         effort = inertia @ np.linalg.solve(task, stay - bent)
-        effort = effort + given["bias"] + self._friction(given, velocity, fall)
+        effort = effort + given["bias"] + self._friction(given, velocity, fall + felt)
         path = inertia @ np.linalg.solve(task, np.concatenate([[0.0], pull]))
         if pressed and config.normal_law == NormalLaw.FORCE:
-            flags |= self._integrate(effort, jacobian.T @ normal, wanted, grown)
-            effort = effort - jacobian.T @ normal * (wanted + self.state.integral)
+            flags |= self._integrate(effort, jacobian.T @ normal, wanted + answer, grown)
+            effort = effort - jacobian.T @ normal * (wanted + answer + self.state.integral)
         given_effort, share, more = self._limited(effort, path)
         if share == 1.0:
             self.state.gathered[:axes] = along.T @ gathered
         return {
             "effort": [*given_effort, *[0.0] * (3 - axes)],
             "force_aim": wanted,
-            "pressing": wanted + self.state.integral if wanted else 0.0,
+            "pressing": wanted + answer + self.state.integral if wanted else 0.0,
             "mass": 1.0 / float(normal @ moved),
             "gap_rate": gap_rate,
             "path_error": far,
@@ -141,18 +147,35 @@ class ReferenceHybrid:
     ) -> tuple[float, float]:
         config, gap = self.config, float(given["gap"])
         state, most = self.state, config.approach_force * mobility / config.normal_kp
+        fastest = max(config.approach_speed, config.approach_rate * gap)
         if state.aim is None:
-            state.aim, state.speed = gap, min(max(-gap_rate, 0.0), config.approach_speed)
+            state.aim, state.speed = gap, min(max(-gap_rate, 0.0), fastest)
         share = min(1.0, dt * config.normal_kp / config.normal_kd)
-        state.speed += share * (config.approach_speed - state.speed)
+        state.speed += share * (fastest - state.speed)
         state.aim = min(max(state.aim - state.speed * dt, gap - most), gap + most)
         ahead = config.normal_kp * (state.aim - gap)
         return config.normal_kd * (-state.speed - gap_rate) + ahead, -state.speed
 
-    def _friction(self, given: Row, velocity: Array, fall: float) -> Array:
+    def _felt(self, given: Row, pressed: bool, out: float, dt: float) -> float:
+        """The surface's rate along the normal: a first-order filter of what the point says of it,
+        by the backward rule; the given one where nothing is felt."""
+        told = float(given["normal"] @ given["surface_velocity"])
+        state, cutoff = self.state, self.config.surface_cutoff_Hz
+        if cutoff == 0.0 or not pressed or self.config.normal_law != NormalLaw.FORCE:
+            state.surface_rate = None
+            return told
+        if state.surface_rate is None:
+            state.surface_rate, state.force_before = told, float(given["force"])
+        sunk = given["compliance"] * (float(given["force"]) - state.force_before)
+        period = 1.0 / (2.0 * math.pi * cutoff)
+        state.surface_rate = (period * state.surface_rate + dt * out + sunk) / (period + dt)
+        state.force_before = float(given["force"])
+        return state.surface_rate
+
+    def _friction(self, given: Row, velocity: Array, out: float) -> Array:
         config, normal = self.config, given["normal"]
         flat = np.eye(config.axes) - np.outer(normal, normal)
-        moving = flat @ given["path_rate"] + normal * (fall + normal @ given["surface_velocity"])
+        moving = flat @ given["path_rate"] + normal * out
         wanted = np.linalg.solve(given["jacobian"], moving)
         band = np.array(config.friction_rate)
         sure = np.minimum(1.0, 5.0 * np.abs(wanted) / band)

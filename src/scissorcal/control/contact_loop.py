@@ -4,16 +4,18 @@ Along the normal the law (sc_hybrid.c) acts on
 
     m x'' + b x' + k x = u(t - delay) behind a motor of first order, u held from tick to tick,
 
-x the indentation, by u = -m kd (estimated x') + h, where h holds k_I T times the sum of the errors
-of the measured force k x, behind its sensor's low-pass. Held efforts and a delay that is no whole
-number of ticks are exact (Astrom and Wittenmark, Computer-Controlled Systems, 1997, section 3.2).
-Without delay, lag and filters, and with b as all the damping, its characteristic polynomial is
-m s^3 + b s^2 + k s + k k_I, which is stable for k_I < b / m alone.
+x the indentation, by u = -m kd (estimated x' - w) + h, where h holds k_P times the error of the
+measured force k x, behind its sensor's low-pass, and k_I T times the sum of its errors. The rate w
+of the surface is 0, or what the law feels of it: the estimated x' plus compliance times the force's
+rate, behind a low-pass. Held efforts and a delay that is no whole number of ticks are exact (Astrom
+and Wittenmark, Computer-Controlled Systems, 1997, section 3.2). Without delay, lag and filters, and
+with b as all the damping, its characteristic polynomial is
+m s^3 + b s^2 + k (1 + k_P) s + k k_I, which is stable for k_I < (1 + k_P) b / m alone.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -33,8 +35,10 @@ class ContactLoop:
     ``viscous_N_s_per_m`` is damping that the law's bias does not compensate. ``delay_s`` passes
     from a measurement to the effort that answers it, without the time for which an effort is held;
     ``motor_lag_s`` is the motor's time constant. The filters' cutoffs are 0 where there is none.
-    ``step_m`` is a count of the encoder, along the normal, which may change the force by
-    ``most_per_count_N`` (chosen: less than half of the 0.12 N by which a force may be off).
+    ``surface_cutoff_Hz`` is the corner below which the law feels the surface's rate
+    (``HybridConfig``'s ``surface_cutoff``, in Hz). ``step_m`` is a count of the encoder, along the
+    normal, which may change the force by ``most_per_count_N`` (chosen: less than half of the
+    0.12 N by which a force may be off).
     """
 
     stiffness_N_per_m: float
@@ -45,6 +49,7 @@ class ContactLoop:
     tick_s: float
     rate_cutoff_Hz: float
     force_cutoff_Hz: float = 0.0
+    surface_cutoff_Hz: float = 0.0
     step_m: float = 0.0
     most_per_count_N: float = 0.05
     stiffness_factor: float = 1.25
@@ -76,10 +81,12 @@ class ContactLoop:
 
 @dataclass(frozen=True)
 class ContactGains:
-    """Damping along the normal and the force's integral, both 1/s; ``HybridConfig``'s names."""
+    """Damping along the normal and the force's integral, both 1/s, and the share of the force's
+    error that is answered at once; ``HybridConfig``'s names."""
 
     contact_kd: float
     force_ki: float
+    force_kp: float = 0.0
 
 
 def contact_poles(
@@ -125,35 +132,48 @@ def _matrices(
     normal_kp: float,
 ) -> Array:
     """The loops from tick to tick (n, size, size); without the sum of errors where none is used."""
-    weights = [(1.0, one.contact_kd, one.force_ki, normal_kp) for one in gains]
-    parts, total = _parts(loop, *corner)
+    weights = [(1.0, one.contact_kd, one.force_ki, normal_kp, one.force_kp) for one in gains]
+    felt = loop.surface_cutoff_Hz if normal_kp == 0.0 else 0.0
+    parts, total = _parts(replace(loop, surface_cutoff_Hz=felt), *corner)
     if not any(one.force_ki for one in gains):
         parts = np.delete(np.delete(parts, total, axis=1), total, axis=2)
     return np.tensordot(weights, parts, 1)
 
 
 def _parts(loop: ContactLoop, stiffness: float, mass: float) -> tuple[Array, int]:
-    """The loop from tick to tick (4, n, n): without gains, and what a unit of each gain adds.
+    """The loop from tick to tick (5, n, n): without gains, and what a unit of each gain adds.
 
     The second is the place of the sum of errors.
 
     States: what moves (`_moving`), the estimated rate, the last place, the sum of the force's
-    errors, and the efforts on their way. The law knows the stated mass.
+    errors, the efforts on their way, and (where it is felt) the surface's rate and the last force.
+    The law knows the stated mass and stiffness.
     """
     free, fresh, stale, seen, ticks = _sampled(loop, stiffness, mass)
-    moving = len(free)
-    size = moving + 3 + ticks + 1
+    moving, feels = len(free), loop.surface_cutoff_Hz > 0.0
+    size = moving + 3 + ticks + 1 + 2 * feels
     estimate, last, total, late = range(moving, moving + 4)
     weight, tick = rate_weight(loop.rate_cutoff_Hz, loop.tick_s), loop.tick_s
-    rate, error = np.zeros(size), np.zeros(size)
-    rate[estimate], rate[0], rate[last] = 1.0 - weight, weight / tick, -weight / tick
-    error[total], error[:moving] = 1.0, -tick * seen
-    place = np.eye(size)[0]
-    efforts = np.stack([np.zeros(size), -loop.mass_kg * rate, error, -loop.mass_kg * place])
-    parts = np.zeros((4, size, size))
+    unit = np.eye(size)
+    place, force = unit[0], np.zeros(size)
+    force[:moving] = seen
+    rate = (1.0 - weight) * unit[estimate] + weight / tick * (place - unit[last])
+    error = unit[total] - tick * force
+    parts = np.zeros((5, size, size))
     parts[0, :moving, :moving] = free
-    parts[0, estimate], parts[0, last, 0], parts[0, total] = rate, 1.0, error
-    parts[0, late + 1 :, late : late + ticks] = np.eye(ticks)
+    parts[0, estimate], parts[0, last], parts[0, total] = rate, place, error
+    parts[0, late + 1 : late + 1 + ticks, late : late + ticks] = np.eye(ticks)
+    surface = np.zeros(size)
+    if feels:
+        felt, pressed = size - 2, size - 1
+        corner = 2.0 * math.pi * loop.surface_cutoff_Hz
+        presses_in = (force - unit[pressed]) / loop.stiffness_N_per_m
+        moved = tick * (rate - unit[felt]) - presses_in
+        surface = unit[felt] + corner / (1.0 + corner * tick) * moved
+        parts[0, felt], parts[0, pressed] = surface, force
+    efforts = np.zeros((5, size))
+    efforts[1], efforts[2] = loop.mass_kg * (surface - rate), error
+    efforts[3], efforts[4] = -loop.mass_kg * place, -force
     parts[:, late] = efforts
     if ticks == 0:
         parts[:, :moving] += fresh[:, None] * efforts[:, None, :]

@@ -17,6 +17,9 @@ WITHIN_S = 0.25
 TOUCH_FORCE_N = 0.2
 MOST_KD_PER_S, LEAST_KI_PER_S, MOST_KI_PER_S = 1500.0, 0.5, 500.0
 LEAST_DAMPING_PER_S = 1.0
+NO_KP = (0.0,)
+FORCE_KP = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
+KEPT_DECAY = 0.75
 PATH_INTEGRAL = 4.0
 """Corner of the path's rate over that of its integral, as in the slowest of a capture's shapes."""
 GRID, ROUNDS, ROUGH = 14, 4, 2
@@ -38,6 +41,7 @@ class HybridGains:
     """
 
     contact_kd: float
+    force_kp: float
     force_ki: float
     normal_kp: float
     normal_kd: float
@@ -58,11 +62,15 @@ def choose_gains(
     loops: Sequence[ContactLoop],
     peak_N: float,
     within_s: float = WITHIN_S,
+    force_kp: Sequence[float] = NO_KP,
 ) -> HybridGains:
     """Gains that hold at each of ``loops``: a scene's lightest and heaviest, softest and hardest.
 
     Damping along the normal and integral gain are those at which the slowest decay of the sampled
-    loop is fastest, stiffness and mass wrong by their factors. Path and approach get the stiffest
+    loop is fastest, stiffness and mass wrong by their factors. Of ``force_kp`` it takes the largest
+    at which that decay is at least 0.75 of the fastest at any of them: a surface that moves with an
+    acceleration a presses by m a / (1 + force_kp). Only a measured force may be answered so, not
+    one that is reconstructed from the axes' own efforts. Path and approach get the stiffest
     gains that keep 45 degrees and a factor of 2 (`scissorcal.device.control`), the approach's no
     integral, and softer where they would be unstable in contact. Its speed is that at which
     touching peaks at ``peak_N``. Raises InputError where no gains let the force settle
@@ -75,13 +83,16 @@ def choose_gains(
     """
     if not loops:
         raise ValueError("gains are chosen for one loop or more")
-    contact, decay = contact_gains(loops)
+    contact, decay = contact_gains(loops, ROUNDS, _largest_kp(loops, force_kp))
     if not decay >= 1.0 / within_s:
         raise InputError(_refusal(loops, within_s))
     path = _motion_gains(loops, PATH_INTEGRAL)
     normal = _stable_in_contact(loops, _motion_gains(loops, math.inf))
+    if normal is None:
+        raise InputError(_refusal(loops, within_s))
     return HybridGains(
         contact_kd=contact.contact_kd,
+        force_kp=contact.force_kp,
         force_ki=contact.force_ki,
         normal_kp=normal.kp,
         normal_kd=normal.kd,
@@ -94,7 +105,9 @@ def choose_gains(
     )
 
 
-def contact_gains(loops: Sequence[ContactLoop], rounds: int = ROUNDS) -> tuple[ContactGains, float]:
+def contact_gains(
+    loops: Sequence[ContactLoop], rounds: int = ROUNDS, force_kp: float = 0.0
+) -> tuple[ContactGains, float]:
     """Damping and integral gain of the fastest slowest decay, and that decay (1/s; below 0: none).
 
     Sought on grids, each of ``rounds`` about the best of the one before.
@@ -102,9 +115,9 @@ def contact_gains(loops: Sequence[ContactLoop], rounds: int = ROUNDS) -> tuple[C
     most_kd = min(_most_kd(loop) for loop in loops)
     kd = np.array([0.0, *np.geomspace(1e-3 * most_kd, most_kd, GRID - 1)])
     ki = np.geomspace(LEAST_KI_PER_S, MOST_KI_PER_S, GRID)
-    best, most = ContactGains(0.0, LEAST_KI_PER_S), -math.inf
+    best, most = ContactGains(0.0, LEAST_KI_PER_S, force_kp), -math.inf
     for _ in range(rounds):
-        gains = [ContactGains(float(one), float(other)) for one in kd for other in ki]
+        gains = [ContactGains(float(one), float(other), force_kp) for one in kd for other in ki]
         found = np.min([contact_decays(loop, gains) for loop in loops], axis=0)
         place = int(np.argmax(found))
         if found[place] > most:
@@ -137,7 +150,7 @@ def friction_rates(
     just cancel the law's damping of ``inertia`` (each axis's own, D_jj), so that the usual share of
     it leaves damping; a narrower band chatters.
 
-    >>> gains = HybridGains(100.0, 10.0, 4e3, 110.0, 4e3, 110.0, 4e4, 0.02, 8.0, 40.0)
+    >>> gains = HybridGains(100.0, 0.0, 10.0, 4e3, 110.0, 4e3, 110.0, 4e4, 0.02, 8.0, 40.0)
     >>> friction_rates(gains, (2e-4, 0.8), (5e-3, 0.8))
     (0.25, 0.01)
     """
@@ -145,10 +158,23 @@ def friction_rates(
     return tuple(dry / (own * damping) for own, dry in zip(inertia, dry_friction, strict=True))
 
 
+def _largest_kp(loops: Sequence[ContactLoop], force_kp: Sequence[float]) -> float:
+    """The largest that is bought with no more than a quarter of the fastest decay."""
+    if len(force_kp) == 1:
+        return force_kp[0]
+    decays = {kp: contact_gains(loops, ROUGH, kp)[1] for kp in force_kp}
+    enough = KEPT_DECAY * max(decays.values())
+    return max((kp for kp, decay in decays.items() if decay >= enough), default=0.0)
+
+
 def _most_kd(loop: ContactLoop) -> float:
-    """Damping at which a count of the encoder changes the force by no more than it may."""
+    """Damping at which a count of the encoder changes the force by no more than it may.
+
+    Its effort lasts a tick, and a mass m on a spring k turns an impulse J into J sqrt(k / m).
+    """
     weight = rate_weight(loop.rate_cutoff_Hz, loop.tick_s)
-    per_count = loop.mass_kg * loop.step_m * weight / loop.tick_s
+    swing = max(math.sqrt(stiffness / mass) for stiffness, mass in loop.corners)
+    per_count = loop.mass_kg * loop.step_m * weight * min(swing, 1.0 / loop.tick_s)
     return min(MOST_KD_PER_S, loop.most_per_count_N / per_count if per_count > 0.0 else math.inf)
 
 
@@ -188,7 +214,7 @@ def _motion_gains(loops: Sequence[ContactLoop], integral: float) -> Gains:
     return weakest
 
 
-def _stable_in_contact(loops: Sequence[ContactLoop], gains: Gains) -> Gains:
+def _stable_in_contact(loops: Sequence[ContactLoop], gains: Gains) -> Gains | None:
     """Gains of place and rate, as fast as given or slower, that press stably at all loops."""
     share = 1.0
     while share > SLOWEST:
@@ -197,14 +223,24 @@ def _stable_in_contact(loops: Sequence[ContactLoop], gains: Gains) -> Gains:
         if all(contact_decays(loop, pressed, slower.kp)[0] > 0.0 for loop in loops):
             return slower
         share *= SLOWER
-    raise InputError(_refusal(loops, math.inf))
+    return None
+
+
+def _has_gains(loops: Sequence[ContactLoop], within_s: float) -> bool:
+    if not contact_gains(loops, ROUGH)[1] >= 1.0 / within_s:
+        return False
+    try:
+        gains = _motion_gains(loops, math.inf)
+    except InputError:
+        return False
+    return _stable_in_contact(loops, gains) is not None
 
 
 def _refusal(loops: Sequence[ContactLoop], within_s: float) -> str:
     worst = max(loops, key=lambda loop: loop.phase_deg)
 
     def settles(change: Callable[[ContactLoop], ContactLoop]) -> bool:
-        return contact_gains([change(loop) for loop in loops], ROUGH)[1] >= 1.0 / within_s
+        return _has_gains([change(loop) for loop in loops], within_s)
 
     softer = _largest(
         SOFTER,

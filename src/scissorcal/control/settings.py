@@ -124,7 +124,7 @@ def control_settings(
 def _slower_integral(gains: HybridGains, loops: list[ContactLoop]) -> HybridGains:
     """The same gains with an integral that does not drive blades to and fro through friction."""
     slower = replace(gains, force_ki=min(gains.force_ki, MOST_KI_PER_S))
-    contact = [ContactGains(slower.contact_kd, slower.force_ki)]
+    contact = [ContactGains(slower.contact_kd, slower.force_ki, slower.force_kp)]
     decay = min(float(contact_decays(loop, contact)[0]) for loop in loops)
     return replace(slower, decay_per_s=decay)
 
@@ -145,6 +145,7 @@ def _config(
     law = HybridConfig(
         axes=2,
         contact_kd=gains.contact_kd,
+        force_kp=gains.force_kp,
         force_ki=gains.force_ki,
         normal_kp=gains.normal_kp,
         normal_kd=gains.normal_kd,

@@ -112,9 +112,10 @@ class ControlConfig:
         fill_struct(struct, self)
         if not lib.sc_control_config_is_sound(struct):
             raise ValueError(
-                "CONTROL needs a law of force for 2 axes, 1 or 2 moving blades, and numbers from 0 "
-                "on; station, inertia, mass, presliding, tick_s, away, end_s, approach_s and "
-                "least_lever above 0."
+                "CONTROL needs a law of force for 2 axes, without force_kp and surface_cutoff_Hz, "
+                "which need a force sensor; 1 or 2 moving blades, and numbers from 0 on; station, "
+                "inertia, mass, presliding, tick_s, away, end_s, approach_s and least_lever above "
+                "0."
             )
 
 

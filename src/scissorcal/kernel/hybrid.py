@@ -53,14 +53,17 @@ class HybridFlag(IntFlag):
 class HybridConfig:
     """Gains and limits of the law, in SI units and radians; docs/control.md has the equations.
 
-    ``axes`` 2 or 3. Along the normal: ``contact_kd`` (1/s) and ``force_ki`` (1/s) while touching;
-    ``normal_kp`` (1/s^2) and ``normal_kd`` (1/s) of the approach and of POSITION. Along the
+    ``axes`` 2 or 3. Along the normal: ``contact_kd`` (1/s), ``force_kp`` and ``force_ki`` (1/s)
+    while touching; ``normal_kp`` (1/s^2) and ``normal_kd`` (1/s) of the approach and of POSITION.
+    Below ``surface_cutoff_Hz`` the surface's rate along the normal is felt while touching, by the
+    point's rate and the input ``compliance`` times the force's; 0 takes the given rate. Along the
     surface: ``path_kp``, ``path_kd``, ``path_ki`` (1/s^3); errors beyond ``path_error_most`` (m)
     count as that long.
     Wanted forces stay within ``touch_force`` to ``force_most`` (N) and change by ``force_slew``
-    (N/s) at most; the integral stays within ``integral_most`` (N). Touching begins at
-    ``touch_force`` and ends after ``leave_s`` below ``leave_force`` (N). The approach moves at
-    ``approach_speed`` (m/s) and pushes by ``approach_force`` (N) at most.
+    (N/s) at most; the integral, and the answer by ``force_kp``, stay within ``integral_most`` (N).
+    Touching begins at ``touch_force`` and ends after ``leave_s`` below ``leave_force`` (N). The
+    approach moves at ``approach_speed`` (m/s) or, from afar, by ``approach_rate`` (1/s) of the gap,
+    and pushes by ``approach_force`` (N) at most.
     ``friction_share`` of dry friction is compensated by the wanted rate of an axis or, where that
     rests, by the measured one: in proportion up to ``friction_rate`` (per axis, rad/s or m/s),
     along the surface up to ``slip_rate`` (m/s). Efforts stay within ``effort_limit`` (per axis). A
@@ -76,7 +79,9 @@ class HybridConfig:
     axes: int
     normal_law: NormalLaw = NormalLaw.FORCE
     contact_kd: float
+    force_kp: float = 0.0
     force_ki: float
+    surface_cutoff_Hz: float = 0.0
     normal_kp: float
     normal_kd: float
     path_kp: float
@@ -90,6 +95,7 @@ class HybridConfig:
     leave_force: float = 0.1
     leave_s: float = 0.02
     approach_speed: float = 5e-3
+    approach_rate: float = 2.0
     approach_force: float = 0.6
     friction_share: float = 0.7
     slip_rate: float = 0.02

@@ -29,7 +29,7 @@ from scissorcal.bench.control.world import (
     slow_process,
 )
 from scissorcal.control.contact_loop import ContactLoop
-from scissorcal.control.gains import HybridGains, choose_gains
+from scissorcal.control.gains import FORCE_KP, HybridGains, choose_gains
 from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inputs
 from scissorcal.tracking.rotation import cross
 from scissorcal.tracking.rows import CameraPose
@@ -46,6 +46,8 @@ LEARN_S = 1.0
 """Time of pictures before the tip moves."""
 START_ABOVE_M = 3e-3
 RATE_CUTOFF_HZ = 400.0
+SURFACE_CUTOFF_HZ = 100.0
+"""Five times as fast as the lightest normal swings on the material (19 Hz)."""
 TOUCH_TICKS = 100
 SOFTNESS = 0.04
 """Stiffness of soft position control, as a share of the stiff one's."""
@@ -143,6 +145,7 @@ class _Run:
             jacobian=true_arm.AXES,
             force_wanted=FORCE_N,
             surface_friction=ASSUMED_FRICTION,
+            compliance=COMPLIANCE,
         )
         self.before = self.arm.measured
         self.seen_rate = np.zeros(3)
@@ -276,6 +279,7 @@ def contact_loops() -> list[ContactLoop]:
             motor_lag_s=true_arm.MOTOR_LAG_S,
             tick_s=true_arm.TICK_S,
             rate_cutoff_Hz=RATE_CUTOFF_HZ,
+            surface_cutoff_Hz=SURFACE_CUTOFF_HZ,
             step_m=true_arm.STEP_M,
             stiffness_factor=1.5,
         )
@@ -286,7 +290,7 @@ def contact_loops() -> list[ContactLoop]:
 @cache
 def gains_of() -> HybridGains:
     """Gains for the benchmark's arm and material."""
-    return choose_gains(contact_loops(), peak_N=PEAK_N)
+    return choose_gains(contact_loops(), peak_N=PEAK_N, force_kp=FORCE_KP)
 
 
 def config_of(gains: HybridGains, law: str) -> HybridConfig:
@@ -298,6 +302,7 @@ def config_of(gains: HybridGains, law: str) -> HybridConfig:
     return HybridConfig(
         axes=3,
         normal_law=NormalLaw.FORCE if law == "hybrid" else NormalLaw.POSITION,
+        surface_cutoff_Hz=SURFACE_CUTOFF_HZ,
         force_most=FORCE_MOST_N,
         friction_rate=(2e-3, 2e-3, 2e-3),
         effort_limit=(EFFORT_N, EFFORT_N, EFFORT_N),

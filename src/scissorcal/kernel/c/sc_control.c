@@ -60,6 +60,7 @@ int sc_control_config_is_sound(const sc_control_config *config)
     }
     return config->law.axes == AXES && config->law.normal_law == SC_HYBRID_FORCE &&
            sc_hybrid_config_is_sound(&config->law) && isfinite(config->edge_offset) &&
+           config->law.force_kp == 0.0f && config->law.surface_cutoff_Hz == 0.0f &&
            isfinite(config->offset) &&
            isfinite(config->torque_zero) && isfinite(config->handle_zero) &&
            (config->moving_blades == 1.0f || config->moving_blades == 2.0f) &&

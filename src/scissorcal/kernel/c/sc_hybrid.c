@@ -7,6 +7,7 @@
 enum { MOST = SC_HYBRID_MOST };
 
 static const float LONGEST_STEP_S = 0.01f; /* a gap in time fills neither the integral nor the ramp */
+static const float TWO_PI = 6.28318531f;
 static const float SHARPER = 5.0f;         /* wanted rates have no noise, and feed nothing back */
 
 /* What the parts of a step share. */
@@ -17,8 +18,10 @@ typedef struct {
     float slip[MOST];     /* of the point over the material, along the surface */
     float gap_rate;
     float gathered[MOST]; /* the path's integral as it would grow */
+    float felt;           /* by how much the surface's rate along the normal is more than given */
     float normal;         /* a_n */
     float fall;           /* rate that is wanted of the gap */
+    float answer;         /* h without lambda_d and the integral */
     float pressing;       /* h as it was */
 } moment;
 
@@ -79,6 +82,32 @@ static int is_pressed(const sc_hybrid_config *config, sc_hybrid *state, const sc
     return pressed;
 }
 
+/* The surface's rate along the normal, felt while it is pressed. */
+static void feel(const sc_hybrid_config *config, sc_hybrid *state, const sc_hybrid_input *in,
+                 int pressed, moment *now)
+{
+    now->felt = 0.0f;
+    if (!pressed || config->surface_cutoff_Hz == 0.0f) {
+        state->feels = 0;
+        return;
+    }
+    const int axes = now->point.axes;
+    const float given = sc_point_dot(axes, in->normal, in->surface_velocity);
+    if (!state->feels) {
+        state->feels = 1;
+        state->surface_rate = given;
+        state->force_before = in->force;
+    }
+    const float corner = TWO_PI * config->surface_cutoff_Hz;
+    const float out = sc_point_dot(axes, in->normal, now->velocity);
+    const float moved = now->dt * (out - state->surface_rate) +
+                        in->compliance * (in->force - state->force_before);
+    state->surface_rate += corner / (1.0f + corner * now->dt) * moved;
+    state->force_before = in->force;
+    now->felt = state->surface_rate - given;
+    now->gap_rate = out - state->surface_rate;
+}
+
 /* Let the gap follow a wanted one, at the rate `fall`. */
 static void follow_gap(const sc_hybrid_config *config, const sc_hybrid_input *in, float gap,
                        moment *now)
@@ -92,31 +121,33 @@ static void approach(const sc_hybrid_config *config, sc_hybrid *state, const sc_
 {
     const float most = config->approach_force * now->point.mobility;
     const float lead = config->normal_kp > 0.0f ? most / config->normal_kp : 0.0f;
+    const float fastest = fmaxf(config->approach_speed, config->approach_rate * in->gap);
     if (!state->approaching) {
         state->approaching = 1;
         state->aim = in->gap;
-        state->speed = fminf(fmaxf(-now->gap_rate, 0.0f), config->approach_speed);
+        state->speed = fminf(fmaxf(-now->gap_rate, 0.0f), fastest);
     }
     const float grows = config->normal_kp * now->dt; /* in the loop's own time, kd / kp */
     const float share = grows < config->normal_kd ? grows / config->normal_kd : 1.0f;
-    state->speed += share * (config->approach_speed - state->speed);
+    state->speed += share * (fastest - state->speed);
     state->aim -= state->speed * now->dt;
     state->aim = in->gap + clipped(state->aim - in->gap, lead);
     now->fall = -state->speed;
     follow_gap(config, in, state->aim, now);
 }
 
-/* Let lambda_d follow what is wanted, and return the integral as it would grow. */
+/* Let lambda_d follow what is wanted, answer its error, and return the integral as it would grow. */
 static float press(const sc_hybrid_config *config, sc_hybrid *state, const sc_hybrid_input *in,
-                   float dt, uint32_t *flags)
+                   moment *now, uint32_t *flags)
 {
     const float wanted = fminf(fmaxf(in->force_wanted, config->touch_force), config->force_most);
     if (wanted != in->force_wanted) {
         *flags |= SC_HYBRID_FORCE_BOUNDED;
     }
-    state->force_aim += clipped(wanted - state->force_aim, config->force_slew * dt);
+    state->force_aim += clipped(wanted - state->force_aim, config->force_slew * now->dt);
     const float error = state->force_aim - in->force;
-    return clipped(state->integral + config->force_ki * error * dt, config->integral_most);
+    now->answer = clipped(config->force_kp * error, config->integral_most);
+    return clipped(state->integral + config->force_ki * error * now->dt, config->integral_most);
 }
 
 /* The path's integral along the surface, no larger than what the largest error pulls. */
@@ -184,7 +215,7 @@ static void compensate(const sc_hybrid_config *config, const sc_hybrid_input *in
                        const moment *now, float *effort)
 {
     const int axes = now->point.axes;
-    const float out = now->fall + sc_point_dot(axes, in->normal, in->surface_velocity);
+    const float out = now->fall + now->felt + sc_point_dot(axes, in->normal, in->surface_velocity);
     float wanted[MOST], glide[MOST], rates[MOST];
     for (int i = 0; i < axes; i++) {
         wanted[i] = in->path_rate[i];
@@ -238,7 +269,7 @@ static void integrate(const sc_hybrid_config *config, sc_hybrid *state, const mo
     const float change = grown - state->integral;
     for (int j = 0; j < now->point.axes; j++) {
         const float by = now->point.press[j];
-        const float whole = effort[j] + by * (state->force_aim + grown);
+        const float whole = effort[j] + by * (state->force_aim + now->answer + grown);
         if (fabsf(whole) > config->effort_limit[j] && whole * by * change > 0.0f) {
             *flags |= SC_HYBRID_INTEGRAL_HELD;
             return;
@@ -281,7 +312,8 @@ static void refuse(sc_hybrid *state, sc_hybrid_output *out, uint32_t flag)
 static int is_finite_step(const sc_hybrid *state, int axes, const float *effort,
                           const float *path_effort)
 {
-    float sum = state->aim + state->speed + state->force_aim + state->integral;
+    float sum = state->aim + state->speed + state->force_aim + state->integral +
+                state->surface_rate;
     for (int j = 0; j < axes; j++) {
         sum += state->gathered[j] + fabsf(effort[j]) + fabsf(path_effort[j]);
     }
@@ -306,9 +338,10 @@ void sc_hybrid_step(const sc_hybrid_config *config, sc_hybrid *state, const sc_h
     look(input, &now);
     const int pressed = is_pressed(config, state, input, now.dt, &out->flags) &&
                         config->normal_law == SC_HYBRID_FORCE;
-    now.fall = 0.0f;
+    feel(config, state, input, pressed, &now);
+    now.fall = now.answer = 0.0f;
     if (pressed) {
-        grown = press(config, state, input, now.dt, &out->flags);
+        grown = press(config, state, input, &now, &out->flags);
         now.normal = input->surface_acceleration - config->contact_kd * now.gap_rate;
     } else if (config->normal_law == SC_HYBRID_FORCE) {
         approach(config, state, input, &now);
@@ -316,14 +349,14 @@ void sc_hybrid_step(const sc_hybrid_config *config, sc_hybrid *state, const sc_h
         now.fall = input->gap_rate_wanted;
         follow_gap(config, input, input->gap_wanted, &now);
     }
-    now.pressing = pressed ? state->force_aim + state->integral : 0.0f;
+    now.pressing = pressed ? state->force_aim + now.answer + state->integral : 0.0f;
     follow_path(config, state, input, &now, pull, out);
     move(input, &now, pull, effort, path_effort);
     compensate(config, input, &now, effort);
     if (pressed) {
         integrate(config, state, &now, grown, effort, &out->flags);
         out->force_aim = state->force_aim;
-        out->pressing = state->force_aim + state->integral;
+        out->pressing = state->force_aim + now.answer + state->integral;
         for (int j = 0; j < config->axes; j++) {
             effort[j] += now.point.press[j] * out->pressing;
         }

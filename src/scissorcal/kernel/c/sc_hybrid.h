@@ -15,12 +15,19 @@
  *
  * with one of these along the normal, where a_s is the acceleration at which the gap's rate stays:
  *
- *     FORCE, touching     a_n = a_s - contact_kd gap',
- *                         h = lambda_d + force_ki * integral of (lambda_d - lambda)
+ *     FORCE, touching     a_n = a_s - contact_kd (n^T pd - w),
+ *                         h = lambda_d + force_kp (lambda_d - lambda)
+ *                             + force_ki * integral of (lambda_d - lambda)
  *     FORCE, not touching a_n = a_s + normal_kd (aim' - gap') + normal_kp (aim - gap), h = 0;
- *                         the aim's fall grows from the gap's to approach_speed, and the aim is no
- *                         farther ahead than presses by approach_force
+ *                         the aim's fall grows from the gap's to approach_speed or, where that
+ *                         is faster, approach_rate * gap; and the aim is no farther ahead than
+ *                         presses by approach_force
  *     POSITION            a_n = a_s + normal_kd (gap_d' - gap') + normal_kp (gap_d - gap), h = 0
+ *
+ * While it touches, the surface's rate w along n is felt: a point that presses with lambda moves with
+ * the surface but for the change of the indentation, compliance * lambda, so that w follows
+ * n^T pd + compliance * lambda' behind a low-pass of surface_cutoff_Hz. It starts at the given
+ * surface's rate, and stays there with a cutoff of 0.
  *
  * Touching begins at touch_force, and lambda_d rises from there at force_slew. Below leave_force the
  * approach takes over at once, lambda_d falls back to touch_force, and after leave_s touching has
@@ -60,7 +67,9 @@ typedef struct {
     int32_t axes;          /* 2 or 3 */
     uint32_t normal_law;
     float contact_kd;      /* damping along the normal while touching [1/s] */
+    float force_kp;        /* its part of h stays within integral_most */
     float force_ki;        /* [1/s] */
+    float surface_cutoff_Hz; /* above it the surface's rate is not felt; 0: it is the given one */
     float normal_kp;       /* [1/s^2] */
     float normal_kd;       /* [1/s] */
     float path_kp;         /* [1/s^2] */
@@ -74,6 +83,7 @@ typedef struct {
     float leave_force;     /* below touch_force [N] */
     float leave_s;
     float approach_speed;  /* [m/s] */
+    float approach_rate;   /* from afar the gap shrinks by this share of it [1/s] */
     float approach_force;  /* above touch_force [N] */
     float friction_share;  /* of dry friction that is compensated */
     float slip_rate;       /* of sliding on the surface, as friction_rate [m/s] */
@@ -99,6 +109,7 @@ typedef struct {
     float surface_acceleration; /* a_s; of a surface at rest -v^T Hessian v / |grad phi| [m/s^2] */
     float surface_friction;     /* mu; 0 compensates none */
     float force;                /* measured lambda [N] */
+    float compliance;           /* indentation by a newton, for the surface's felt rate [m/N] */
     float force_wanted;         /* [N] */
     float gap_wanted;           /* of POSITION [m] */
     float gap_rate_wanted;      /* [m/s] */
@@ -115,6 +126,9 @@ typedef struct {
     float speed;          /* at which the aim falls [m/s] */
     float force_aim;      /* lambda_d behind its slew [N] */
     float integral;       /* force_ki times the integral of the force's error [N] */
+    uint32_t feels;       /* the two that follow are set */
+    float surface_rate;   /* of the surface along the normal, as felt [m/s] */
+    float force_before;   /* [N] */
     float below_s;        /* how long the force has been below leave_force */
     float gathered[SC_HYBRID_MOST]; /* path_ki times the integral of the path's error [m/s^2] */
 } sc_hybrid;
@@ -124,7 +138,7 @@ typedef struct {
     float force_aim;  /* lambda_d behind its slew; 0 while nothing is pressed [N] */
     float pressing;   /* h [N] */
     float mass;       /* that the surface meets along its normal [kg] */
-    float gap_rate;   /* [m/s] */
+    float gap_rate;   /* against the surface's rate, felt or given [m/s] */
     float path_error; /* length of the error along the surface [m] */
     float path_share; /* of the path's effort that was given */
     uint32_t flags;

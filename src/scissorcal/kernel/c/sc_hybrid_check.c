@@ -19,7 +19,8 @@ int sc_hybrid_config_is_sound(const sc_hybrid_config *config)
         config->path_ki,         config->path_error_most, config->force_most,     config->force_slew,
         config->integral_most,   config->leave_force,    config->leave_s,
         config->approach_speed,  config->approach_force, config->friction_share,
-        config->slip_rate,       config->touch_force};
+        config->slip_rate,       config->touch_force,    config->force_kp,
+        config->surface_cutoff_Hz, config->approach_rate};
     for (size_t i = 0; i < sizeof levels / sizeof levels[0]; i++) {
         if (!is_level(levels[i])) {
             return 0;
@@ -64,6 +65,7 @@ int sc_hybrid_input_is_usable(int32_t axes, const sc_hybrid_input *in)
                             in->surface_acceleration,
                             in->surface_friction,
                             in->force,
+                            in->compliance,
                             in->force_wanted,
                             in->gap_wanted,
                             in->gap_rate_wanted,
@@ -75,7 +77,7 @@ int sc_hybrid_input_is_usable(int32_t axes, const sc_hybrid_input *in)
         }
     }
     return all_usable((int)(sizeof single / sizeof single[0]), single) && in->dt >= 0.0f &&
-           in->surface_friction >= 0.0f && all_usable(axes, in->rate) &&
+           in->surface_friction >= 0.0f && in->compliance >= 0.0f && all_usable(axes, in->rate) &&
            all_usable(axes, in->bias) && all_usable(axes, in->jacobian_rate) &&
            all_usable(axes, in->point) && all_usable(axes, in->surface_velocity) &&
            all_usable(axes, in->path) && all_usable(axes, in->path_rate) &&
