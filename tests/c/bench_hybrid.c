@@ -32,10 +32,32 @@ static float random_unit(uint32_t *seed)
 
 static sc_hybrid_config config_of(const hybrid_case *one)
 {
-    sc_hybrid_config config = {
-        one->axes, one->law, 100.0f, 10.0f, 4000.0f, 100.0f, 4000.0f, 100.0f, 3e4f, 2e-3f, 5.0f, 10.0f,
-        3.0f,      0.2f,     0.1f,   0.02f, 5e-3f,   0.6f,   0.7f,    1e-3f,  {0.2f, 0.01f, 0.2f},
-        {0.5f, 20.0f, 20.0f}, 0.05f};
+    const sc_hybrid_config config = {.axes = one->axes,
+                                     .normal_law = one->law,
+                                     .contact_kd = 100.0f,
+                                     .force_kp = 0.5f,
+                                     .force_ki = 10.0f,
+                                     .surface_cutoff_Hz = 100.0f,
+                                     .normal_kp = 4000.0f,
+                                     .normal_kd = 100.0f,
+                                     .path_kp = 4000.0f,
+                                     .path_kd = 100.0f,
+                                     .path_ki = 3e4f,
+                                     .path_error_most = 2e-3f,
+                                     .force_most = 5.0f,
+                                     .force_slew = 10.0f,
+                                     .integral_most = 3.0f,
+                                     .touch_force = 0.2f,
+                                     .leave_force = 0.1f,
+                                     .leave_s = 0.02f,
+                                     .approach_speed = 5e-3f,
+                                     .approach_rate = 2.0f,
+                                     .approach_force = 0.6f,
+                                     .friction_share = 0.7f,
+                                     .slip_rate = 1e-3f,
+                                     .friction_rate = {0.2f, 0.01f, 0.2f},
+                                     .effort_limit = {0.5f, 20.0f, 20.0f},
+                                     .least_volume = 0.05f};
     return config;
 }
 
@@ -65,6 +87,7 @@ static sc_hybrid_input input_of(const hybrid_case *one, uint32_t *seed)
     in.surface_friction = 0.2f;
     in.force = one->force * (1.0f + 0.1f * random_unit(seed));
     in.force_wanted = 2.0f;
+    in.compliance = 1e-4f;
     return in;
 }
 

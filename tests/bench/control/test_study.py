@@ -9,9 +9,10 @@ import pytest
 from scissorcal.bench.control.control_study import ControlRun, control_run
 from scissorcal.bench.control.objects import plate_of
 from scissorcal.bench.control.pose_study import SOURCES, PoseRun
-from scissorcal.bench.control.result import ControlBench, Run, summarise
+from scissorcal.bench.control.result import ControlBench, summarise
 from scissorcal.bench.control.study import Done, Extent, Job, do, jobs
 from scissorcal.bench.control.traps import FIXED_PLATE
+from scissorcal.bench.run import Run
 from scissorcal.report.bench_control import control_page
 
 RUN = Run(datetime(2026, 1, 2, tzinfo=UTC), "0", "a machine", 1, 0, 1.0, 1)

@@ -22,13 +22,13 @@ from scissorcal.bench.extremes.result import (
     SUBJECTS,
     ErrorMap,
     MapCell,
-    Run,
     Sweep,
     SweepPoint,
     summarise,
 )
 from scissorcal.bench.extremes.states import SWEPT, everyday_state, random_state
 from scissorcal.bench.extremes.study import Done, Extent, Job, Tried, do, jobs, planned, try_state
+from scissorcal.bench.run import Run
 from scissorcal.errors import InputError
 from scissorcal.package.exact import ExactModel
 from scissorcal.report.extremes import LOOKS, WRONG, extremes_page, map_chart, sweep_chart
@@ -264,7 +264,7 @@ def test_a_budget_is_kept_with_several_workers(tmp_path: Path, monkeypatch, work
 
 
 def _facts(planned: int) -> Run:
-    return Run(datetime(2026, 1, 2, tzinfo=UTC), "1.0", "none", 1, 0, 1.0, None, planned)
+    return Run(datetime(2026, 1, 2, tzinfo=UTC), "1.0", "none", 1, 0, 1.0, planned)
 
 
 def _done(outcome: str) -> Done:

@@ -13,6 +13,7 @@ from scissorcal.bench.control.control_study import LAWS, POSES, ControlRun
 from scissorcal.bench.control.pose_study import SOURCES, PoseRun
 from scissorcal.bench.control.study import CONTROL_CASES, POSE_CASES, Done
 from scissorcal.bench.control.traps import traps
+from scissorcal.bench.run import Run
 from scissorcal.tracking.consistency import mean_band, share_held
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
@@ -88,19 +89,6 @@ class ControlRow:
     touch_N: Spread
     touch_bound_N: float
     contact_share: float
-
-
-@dataclass(frozen=True)
-class Run:
-    """How a run was made."""
-
-    created: datetime
-    version: str
-    machine: str
-    workers: int
-    seed: int
-    seconds: float
-    planned: int
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from scissorcal.bench.extremes.compare import Compared, Subject
 from scissorcal.bench.extremes.quantities import QUANTITIES, Quantity
 from scissorcal.bench.extremes.states import State
 from scissorcal.bench.extremes.study import PAIRS, Done, Tried, unit_of
+from scissorcal.bench.run import Run
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 ExtremesFormat = Literal["scissorcal-extremes/1"]
@@ -183,20 +184,6 @@ class Extremes:
             listed = f"{first} are listed in the page" + (", and each wrong cell" if cells else "")
         remedy = f"{self.sentence} {listed}: report them."
         return (judge("bench", "wrong", count, 0.0, self.sentence, remedy),)
-
-
-@dataclass(frozen=True)
-class Run:
-    """Facts about a run that its states do not tell."""
-
-    created: datetime
-    version: str
-    machine: str
-    workers: int
-    seed: int
-    seconds: float
-    budget_s: Number
-    planned: int
 
 
 def summarise(run: Run, done: Iterable[Done], cells: Sequence[Cell]) -> Extremes:

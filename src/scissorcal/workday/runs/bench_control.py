@@ -1,15 +1,11 @@
 """`bench control`: its jobs spread over processes, its page and JSON twin."""
 
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import scissorcal
-from scissorcal.files import replacing
 from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
@@ -41,9 +37,10 @@ def run_bench_control(
 
     The same extent and seed draw the same worlds. Needs no workspace.
     """
-    from scissorcal.bench.control.result import Run, control_text, summarise
+    from scissorcal.bench.control.result import control_text, summarise
     from scissorcal.bench.control.study import do, jobs
     from scissorcal.report.bench_control import control_page
+    from scissorcal.workday.runs.bench_files import run_facts, write_page_and_twin
 
     began = time.monotonic()
     tell = progress or (lambda done, sentence: None)
@@ -57,20 +54,7 @@ def run_bench_control(
     with open_pool(workers, cluster) as pool:
         pool.work(do, every, keep)
         count = pool.workers
-    run = Run(
-        created=datetime.now(UTC),
-        version=scissorcal.__version__,
-        machine=f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
-        workers=count,
-        seed=seed,
-        seconds=time.monotonic() - began,
-        planned=len(every),
-    )
-    result = summarise(run, done)
-    folder.mkdir(parents=True, exist_ok=True)
-    outcome = ControlOutcome(result, folder / "control.html", folder / "control.json")
-    texts = ((outcome.json, control_text(result)), (outcome.html, control_page(result)))
-    for path, text in texts:
-        with replacing(path) as part:
-            part.write_text(text, encoding="utf-8")
-    return outcome
+    result = summarise(run_facts(began, workers=count, seed=seed, planned=len(every)), done)
+    twin = control_text(result)
+    html, json = write_page_and_twin(folder, "control", control_page(result), twin)
+    return ControlOutcome(result, html, json)

@@ -1,15 +1,11 @@
 """`bench extremes`: its jobs spread over processes, its page and JSON twin."""
 
-import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import scissorcal
-from scissorcal.files import replacing
 from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
@@ -47,9 +43,10 @@ def run_extremes(
     later, and what was tried is some of everything. Needs no workspace.
     """
     from scissorcal.bench.extremes.cells import all_cells
-    from scissorcal.bench.extremes.result import Run, extremes_text, summarise
+    from scissorcal.bench.extremes.result import extremes_text, summarise
     from scissorcal.bench.extremes.study import Done, do, jobs
     from scissorcal.report.extremes import extremes_page
+    from scissorcal.workday.runs.bench_files import run_facts, write_page_and_twin
 
     began = time.monotonic()
     tell = progress or (lambda done, sentence: None)
@@ -67,26 +64,11 @@ def run_extremes(
         handed = pool if deadline is None else replace(pool, ahead=1)
         handed.work(do, _in_time(every, done, deadline), keep)
         count = pool.workers
-    run = Run(
-        created=datetime.now(UTC),
-        version=scissorcal.__version__,
-        machine=f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
-        workers=count,
-        seed=seed,
-        seconds=time.monotonic() - began,
-        budget_s=budget_s,
-        planned=planned,
-    )
+    run = run_facts(began, workers=count, seed=seed, planned=planned, budget_s=budget_s)
     result = summarise(run, done, all_cells())
-    folder.mkdir(parents=True, exist_ok=True)
-    outcome = ExtremesOutcome(result, folder / "extremes.html", folder / "extremes.json")
-    for path, text in (
-        (outcome.json, extremes_text(result)),
-        (outcome.html, extremes_page(result)),
-    ):
-        with replacing(path) as part:
-            part.write_text(text, encoding="utf-8")
-    return outcome
+    twin = extremes_text(result)
+    html, json = write_page_and_twin(folder, "extremes", extremes_page(result), twin)
+    return ExtremesOutcome(result, html, json)
 
 
 def _in_time(every: "list[Job]", done: "list[Done]", deadline: float | None) -> "Iterator[Job]":
