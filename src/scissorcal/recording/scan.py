@@ -14,6 +14,7 @@ from scissorcal.errors import InputError
 from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
 from scissorcal.recording.channels import CHANNELS
+from scissorcal.recording.foreign import refuse_other_formats
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
 from scissorcal.recording.telemetry import TelemetryChannel, rows_of
@@ -110,7 +111,7 @@ class Scan:
 def scan_file(path: Path) -> Scan:
     """Read a whole file, complete, cut off or damaged; InputError if it is no recording."""
     data = read_bytes(path)
-    _refuse_other_formats(path, data)
+    refuse_other_formats(path, data)
     walk = _Walk()
     for offset, opcode, body in _records(data, walk):
         try:
@@ -357,33 +358,6 @@ def _open_attachment(body: bytes) -> Attachment:
     if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
         raise _DamageError(f"attachment {record.name!r}, whose checksum does not match")
     return Attachment(record.name, record.media_type, record.data)
-
-
-def _refuse_other_formats(path: Path, data: bytes) -> None:
-    if data.startswith(MAGIC):
-        return
-    if MAGIC.startswith(data):
-        raise InputError(
-            f"{path} is cut off within its first {len(MAGIC)} bytes: nothing can be recovered "
-            "from it. Capture again."
-        )
-    known = {
-        b"\x89PNG": "a PNG image",
-        b"\xff\xd8\xff": "a JPEG image",
-        b"PK\x03\x04": "a zip archive",
-        b"PAR1": "a Parquet table (use 'scissorcal import')",
-        b"MATLAB": "a MATLAB file (use 'scissorcal import')",
-        b"\x89HDF": "an HDF5 file",
-    }
-    looks = next((words for start, words in known.items() if data.startswith(start)), "")
-    if not looks:
-        printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in data[:1000])
-        text = printable > 0.9 * len(data[:1000])
-        looks = "text (for a table use 'scissorcal import')" if text else "an unknown format"
-    raise InputError(
-        f"{path} is not a recording: its first bytes are those of {looks}. Name an .mcap file that "
-        "scissorcal wrote."
-    )
 
 
 def _why_no_recording(path: Path, walk: _Walk) -> str:
