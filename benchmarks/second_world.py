@@ -28,8 +28,13 @@ SURFACES: dict[str, Surface] = {
     "cylinder 30 mm": Cylinder(30e-3),
     "sphere 30 mm": Sphere(30e-3),
 }
-AT_REST = PlateMotion(0.01e-3, np.radians(0.002), 0.5)
-"""What a recipe states of a clamped plate; other settings are the defaults."""
+MOTIONS = {
+    "clamped": PlateMotion(0.01e-3, np.radians(0.002), 0.5),
+    "hand": PlateMotion(),
+    "springs": PlateMotion(time_s=0.25),
+}
+"""What is stated of a plate's motion: the recipe's default for a clamped plate, its figures for one
+in a hand, and for the body on springs the time over which its velocity keeps. All else is default."""
 ROWS = {
     "fixed": Scene(),
     "fixed, 40 s": Scene(seconds=40.0),
@@ -55,8 +60,8 @@ class Ended:
 
 
 def settings_of(scene: Scene) -> TrackingSettings:
-    """The defaults, and whether the plate is clamped."""
-    return TrackingSettings(plate=AT_REST) if scene.motion == "clamped" else TrackingSettings()
+    """The defaults, and how the plate moves."""
+    return TrackingSettings(plate=MOTIONS[scene.motion])
 
 
 def follow(

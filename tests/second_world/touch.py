@@ -31,8 +31,8 @@ CLOCK_SD_S, LATE_SHARE, LATE_S, LOST = 0.3e-3, 0.02, 3e-3, 0.01
 class Touches:
     """Rows of contact as a rig states them, and the truth of each.
 
-    ``stamp_s`` (n,), ``point_m`` (n, 3) the tip's centre less its radius along the tool, or the
-    centre itself where ``centre``; ``force_N`` (n,) along the expected normal. Truth: ``true_s``
+    ``stamp_s`` (n,), ``point_m`` (n, 3) the tip's centre less its radius along the tool, which
+    stands along the face's first normal; ``force_N`` (n,) along the expected normal. Truth: ``true_s``
     (n,), ``arcs_m`` (n, 2) where the face is touched, ``pressed_N`` (n,).
     """
 
@@ -50,8 +50,6 @@ def touches(
     seconds: float,
     tip_radius_m: float,
     rng: np.random.Generator,
-    *,
-    centre: bool = False,
 ) -> Touches:
     """Press and drag a tip over the face; what the rig says of it, a hundred times a second."""
     count = round(seconds / STEP_S)
@@ -78,8 +76,7 @@ def touches(
     rotation, place = motion(true)
     where = place + np.einsum("nij,nj->ni", rotation, ball)
     outward = np.einsum("nij,nj->ni", rotation, normals)
-    if not centre:
-        where = where - tip_radius_m * outward[0]
+    where = where - tip_radius_m * outward[0]
     where = where + _misplaced(where, rng)
     side = np.einsum("nij,njk,nk->ni", rotation, frames[:, :, :2], lag) * SIDE_N_PER_M
     force = _felt(outward * press[:, None] - side * (press > 0.0)[:, None], rng)

@@ -26,7 +26,6 @@ class Scene:
     flat: bool = False
     seconds: float = 8.0
     tip_radius_m: float = 1e-3
-    centre: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,5 @@ def draw_world(scene: Scene, shape: Shape, rng: np.random.Generator) -> World:
     moving, seeing, touching = rng.spawn(3)
     motion = moved(scene.motion, scene.seconds, moving)
     seen = pictures(motion, scene.seconds, scene.blind_s, scene.flat, seeing)
-    rows = touches(
-        motion, shape, scene.seconds, scene.tip_radius_m, touching, centre=scene.centre
-    )
+    rows = touches(motion, shape, scene.seconds, scene.tip_radius_m, touching)
     return World(scene, shape, motion, seen, rows)

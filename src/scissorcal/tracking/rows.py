@@ -17,6 +17,7 @@ from scissorcal.tracking.filter import (
     OFFSET,
     PLACE,
     POSE,
+    RIG_BIAS,
     SIZE,
     SPEED,
     SPIN,
@@ -81,7 +82,7 @@ class ForceDirection:
 
 
 def camera_row(state: FilterState, seen: CameraPose) -> tuple[Array, Array, Array]:
-    """Residual (6,), slopes (6, 24), noise (6, 6) of a picture's pose.
+    """Residual (6,), slopes (6, 30), noise (6, 6) of a picture's pose.
 
     [Log(R_m R^T) - b_r; o_m - o - b_t]
     """
@@ -95,7 +96,7 @@ def camera_row(state: FilterState, seen: CameraPose) -> tuple[Array, Array, Arra
 def contact_row(
     state: FilterState, contact: Contact, surface: Surface, errors: ContactErrors
 ) -> tuple[float, Array, float]:
-    """Residual, slopes (24,), noise (m^2) of a contact: 0 = phi/|grad phi| + c force - b_c.
+    """Residual, slopes (30,), noise (m^2) of a contact: 0 = phi/|grad phi| + c force - b_c.
 
     The slope by the compliance is the smoothed force: the raw one's noise moves nothing, so a
     regression on it takes the plate for stiffer than it is. The noise grows by the terms of second
@@ -112,6 +113,8 @@ def contact_row(
     slope = np.zeros(SIZE)
     slope[TURN] = cross(normal, away)
     slope[PLACE] = -normal
+    slope[RIG_BIAS] = slope[POSE]
+    residual -= float(slope[RIG_BIAS] @ mean[RIG_BIAS])
     slope[OFFSET] = -1.0
     slope[COMPLIANCE] = contact.smooth_force_N
     noise = errors.white_m**2 + (float(mean[COMPLIANCE]) * errors.force_sd_N) ** 2
@@ -125,7 +128,7 @@ def contact_row(
 def force_row(
     state: FilterState, felt: ForceDirection, surface: Surface, errors: ForceErrors
 ) -> tuple[Array, Array, Array] | None:
-    """Residual (2,), slopes (2, 24), noise (2, 2) of a force's direction; None where there is none.
+    """Residual (2,), slopes (2, 30), noise (2, 2) of a force's direction; None where there is none.
 
     f/|f| = (n - mu t)/|n - mu t|, with t the direction in which the tip slides over the plate; the
     row is its part across the predicted direction.
