@@ -24,7 +24,7 @@ TURN, PLACE, SPIN, SPEED = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 POSE, RATES, BIAS = slice(0, 6), slice(6, 12), slice(12, 18)
 OFFSET, COMPLIANCE, FRICTION = 18, 19, 20
 ZERO = slice(21, 24)
-RIG_BIAS = slice(24, 30)
+RIG_TURN, RIG_PLACE, RIG_BIAS = slice(24, 27), slice(27, 30), slice(24, 30)
 
 _SERIES_BELOW = 1e-2
 

@@ -18,6 +18,8 @@ from scissorcal.tracking.filter import (
     PLACE,
     POSE,
     RIG_BIAS,
+    RIG_PLACE,
+    RIG_TURN,
     SIZE,
     SPEED,
     SPIN,
@@ -102,10 +104,12 @@ def contact_row(
     regression on it takes the plate for stiffer than it is. The noise grows by the terms of second
     order that the row leaves out: d_phi x d_o along the normal, and the surface's curvature times
     the error of place along it. Neighbouring rows share them, so they count for as many rows as
-    ``bilinear_time_s`` holds.
+    ``bilinear_time_s`` holds. The rig's bias moves the tip as the opposite error of pose would, so
+    both have one slope; what the bias itself changes of it is left out.
     """
     mean, turn = state.mean, state.rotation
     away = contact.point_m - mean[PLACE]
+    away = away - mean[RIG_PLACE] - cross(mean[RIG_TURN], away)
     here = surface.at(away @ turn)
     steep = math.sqrt(float(here.gradient @ here.gradient))
     normal = turn @ (here.gradient / steep)
@@ -114,7 +118,6 @@ def contact_row(
     slope[TURN] = cross(normal, away)
     slope[PLACE] = -normal
     slope[RIG_BIAS] = slope[POSE]
-    residual -= float(slope[RIG_BIAS] @ mean[RIG_BIAS])
     slope[OFFSET] = -1.0
     slope[COMPLIANCE] = contact.smooth_force_N
     noise = errors.white_m**2 + (float(mean[COMPLIANCE]) * errors.force_sd_N) ** 2
