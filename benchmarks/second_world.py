@@ -34,7 +34,8 @@ MOTIONS = {
     "springs": PlateMotion(time_s=0.25),
 }
 """What is stated of a plate's motion: the recipe's default for a clamped plate, its figures for one
-in a hand, and for the body on springs the time over which its velocity keeps. All else is default."""
+in a hand, and for the body on springs the time over which its velocity keeps.
+All else is default."""
 ROWS = {
     "fixed": Scene(),
     "fixed, 40 s": Scene(seconds=40.0),
@@ -44,8 +45,11 @@ ROWS = {
     "on springs, 1 s without pictures": Scene("springs", blind_s=1.0),
     "fixed, mirrored poses": Scene(flat=True),
 }
-CASES = (*(("plane", name) for name in ROWS),
-    ("cylinder 30 mm", "fixed"), ("sphere 30 mm", "fixed"))
+CASES = (
+    *(("plane", name) for name in ROWS),
+    ("cylinder 30 mm", "fixed"),
+    ("sphere 30 mm", "fixed"),
+)
 SEED = 149
 
 
@@ -118,8 +122,8 @@ def line(case: tuple[str, str], found: tuple[Sequence[Ended], Sequence[Ended]]) 
     parts = [f"| {case[0]}, {case[1]} "]
     medians = [1e3 * float(np.median([abs(one.normal_m) for one in part])) for part in found]
     parts.append(f"| {medians[0]:.3f} | {medians[1]:.3f} | {medians[1] / medians[0]:.2f} ")
-    for part in found:
-        parts.append(f"| {1e3 * float(np.median([one.across_m for one in part])):.2f} ")
+    across = (1e3 * float(np.median([one.across_m for one in part])) for part in found)
+    parts += [f"| {value:.2f} " for value in across]
     for part in found:
         values = [one.nees for one in part]
         parts.append(f"| {np.mean(values):.1f}, {100.0 * share_held(values):.0f} % ")

@@ -123,7 +123,7 @@ def _corner_noise(count: int, rng: np.random.Generator) -> Array:
 
 
 def _solve(lens: _Lens, board: Array, pixels: Array) -> tuple[Array, Array, Array, bool] | None:
-    """The likelier of a plane's two poses in the rig's frame, its covariance, whether it is sure."""
+    """The likelier of a plane's two poses in the rig's frame, its covariance, and whether sure."""
     middle = board.mean(axis=0)
     solved = cv2.solvePnPGeneric(
         board - middle, pixels, lens.matrix, lens.bend, flags=cv2.SOLVEPNP_IPPE

@@ -1,11 +1,11 @@
-"""The filter in the second world: consistent where its statements hold, and not without its parts."""
+"""The filter in the second world: consistent where statements hold, not without its parts."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from benchmarks.second_world import ROWS, SURFACES, follow, judge, runs, settings_of
+
 from scissorcal.tracking.consistency import mean_band, share_held
 
 from . import SHAPES, Scene, draw_world
@@ -13,7 +13,7 @@ from . import SHAPES, Scene, draw_world
 RUNS = 24
 SEEDS = range(500_000, 500_000 + RUNS)
 MOST = {"fixed": 0.5, "carried by hand": 0.2, "on springs": 0.2}
-"""Contact's median error along the normal over vision's: 1.5 times what 50 runs gave, and more."""
+"""Contact's median error along the normal over vision's: some twice what 50 runs gave."""
 
 
 @pytest.mark.slow

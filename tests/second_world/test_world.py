@@ -51,7 +51,7 @@ def test_a_shape_lies_on_the_filters_surface(name: str):
     assert np.abs(SURFACES[name].gradient(points) - normals).max() < 1e-12
     assert np.abs(axes @ axes.swapaxes(1, 2) - np.eye(3)).max() < 1e-12
     step = 1e-7
-    along = (SHAPES[name].walk(arcs + [step, 0.0])[0] - points) / step
+    along = (SHAPES[name].walk(arcs + np.array([step, 0.0]))[0] - points) / step
     assert np.abs(np.sum(along * normals, axis=1)).max() < 1e-5
 
 
@@ -80,8 +80,10 @@ def test_a_pictures_covariance_is_that_of_its_errors():
         true = Rotation.from_matrix(axes)
         errors = np.array(
             [
-                [*(true * Rotation.from_matrix(seen.rotation).inv()).as_rotvec()]
-                + [*(place - seen.place_m)]
+                [
+                    *(true * Rotation.from_matrix(seen.rotation).inv()).as_rotvec(),
+                    *(place - seen.place_m),
+                ]
                 for seen in world.pictures
             ]
         )

@@ -17,7 +17,7 @@ COMPLIANCE, COMPLIANCE_SPREAD, AT_N = 1e-4, 0.2, 2.5
 """Way over force at 2.5 N; half of it is linear (the plate), half Hertz's two thirds (the tip)."""
 HERTZ_SHARE, CREEP, CREEP_S = 0.5, 0.15, 0.4
 STICK, SLIP, SIDE_N_PER_M = (0.2, 0.45), 0.7, 8e3
-"""Friction coefficient at rest; the share of it that is left in a slip; the tool's own side spring."""
+"""Friction coefficient at rest, the share of it that is left in a slip, the tool's side spring."""
 TIP_CONSTANT_M, TIP_PERIODIC_M, TIP_PERIOD_M, TIP_PLAY_M = 0.05e-3, 0.06e-3, (0.04, 0.15), 0.04e-3
 """Errors of the rig's places: constant, repeating by place (sd), play that turns with direction."""
 ENCODER_M, RING_M, RING_HZ = 5e-6, 0.018e-3, 23.0
@@ -32,8 +32,8 @@ class Touches:
     """Rows of contact as a rig states them, and the truth of each.
 
     ``stamp_s`` (n,), ``point_m`` (n, 3) the tip's centre less its radius along the tool, which
-    stands along the face's first normal; ``force_N`` (n,) along the expected normal. Truth: ``true_s``
-    (n,), ``arcs_m`` (n, 2) where the face is touched, ``pressed_N`` (n,).
+    stands along the face's first normal; ``force_N`` (n,) along the expected normal. Truth:
+    ``true_s`` (n,), ``arcs_m`` (n, 2) where the face is touched, ``pressed_N`` (n,).
     """
 
     stamp_s: Array

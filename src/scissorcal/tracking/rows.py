@@ -36,6 +36,7 @@ KNOWN_SLIDING = 3.0
 """The direction of sliding is known where its speed is so many standard deviations of itself."""
 BILINEAR_S = 1.0
 
+_IDENTITY = np.eye(3)
 _CAMERA_SLOPES = np.zeros((6, SIZE))
 _CAMERA_SLOPES[:, POSE] = _CAMERA_SLOPES[:, BIAS] = np.eye(6)
 
@@ -184,8 +185,6 @@ def _second_order(covariance: Array, away: Array, normal: Array, bend: Array | N
     slid: float = sum(own[3:]) - float(normal @ places @ normal)
     if bend is None:
         return tilt * slid
-    lever = cross_matrix(away)
-    shared = covariance[PLACE, TURN] @ lever.T
-    moved = places - shared - shared.T + lever @ turns @ lever.T
-    bent = bend @ moved
-    return tilt * slid + float(np.sum(bent * bent.T))
+    by_pose = np.concatenate((-cross_matrix(away), _IDENTITY), axis=1)
+    bent = bend @ (by_pose @ covariance[POSE, POSE] @ by_pose.T)
+    return tilt * slid + float(np.vdot(bent, bent.T))
