@@ -70,9 +70,9 @@ class ContactErrors:
     edge, encoders that err alike at the same place. ``white_m`` is new in each row, ``slow_m``
     fluctuates with ``slow_time_s`` (a first-order process: the tip's wear, its play). The plate
     gives way by ``compliance_m_per_N`` times the force, known to ``compliance_sd_m_per_N``.
-    ``force_filter_s`` smooths the force that the compliance is regressed on, and ``force_sd_N`` is the noise of the
-    raw one. ``bilinear_time_s`` is the time over which the second-order terms of rows repeat
-    themselves; 0 leaves those terms out.
+    ``force_filter_s`` smooths the force that the compliance is regressed on, and ``force_sd_N`` is
+    the noise of the raw one. ``bilinear_time_s`` is the time over which the second-order terms of
+    rows repeat themselves; 0 leaves those terms out.
     """
 
     turn_bias_rad: float = math.radians(0.2)
