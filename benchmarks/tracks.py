@@ -12,7 +12,12 @@ import numpy as np
 from tests.workday.track_world import a_recipe, score, tracked
 
 MOVES = ("speed_mm_per_s = 5", "turn_deg_per_s = 1")
-PLATES = {"clamped": (), "moving, 5 mm/s and 1 deg/s": MOVES}
+PLATES = {
+    "clamped": (),
+    "moving, 5 mm/s and 1 deg/s": MOVES,
+    "the same, motion_time_s = 4": (*MOVES, "motion_time_s = 4"),
+}
+"""The simulated plate sways at 0.3 Hz: over 0.14 s its velocity changes as in a process of 4 s."""
 SECONDS = {False: 1.5, True: 3.0}
 """With contact, the second tap is under way at the end."""
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
-from scissorcal.tracking.filter import SIZE, FilterState, start_state
+from scissorcal.tracking.filter import RIG_BIAS, SIZE, FilterState, start_state
 from scissorcal.tracking.rows import (
     CameraPose,
     Contact,
@@ -29,6 +29,7 @@ def a_state() -> FilterState:
     state = start_state(settings, 0.0, rotation, place, 1e-12 * np.eye(6))
     state.mean[6:] = 0.01 * np.random.default_rng(0).standard_normal(SIZE - 6)
     state.mean[19], state.mean[20] = 1e-4, 0.25
+    state.mean[RIG_BIAS] = 0.0
     return state
 
 
@@ -70,6 +71,21 @@ def test_slopes_of_a_contact(surface: Surface) -> None:
         state, lambda s: np.array(contact_row(s, contact, surface, ContactErrors())[0])
     )
     np.testing.assert_allclose(slope, wanted, rtol=1e-6, atol=1e-7)
+
+
+def test_a_known_bias_of_the_rigs_places_is_taken_off() -> None:
+    state, surface = a_state(), Sphere(0.02)
+    point = on_surface(state, surface)
+    bias = np.array([2e-3, -1e-3, 3e-3, 1e-4, -5e-5, 2e-4])
+    off = point + bias[3:] + np.cross(bias[:3], point - state.mean[3:6])
+    errors = ContactErrors()
+    exact, _, _ = contact_row(state, Contact(0.0, point, 2.5, 2.5, 0.01), surface, errors)
+    blind, _, _ = contact_row(state, Contact(0.0, off, 2.5, 2.5, 0.01), surface, errors)
+    state.mean[RIG_BIAS] = bias
+    told, _, _ = contact_row(state, Contact(0.0, off, 2.5, 2.5, 0.01), surface, errors)
+    assert abs(blind - exact) > 5e-5
+    # What is left is the bias's square: 4e-3 rad of 0.3 mm.
+    assert abs(told - exact) < 1.5e-6
 
 
 @pytest.mark.parametrize("surface", SURFACES)

@@ -50,6 +50,16 @@ class PlateTracking(Section):
         description="from a picture's exposure to its time stamp, beyond the shortest delay of its "
         "arrival, which times of arrival cannot show; 'scissorcal track' measures it where it can",
     )
+    contact_bias_mm: _SizeOrNone = Field(
+        default=0.05,
+        description="constant error of the tip's place in each axis: the length of a blade, its "
+        "edge as it was photographed; 0 where it is known to be exact",
+    )
+    contact_bias_deg: _SizeOrNone = Field(
+        default=0.2,
+        description="constant turn of the rig's own places: errors of encoders and edge that are "
+        "the same at the same place; 0.07 mm over 20 mm",
+    )
     contact_white_mm: _Size = Field(
         default=0.02,
         description="error of the tip's place that is new at each contact: steps of the encoders, "

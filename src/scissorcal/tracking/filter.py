@@ -1,8 +1,9 @@
 """Error-state Kalman filter over a plate's pose: the state, its way through time, one correction.
 
-The state's error has 24 numbers, in this order: a rotation vector (R = Exp(d_phi) R^) and a
+The state's error has 30 numbers, in this order: a rotation vector (R = Exp(d_phi) R^) and a
 translation in the rig's axes; angular and linear velocity; the camera's bias (turn, place); the
-offset of the contact; the plate's compliance; the friction coefficient; the force sensor's zero.
+offset of the contact; the plate's compliance; the friction coefficient; the force sensor's zero;
+the bias of the rig's own places (turn, place).
 Rotations are matrices, so no orientation is special (Sola, Deray and Atchuthan 2018,
 arXiv:1812.01537).
 """
@@ -18,11 +19,12 @@ from scissorcal.tracking.settings import PlateMotion, TrackingSettings
 
 Array = NDArray[np.float64]
 
-SIZE = 24
+SIZE = 30
 TURN, PLACE, SPIN, SPEED = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 POSE, RATES, BIAS = slice(0, 6), slice(6, 12), slice(12, 18)
 OFFSET, COMPLIANCE, FRICTION = 18, 19, 20
 ZERO = slice(21, 24)
+RIG_TURN, RIG_PLACE, RIG_BIAS = slice(24, 27), slice(27, 30), slice(24, 30)
 
 _SERIES_BELOW = 1e-2
 
@@ -37,7 +39,7 @@ _IDENTITY = np.eye(SIZE)
 
 @dataclass
 class FilterState:
-    """Time (s), rotation (3, 3), the other means (24,), whose first three are 0, and covariance.
+    """Time (s), rotation (3, 3), the other means (30,), whose first three are 0, and covariance.
 
     ``copy`` is what a rewind returns to.
     """
@@ -74,6 +76,8 @@ def start_state(
     spread[COMPLIANCE, COMPLIANCE] = contact.compliance_sd_m_per_N**2
     spread[FRICTION, FRICTION] = force.friction_sd**2
     spread[ZERO, ZERO] = (force.zero_sd_N or 0.0) ** 2 * np.eye(3)
+    sds = np.repeat([contact.turn_bias_rad, contact.place_bias_m], 3)
+    spread[RIG_BIAS, RIG_BIAS] = np.diag(sds**2)
     mean = np.zeros(SIZE)
     mean[PLACE] = place
     mean[COMPLIANCE], mean[FRICTION] = contact.compliance_m_per_N, force.friction
@@ -128,7 +132,7 @@ def _move(state: FilterState, plate: PlateMotion, elapsed: float, keep: float) -
 
 
 def correct(state: FilterState, step: Array, covariance: Array) -> None:
-    """Add an error (24,) to the state, in place, and take a covariance (24, 24)."""
+    """Add an error (30,) to the state, in place, and take a covariance (30, 30)."""
     state.mean += step
     state.rotation = nearest_rotation(rotation_of(step[TURN]) @ state.rotation)
     state.mean[TURN] = 0.0
@@ -140,7 +144,7 @@ def update(
 ) -> tuple[float, bool]:
     """Correct by a row of several numbers; give its NIS and whether the gate let it in.
 
-    ``residual`` (m,) is measured minus predicted, ``slopes`` (m, 24) of the prediction, ``noise``
+    ``residual`` (m,) is measured minus predicted, ``slopes`` (m, 30) of the prediction, ``noise``
     (m, m). NIS is the residual's square by its covariance, chi-square with m degrees of freedom
     where the filter is consistent.
     """
@@ -160,7 +164,7 @@ def update(
 def update_by_one(
     state: FilterState, residual: float, slope: Array, noise: float, gate: float
 ) -> tuple[float, bool]:
-    """Correct by a row of one number, as `update` does; ``slope`` is (24,)."""
+    """Correct by a row of one number, as `update` does; ``slope`` is (30,)."""
     shared = state.covariance @ slope
     total = float(slope @ shared) + noise
     nis = residual * residual / total

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SMALL = 1e-6
+_THRICE = 3.0 * np.eye(3)
 
 
 def rotation_of(vector: Array) -> Array:
@@ -83,4 +84,4 @@ def nearest_rotation(matrix: Array) -> Array:
     A step of X <- X (3 - X^T X) / 2 squares the deviation from orthogonality (Higham 1986,
     doi:10.1137/0907079); after each product of the filter it stands near 1e-16.
     """
-    return np.asarray(0.5 * matrix @ (3.0 * np.eye(3) - matrix.T @ matrix))
+    return np.asarray(0.5 * matrix @ (_THRICE - matrix.T @ matrix))

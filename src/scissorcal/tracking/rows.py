@@ -17,6 +17,9 @@ from scissorcal.tracking.filter import (
     OFFSET,
     PLACE,
     POSE,
+    RIG_BIAS,
+    RIG_PLACE,
+    RIG_TURN,
     SIZE,
     SPEED,
     SPIN,
@@ -33,6 +36,7 @@ KNOWN_SLIDING = 3.0
 """The direction of sliding is known where its speed is so many standard deviations of itself."""
 BILINEAR_S = 1.0
 
+_IDENTITY = np.eye(3)
 _CAMERA_SLOPES = np.zeros((6, SIZE))
 _CAMERA_SLOPES[:, POSE] = _CAMERA_SLOPES[:, BIAS] = np.eye(6)
 
@@ -81,7 +85,7 @@ class ForceDirection:
 
 
 def camera_row(state: FilterState, seen: CameraPose) -> tuple[Array, Array, Array]:
-    """Residual (6,), slopes (6, 24), noise (6, 6) of a picture's pose.
+    """Residual (6,), slopes (6, 30), noise (6, 6) of a picture's pose.
 
     [Log(R_m R^T) - b_r; o_m - o - b_t]
     """
@@ -95,16 +99,18 @@ def camera_row(state: FilterState, seen: CameraPose) -> tuple[Array, Array, Arra
 def contact_row(
     state: FilterState, contact: Contact, surface: Surface, errors: ContactErrors
 ) -> tuple[float, Array, float]:
-    """Residual, slopes (24,), noise (m^2) of a contact: 0 = phi/|grad phi| + c force - b_c.
+    """Residual, slopes (30,), noise (m^2) of a contact: 0 = phi/|grad phi| + c force - b_c.
 
     The slope by the compliance is the smoothed force: the raw one's noise moves nothing, so a
     regression on it takes the plate for stiffer than it is. The noise grows by the terms of second
     order that the row leaves out: d_phi x d_o along the normal, and the surface's curvature times
     the error of place along it. Neighbouring rows share them, so they count for as many rows as
-    ``bilinear_time_s`` holds.
+    ``bilinear_time_s`` holds. The rig's bias moves the tip as the opposite error of pose would, so
+    both have one slope; what the bias itself changes of it is left out.
     """
     mean, turn = state.mean, state.rotation
     away = contact.point_m - mean[PLACE]
+    away = away - mean[RIG_PLACE] - cross(mean[RIG_TURN], away)
     here = surface.at(away @ turn)
     steep = math.sqrt(float(here.gradient @ here.gradient))
     normal = turn @ (here.gradient / steep)
@@ -112,6 +118,7 @@ def contact_row(
     slope = np.zeros(SIZE)
     slope[TURN] = cross(normal, away)
     slope[PLACE] = -normal
+    slope[RIG_BIAS] = slope[POSE]
     slope[OFFSET] = -1.0
     slope[COMPLIANCE] = contact.smooth_force_N
     noise = errors.white_m**2 + (float(mean[COMPLIANCE]) * errors.force_sd_N) ** 2
@@ -125,7 +132,7 @@ def contact_row(
 def force_row(
     state: FilterState, felt: ForceDirection, surface: Surface, errors: ForceErrors
 ) -> tuple[Array, Array, Array] | None:
-    """Residual (2,), slopes (2, 24), noise (2, 2) of a force's direction; None where there is none.
+    """Residual (2,), slopes (2, 30), noise (2, 2) of a force's direction; None where there is none.
 
     f/|f| = (n - mu t)/|n - mu t|, with t the direction in which the tip slides over the plate; the
     row is its part across the predicted direction.
@@ -178,8 +185,6 @@ def _second_order(covariance: Array, away: Array, normal: Array, bend: Array | N
     slid: float = sum(own[3:]) - float(normal @ places @ normal)
     if bend is None:
         return tilt * slid
-    lever = cross_matrix(away)
-    shared = covariance[PLACE, TURN] @ lever.T
-    moved = places - shared - shared.T + lever @ turns @ lever.T
-    bent = bend @ moved
-    return tilt * slid + float(np.sum(bent * bent.T))
+    by_pose = np.concatenate((-cross_matrix(away), _IDENTITY), axis=1)
+    bent = bend @ (by_pose @ covariance[POSE, POSE] @ by_pose.T)
+    return tilt * slid + float(np.vdot(bent, bent.T))

@@ -65,14 +65,18 @@ class CameraErrors:
 class ContactErrors:
     """What contact rows assume.
 
-    ``white_m`` is new in each row, ``slow_m`` fluctuates with ``slow_time_s`` (a first-order
-    process: the tip's wear, its play, the rig's own errors of place). The plate gives way by
-    ``compliance_m_per_N`` times the force, known to ``compliance_sd_m_per_N``. ``force_filter_s``
-    smooths the force that the compliance is regressed on, and ``force_sd_N`` is the noise of the
-    raw one. ``bilinear_time_s`` is the time over which the second-order terms of rows repeat
-    themselves; 0 leaves those terms out.
+    ``turn_bias_rad`` and ``place_bias_m`` are constant, in each of the rig's axes: how the rig's
+    own places are turned (about the plate's origin) and shifted, by the tip's length, the blade's
+    edge, encoders that err alike at the same place. ``white_m`` is new in each row, ``slow_m``
+    fluctuates with ``slow_time_s`` (a first-order process: the tip's wear, its play). The plate
+    gives way by ``compliance_m_per_N`` times the force, known to ``compliance_sd_m_per_N``.
+    ``force_filter_s`` smooths the force that the compliance is regressed on, and ``force_sd_N`` is
+    the noise of the raw one. ``bilinear_time_s`` is the time over which the second-order terms of
+    rows repeat themselves; 0 leaves those terms out.
     """
 
+    turn_bias_rad: float = math.radians(0.2)
+    place_bias_m: float = 0.05e-3
     white_m: float = 0.02e-3
     slow_m: float = 0.1e-3
     slow_time_s: float = 2.0
@@ -135,6 +139,8 @@ def settings_of(recipe: Recipe, shared: Array | None = None) -> TrackingSettings
         tracking.motion_time_s,
     )
     contact = ContactErrors(
+        turn_bias_rad=math.radians(tracking.contact_bias_deg),
+        place_bias_m=tracking.contact_bias_mm * 1e-3,
         white_m=tracking.contact_white_mm * 1e-3,
         slow_m=tracking.contact_slow_mm * 1e-3,
         slow_time_s=tracking.contact_slow_s,

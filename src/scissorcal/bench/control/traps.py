@@ -37,16 +37,20 @@ class Trap:
 
 
 def settings_for(scenario: Scenario) -> TrackingSettings:
-    """The whole filter: it is told whether the plate moves, as a recipe tells it."""
+    """The whole filter: it is told whether the plate moves, as a recipe tells it.
+
+    The rig of this world has no constant error of place, and the filter is told so.
+    """
     plate = MOVING if scenario.moving else AT_REST
-    return TrackingSettings(plate=plate, force=ForceErrors(zero_sd_N=0.02))
+    exact = ContactErrors(turn_bias_rad=0.0, place_bias_m=0.0)
+    return TrackingSettings(plate=plate, contact=exact, force=ForceErrors(zero_sd_N=0.02))
 
 
 def traps() -> tuple[Trap, ...]:
     """Each part of the filter that a scenario needs."""
     fixed, moving = settings_for(FIXED_PLATE), settings_for(MOVING_PLATE)
     no_bias = CameraErrors(turn_bias_rad=0.0, place_bias_m=0.0)
-    contact = ContactErrors()
+    contact = fixed.contact
     rigid = replace(contact, compliance_m_per_N=0.0, compliance_sd_m_per_N=0.0)
     raw, white = replace(contact, force_filter_s=0.0), replace(contact, slow_m=0.0)
     linear = replace(contact, bilinear_time_s=0.0)
