@@ -34,7 +34,6 @@ static inline sc_control_config sound_control(void)
                                   .leave_force = 0.15f,
                                   .leave_s = 0.02f,
                                   .approach_speed = 0.01f,
-                                  .approach_rate = 2.0f,
                                   .approach_force = 1.5f,
                                   .friction_share = 0.7f,
                                   .slip_rate = 0.02f,

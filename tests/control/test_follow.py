@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scissorcal.control.result import control_figures
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import ControlFlag, HybridFlag, Mode
+from scissorcal.kernel import CONTROL_DTYPE, ControlFlag, HybridFlag, Mode
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
 from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
 from scissorcal.recording.telemetry import CONTROL
@@ -95,6 +96,34 @@ def test_a_plate_that_jumps_up_is_pressed_as_before(monkeypatch: pytest.MonkeyPa
     assert rms(true[-1_000:]) < 0.12
     assert run.result.figures.reached_share == 1.0
     assert max(run.truth.normal_N) < 6.0
+
+
+def test_a_plate_that_drops_loses_contact_and_is_said_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = go(prepare(points(20.0, 60.0), step_mm=(0.0, -1.7, 0.0), step_at_s=3.0), monkeypatch)
+    assert run.result is not None
+    assert run.result.figures.losses == 1
+    assert run.result.figures.touches == 2
+    assert "contact" in failed(run.result.verdicts)
+
+
+def test_a_hard_touch_is_told_from_the_force_that_was_wanted() -> None:
+    """2.9 N at a touch where 0.3 N are wanted; the ramp to 4 N is no peak."""
+    samples = np.zeros(1_000, dtype=CONTROL_DTYPE)
+    samples["flags"] = int(HybridFlag.CONTACT)
+    samples["flags"][100] |= int(HybridFlag.TOUCHED)
+    ramp = np.minimum(0.3 + 0.01 * np.arange(900), 4.0)
+    samples["force_aim"][100:] = samples["force"][100:] = ramp
+    samples["force_wanted"] = 4.0
+    samples["force"][101] = 2.9
+    (peak,) = control_figures(samples, 1e-3, 1.0, 2, 0.01).peaks_N
+    assert peak == pytest.approx(2.9 - 0.31, abs=1e-6)
+
+
+def test_a_small_force_anywhere_on_the_path_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = points(20.0, 40.0)
+    path.force[-1] = 0.1
+    with pytest.raises(InputError, match=r"0\.1 N is less than 0\.3 N"):
+        go(prepare(path), monkeypatch)
 
 
 def test_without_a_pose_the_tip_is_lifted_and_goes_on_with_the_next(

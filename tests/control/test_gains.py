@@ -76,9 +76,11 @@ def test_gains_hold_at_every_corner_or_are_refused_with_a_figure_that_holds(
         softer = re.search(r"a stiffness of at most ([\d.e+-]+) N/mm", str(refusal))
         sooner = re.search(r"a delay of at most ([\d.e+-]+) ms", str(refusal))
         if softer:
-            choose_gains([replace(loop, stiffness_N_per_m=950.0 * float(softer[1]))], peak_N=2.0)
+            assert 1e3 * float(softer[1]) <= stiffness
+            choose_gains([replace(loop, stiffness_N_per_m=1e3 * float(softer[1]))], peak_N=2.0)
         if sooner:
-            choose_gains([replace(loop, delay_s=0.95e-3 * float(sooner[1]))], peak_N=2.0)
+            assert float(sooner[1]) <= delay_ms
+            choose_gains([replace(loop, delay_s=1e-3 * float(sooner[1]))], peak_N=2.0)
         return
     contact = ContactGains(gains.contact_kd, gains.force_ki, gains.force_kp)
     assert contact_decay(loop, contact) == pytest.approx(gains.decay_per_s)
@@ -100,10 +102,34 @@ def test_what_cannot_be_held_is_refused_with_the_figures_that_could() -> None:
         choose_gains([replace(LOOP, stiffness_N_per_m=5e3)], peak_N=1.0)
     said = str(refused.value)
     assert "against 5 N/mm with 0.05 kg along the normal" in said
-    assert "an effort acts 2.5 ms after the measurement" in said
+    assert "an effort acts 1 ms and the motor's 1.5 ms after the measurement" in said
     assert re.search(r"What would do: a stiffness of at most 4\.\d N/mm or a delay of", said)
     with pytest.raises(InputError, match="Neither softer material nor a shorter delay"):
         choose_gains([replace(HARD, stiffness_N_per_m=1e9)], peak_N=1.0)
+
+
+HEAVY = ContactLoop(1e4, 1.0, 0.0, 1e-3, 1e-3, 1e-3, 400.0, surface_cutoff_Hz=100.0)
+
+
+def test_of_proportional_answers_the_largest_is_taken_that_keeps_three_quarters_of_the_decay() -> (
+    None
+):
+    asked = (0.0, 0.5, 1.0, 2.0)
+    decays = {kp: contact_gains([HEAVY], force_kp=kp)[1] for kp in asked}
+    enough = [kp for kp in asked if decays[kp] >= 0.75 * max(decays.values())]
+    chosen = choose_gains([HEAVY], peak_N=1.0, force_kp=asked)
+    assert chosen.force_kp == max(enough) > 0.0
+    assert max(enough) < max(asked)
+    assert chosen.decay_per_s == pytest.approx(decays[chosen.force_kp])
+    assert choose_gains([HEAVY], peak_N=1.0, force_kp=(0.5,)).force_kp == 0.5
+
+
+@pytest.mark.parametrize("asked", [(1.0,), (1.0, 2.0)])
+def test_a_proportional_answer_that_no_gains_hold_is_refused_and_named(
+    asked: tuple[float, ...],
+) -> None:
+    with pytest.raises(InputError, match="no force_kp"):
+        choose_gains([replace(LOOP, stiffness_N_per_m=2e3)], peak_N=1.0, force_kp=asked)
 
 
 def test_the_worst_of_several_loops_decides() -> None:

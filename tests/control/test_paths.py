@@ -59,6 +59,8 @@ def test_a_path_is_read_with_its_lines(tmp_path: Path) -> None:
         ("x_mm,x_mm\n1,2\n", "line 1"),
         ("", "line 1"),
         ("x_mm\n1\n", "has 1 points"),
+        ('x_mm\n"1\n2\n', "line 2: x_mm is"),
+        (f"x_mm\n1\n{'2' * 200_000}\n", "line 3: no number has so many characters"),
     ],
 )
 def test_a_wrong_path_is_refused_with_its_line(tmp_path: Path, text: str, words: str) -> None:

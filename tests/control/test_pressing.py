@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.control import friction_rates
+from scissorcal.control import choose_gains, friction_rates
 from scissorcal.kernel import HybridFlag, NormalLaw, hybrid_inputs
 from tests.control.plant import Blade, Disc
-from tests.control.rig import designed, mass_at, resting, steered, swinging
+from tests.control.rig import MASSES_KG, designed, loop_of, mass_at, resting, steered, swinging
 from tests.control.steering import Known, Steering, Wish
 
 LATE = Blade(delay_s=1e-3)
@@ -90,6 +90,26 @@ def test_a_surface_that_moves_untold_is_felt() -> None:
         assert (flags_of(run) == HybridFlag.CONTACT).all()
         rms.append(math.sqrt(np.mean((run["force"] - 2.0) ** 2)))
     assert rms[1] < 0.5 * rms[0]
+
+
+def test_feeling_a_surface_does_not_excite_friction_where_the_compliance_is_wrong() -> None:
+    """At rest, compliance stated 1.5 times too high; the gains allow for as much."""
+    soft = Disc(stiffness=1e3)
+    loops = [
+        loop_of(LATE, soft, mass, surface_cutoff_Hz=100.0, stiffness_factor=1.5)
+        for mass in MASSES_KG
+    ]
+    gains = choose_gains(loops, peak_N=1.0).settings()
+    noise = []
+    for share in (0.0, 0.7):
+        steering = steered(
+            LATE,
+            soft,
+            Known(compliance=1.5),
+            **{**gains, "surface_cutoff_Hz": 100.0, "friction_share": share},
+        )
+        noise.append(after(steering.run(3.0, resting()), 2.0)["force"].std())
+    assert noise[1] < 0.004 > noise[0]
 
 
 def test_a_far_surface_is_approached_by_a_share_of_the_gap() -> None:

@@ -88,7 +88,7 @@ class ReferenceHybrid:
         bent = np.concatenate([[normal @ given["jacobian_rate"]], along @ given["jacobian_rate"]])
         stay = np.concatenate([[given["surface_acceleration"] + a_n], np.zeros(axes - 1)])
         effort = inertia @ np.linalg.solve(task, stay - bent)
-        effort = effort + given["bias"] + self._friction(given, velocity, fall + felt)
+        effort = effort + given["bias"] + self._friction(given, velocity, fall)
         path = inertia @ np.linalg.solve(task, np.concatenate([[0.0], pull]))
         if pressed and config.normal_law == NormalLaw.FORCE:
             flags |= self._integrate(effort, jacobian.T @ normal, wanted + answer, grown)
@@ -161,7 +161,8 @@ class ReferenceHybrid:
         by the backward rule; the given one where nothing is felt."""
         told = float(given["normal"] @ given["surface_velocity"])
         state, cutoff = self.state, self.config.surface_cutoff_Hz
-        if cutoff == 0.0 or not pressed or self.config.normal_law != NormalLaw.FORCE:
+        untold = cutoff == 0.0 or float(given["dt"]) > 0.01
+        if untold or not pressed or self.config.normal_law != NormalLaw.FORCE:
             state.surface_rate = None
             return told
         if state.surface_rate is None:
@@ -172,10 +173,10 @@ class ReferenceHybrid:
         state.force_before = float(given["force"])
         return state.surface_rate
 
-    def _friction(self, given: Row, velocity: Array, out: float) -> Array:
+    def _friction(self, given: Row, velocity: Array, fall: float) -> Array:
         config, normal = self.config, given["normal"]
         flat = np.eye(config.axes) - np.outer(normal, normal)
-        moving = flat @ given["path_rate"] + normal * out
+        moving = flat @ given["path_rate"] + normal * (fall + normal @ given["surface_velocity"])
         wanted = np.linalg.solve(given["jacobian"], moving)
         band = np.array(config.friction_rate)
         sure = np.minimum(1.0, 5.0 * np.abs(wanted) / band)

@@ -103,6 +103,8 @@ def test_every_end_of_the_mode_has_a_sentence() -> None:
         {"away": math.inf},
         {"handle_zero": math.nan},
         {"law": replace(LAW, axes=3, friction_rate=(1.0,) * 3, effort_limit=(1.0,) * 3)},
+        {"law": replace(LAW, force_kp=0.5)},
+        {"law": replace(LAW, surface_cutoff_Hz=100.0)},
         {"opening": replace(FLAT, positive=(0.01,))},
         {"opening": replace(FLAT, negative=(-0.01,) * FRICTION_POINTS)},
     ],

@@ -163,6 +163,9 @@ def test_pressing_alone_is_balanced_by_the_force_alone() -> None:
         ({"approach_force": 0.2}, "approach_force"),
         ({"least_volume": 1.0}, "between 0 and 1"),
         ({"path_kp": 1e10}, "nothing beyond 1e9"),
+        ({"force_kp": -1.0}, "force_kp"),
+        ({"surface_cutoff_Hz": math.nan}, "surface_cutoff_Hz"),
+        ({"approach_rate": -2.0}, "approach_rate"),
     ],
 )
 def test_settings_out_of_range_are_refused(changes: dict[str, Any], said: str) -> None:
@@ -178,3 +181,31 @@ def test_inputs_of_other_names_are_refused() -> None:
 
 def test_every_case_has_its_vectors() -> None:
     assert list(cases()) == [case["title"] for case in GOLDEN["cases"]]
+
+
+def test_what_is_felt_of_a_surface_begins_anew_with_each_touch_and_after_a_gap_in_time() -> None:
+    """At the rate that is given then; in between it follows the force at once."""
+    law = Hybrid(hybrid_config(surface_cutoff_Hz=100.0))
+    jacobian = np.array([[-0.02, 1.0], [0.07, 0.0]])
+
+    def gap_rate(force: float, given: float, dt: float = 1e-3) -> float:
+        inputs = hybrid_inputs(
+            dt=dt,
+            jacobian=jacobian,
+            inertia=np.diag([2e-4, 0.8]),
+            normal=(0.0, 1.0),
+            force=force,
+            compliance=1e-4,
+            force_wanted=1.0,
+            surface_velocity=(0.0, given),
+        )
+        return float(law.step(inputs)["gap_rate"][0])
+
+    assert gap_rate(1.0, 0.01) == pytest.approx(-0.01)
+    corner = 2.0 * math.pi * 100.0
+    felt = 0.01 + corner / (1.0 + corner * 1e-3) * (1e-3 * -0.01 + 1e-4 * 0.5)
+    assert gap_rate(1.5, 0.03) == pytest.approx(-felt, rel=1e-5)
+    assert gap_rate(0.05, 0.04) == pytest.approx(-0.04)  # a bounce
+    assert gap_rate(1.0, 0.02) == pytest.approx(-0.02)
+    assert gap_rate(3.0, 0.05, dt=0.5) == pytest.approx(-0.05)
+    assert gap_rate(3.0, 0.02) == pytest.approx(-0.02)

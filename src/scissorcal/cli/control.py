@@ -94,9 +94,9 @@ def _text(controlled: "Controlled") -> str:
         f"force {figures.force_rms_N:.2f} N rms and {figures.force_95_N:.2f} N in 95 % off (known "
         f"to {figures.force_sd_N:.2f} N), path {figures.path_rms_mm:.2f} mm rms and "
         f"{figures.path_95_mm:.2f} mm in 95 %",
-        f"{figures.touches} touches, the hardest {peak:.2f} N; contact lost {figures.losses} "
-        f"times, let go of {figures.let_goes} times; {100 * figures.limited_share:.1f} % of the "
-        "ticks at a limit",
+        f"{figures.touches} touches, the hardest {peak:.2f} N beyond what was wanted; contact "
+        f"lost {figures.losses} times, let go of {figures.let_goes} times; "
+        f"{100 * figures.limited_share:.1f} % of the ticks at a limit",
         "",
     ]
     rows = [["gain", "", ""]]

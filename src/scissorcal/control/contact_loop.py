@@ -36,7 +36,7 @@ class ContactLoop:
     from a measurement to the effort that answers it, without the time for which an effort is held;
     ``motor_lag_s`` is the motor's time constant. The filters' cutoffs are 0 where there is none.
     ``surface_cutoff_Hz`` is the corner below which the law feels the surface's rate
-    (``HybridConfig``'s ``surface_cutoff``, in Hz). ``step_m`` is a count of the encoder, along the
+    (``HybridConfig``'s). ``step_m`` is a count of the encoder, along the
     normal, which may change the force by ``most_per_count_N`` (chosen: less than half of the
     0.12 N by which a force may be off).
     """

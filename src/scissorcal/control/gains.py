@@ -85,11 +85,11 @@ def choose_gains(
         raise ValueError("gains are chosen for one loop or more")
     contact, decay = contact_gains(loops, ROUNDS, _largest_kp(loops, force_kp))
     if not decay >= 1.0 / within_s:
-        raise InputError(_refusal(loops, within_s))
+        raise InputError(_refusal(loops, within_s, min(force_kp)))
     path = _motion_gains(loops, PATH_INTEGRAL)
     normal = _stable_in_contact(loops, _motion_gains(loops, math.inf))
     if normal is None:
-        raise InputError(_refusal(loops, within_s))
+        raise InputError(_refusal(loops, within_s, min(force_kp)))
     return HybridGains(
         contact_kd=contact.contact_kd,
         force_kp=contact.force_kp,
@@ -164,7 +164,7 @@ def _largest_kp(loops: Sequence[ContactLoop], force_kp: Sequence[float]) -> floa
         return force_kp[0]
     decays = {kp: contact_gains(loops, ROUGH, kp)[1] for kp in force_kp}
     enough = KEPT_DECAY * max(decays.values())
-    return max((kp for kp, decay in decays.items() if decay >= enough), default=0.0)
+    return max((kp for kp, decay in decays.items() if decay >= enough), default=min(force_kp))
 
 
 def _most_kd(loop: ContactLoop) -> float:
@@ -226,8 +226,8 @@ def _stable_in_contact(loops: Sequence[ContactLoop], gains: Gains) -> Gains | No
     return None
 
 
-def _has_gains(loops: Sequence[ContactLoop], within_s: float) -> bool:
-    if not contact_gains(loops, ROUGH)[1] >= 1.0 / within_s:
+def _has_gains(loops: Sequence[ContactLoop], within_s: float, force_kp: float) -> bool:
+    if not contact_gains(loops, ROUGH, force_kp)[1] >= 1.0 / within_s:
         return False
     try:
         gains = _motion_gains(loops, math.inf)
@@ -236,41 +236,56 @@ def _has_gains(loops: Sequence[ContactLoop], within_s: float) -> bool:
     return _stable_in_contact(loops, gains) is not None
 
 
-def _refusal(loops: Sequence[ContactLoop], within_s: float) -> str:
+def _refusal(loops: Sequence[ContactLoop], within_s: float, force_kp: float) -> str:
     worst = max(loops, key=lambda loop: loop.phase_deg)
 
-    def settles(change: Callable[[ContactLoop], ContactLoop]) -> bool:
-        return _has_gains([change(loop) for loop in loops], within_s)
+    def has_gains(**changes: float) -> bool:
+        """Whether there are some with fields of all loops at a share of what they are."""
+        changed = [
+            replace(loop, **{name: share * getattr(loop, name) for name, share in changes.items()})
+            for loop in loops
+        ]
+        return _has_gains(changed, within_s, force_kp)
 
-    softer = _largest(
-        SOFTER,
-        lambda share: settles(
-            lambda loop: replace(loop, stiffness_N_per_m=share * loop.stiffness_N_per_m)
-        ),
-    )
-    sooner = _largest(
-        SOONER, lambda share: settles(lambda loop: replace(loop, delay_s=share * loop.delay_s))
-    )
     told = (
         f"No gains hold a force against {1e-3 * worst.stiffness_N_per_m:.3g} N/mm with "
         f"{worst.mass_kg:.2g} kg along the normal, stiffness and mass wrong by factors of "
         f"{worst.stiffness_factor:g} and {worst.mass_factor:g}: an effort acts "
-        f"{1e3 * (worst.delay_s + worst.motor_lag_s):.2g} ms after the measurement that it "
-        f"answers, and damping lags by {worst.phase_deg:.0f} degrees where the material swings."
+        f"{1e3 * worst.delay_s:.2g} ms and the motor's {1e3 * worst.motor_lag_s:.2g} ms after the "
+        f"measurement that it answers, and damping lags by {worst.phase_deg:.0f} degrees where the "
+        "material swings."
     )
     remedies = []
+    softer = _figure(
+        SOFTER, lambda share: has_gains(stiffness_N_per_m=share), 1e-3 * worst.stiffness_N_per_m
+    )
     if softer is not None:
-        remedies.append(
-            f"a stiffness of at most {1e-3 * softer * worst.stiffness_N_per_m:.2g} N/mm"
-        )
-    if sooner is not None and worst.delay_s > 0.0:
-        remedies.append(f"a delay of at most {1e3 * sooner * worst.delay_s:.2g} ms")
+        remedies.append(f"a stiffness of at most {softer:.2g} N/mm")
+    if worst.delay_s > 0.0:
+        sooner = _figure(SOONER, lambda share: has_gains(delay_s=share), 1e3 * worst.delay_s)
+        if sooner is not None:
+            remedies.append(f"a delay of at most {sooner:.2g} ms besides the motor's")
+    if force_kp > 0.0 and _has_gains(loops, within_s, 0.0):
+        remedies.append("no force_kp")
     if not remedies:
         return (
             f"{told} Neither softer material nor a shorter delay alone would do: answer sooner, "
             "filter the rate less, or know stiffness and mass better."
         )
     return f"{told} What would do: {' or '.join(remedies)}."
+
+
+def _figure(shares: Sequence[float], holds: Callable[[float], bool], whole: float) -> float | None:
+    """Of ``whole`` what the largest share gives, in two digits that hold as they are read."""
+    share = _largest(shares, holds)
+    while share is not None and share > 0.0:
+        value = share * whole
+        digit = 10.0 ** (math.floor(math.log10(value)) - 1)
+        rounded = float(f"{digit * math.floor(value / digit * (1.0 + 1e-12)):.2g}")
+        if holds(rounded / whole):
+            return rounded
+        share = _largest([one for one in shares if one < share], holds)
+    return share
 
 
 def _largest(shares: Sequence[float], holds: Callable[[float], bool]) -> float | None:

@@ -63,6 +63,11 @@ class RigMechanics:
         jacobian = self.tip.jacobian((opening, 0.0))[:2]
         return np.asarray(jacobian.T @ np.array(foot.normal))
 
+    def slide_at(self, foot: Foot, opening: float) -> Array:
+        """J^T t (2,): torque and force on the axes of a newton along the contour."""
+        jacobian = self.tip.jacobian((opening, 0.0))[:2]
+        return np.asarray(jacobian.T @ np.array((foot.normal[1], -foot.normal[0])))
+
     def opening_at(self, height: float) -> float | None:
         """Opening (rad) at which the tip stands at a height (m) over the pivot; None if at none."""
         reach = math.hypot(self.tip.station_m, self.tip.offset_m)

@@ -58,12 +58,15 @@ def read_path(path: Path) -> SurfacePoints:
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} is larger than {LARGEST_FILE // 10**6} MB: thin it out.")
-        rows = csv.reader(path.read_text("utf-8-sig").splitlines())
+        rows = csv.reader(path.read_text("utf-8-sig").splitlines(), quoting=csv.QUOTE_NONE)
     except FileNotFoundError:
         raise InputError(f"{path} does not exist. Check the name and the folder.") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path} cannot be read: {error}.") from None
-    head = [name.strip() for name in next(rows, [])]
+    try:
+        head = [name.strip() for name in next(rows, [])]
+    except csv.Error:
+        raise InputError(f"{path}, line 1: no column has so long a name.") from None
     unknown = [name for name in head if name not in COLUMNS]
     if unknown or "x_mm" not in head or len(set(head)) != len(head):
         raise InputError(
@@ -72,10 +75,15 @@ def read_path(path: Path) -> SurfacePoints:
         )
     table: list[list[float]] = []
     lines: list[int] = []
-    for row in rows:
-        if row and any(cell.strip() for cell in row):
-            table.append(_numbers(row, head, f"{path}, line {rows.line_num}"))
-            lines.append(rows.line_num)
+    try:
+        for row in rows:
+            if row and any(cell.strip() for cell in row):
+                table.append(_numbers(row, head, f"{path}, line {rows.line_num}"))
+                lines.append(rows.line_num)
+    except csv.Error:
+        raise InputError(
+            f"{path}, line {rows.line_num}: no number has so many characters."
+        ) from None
     if len(table) < 2:
         raise InputError(f"{path} has {len(table)} points: a path needs two or more.")
     values = np.array(table)

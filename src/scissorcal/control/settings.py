@@ -96,10 +96,11 @@ def control_settings(
                 f"{torque_limit:g} N m and {force_limit:g} N (recipe's limits and device's). Ask "
                 "for less force."
             )
-    if largest < TOUCH_N:
+    least = float(path.force.min())
+    if least < TOUCH_N:
         raise InputError(
-            f"{largest:.3g} N is less than {TOUCH_N:g} N, at which a touch is told from the "
-            "friction of the blades. Ask for more force."
+            f"{least:.3g} N is less than {TOUCH_N:g} N, at which a touch is told from the friction "
+            "of the blades. Ask for more force throughout the path."
         )
     feet = [foot for foot, _ in on_path]
     masses = [rig.mass_at(*at) for at in zip(feet, openings, strict=True)]
@@ -245,7 +246,8 @@ def _largest_force(
     rig: RigMechanics, foot: Foot, opening: float, efforts: tuple[float, float], friction: float
 ) -> float:
     """Force (N) that the motors may hold at a foot while the tip slides."""
-    press = np.abs(rig.press_at(foot, opening)) + friction * np.array((LEAST_LEVER_M, 1.0))
+    slides = np.abs(rig.slide_at(foot, opening))
+    press = np.abs(rig.press_at(foot, opening)) + friction * slides
     found = []
     for facts, by, limit, fastest in zip(
         (rig.opening, rig.advance),

@@ -62,7 +62,8 @@ class HybridConfig:
     Wanted forces stay within ``touch_force`` to ``force_most`` (N) and change by ``force_slew``
     (N/s) at most; the integral, and the answer by ``force_kp``, stay within ``integral_most`` (N).
     Touching begins at ``touch_force`` and ends after ``leave_s`` below ``leave_force`` (N). The
-    approach moves at ``approach_speed`` (m/s) or, from afar, by ``approach_rate`` (1/s) of the gap,
+    approach moves at ``approach_speed`` (m/s) or, from afar, by ``approach_rate`` (1/s) of the gap
+    (it touches at ``approach_speed`` where the gap is known to ``approach_speed / approach_rate``),
     and pushes by ``approach_force`` (N) at most.
     ``friction_share`` of dry friction is compensated by the wanted rate of an axis or, where that
     rests, by the measured one: in proportion up to ``friction_rate`` (per axis, rad/s or m/s),
@@ -95,7 +96,7 @@ class HybridConfig:
     leave_force: float = 0.1
     leave_s: float = 0.02
     approach_speed: float = 5e-3
-    approach_rate: float = 2.0
+    approach_rate: float = 0.0
     approach_force: float = 0.6
     friction_share: float = 0.7
     slip_rate: float = 0.02

@@ -181,7 +181,7 @@ def _controls(rows: Sequence[ControlRow]) -> Panel:
                 *_spread("force", row.force_N, "N"),
                 *_spread("path", row.path_mm, "mm"),
                 *_spread("touch", row.touch_N, "N"),
-                number("speed times sqrt(k m)", row.touch_bound_N, "N", digits=2),
+                number("touch over bound", row.touch_ratio.median, digits=2),
                 percent_of("in contact", row.contact_share, digits=3),
             ),
         )
@@ -191,9 +191,9 @@ def _controls(rows: Sequence[ControlRow]) -> Panel:
         "control",
         PART,
         "Control",
-        "A path at 2.5 N. Hybrid control closes its loop on the measured force: on a fixed plate "
-        "the pose does not matter for the force. It matters for the path, for control by place, "
-        "and on a moving plate, whose velocity enters the damping.",
+        "A path at 2.5 N. Hybrid control closes its loop on the measured force and feels the "
+        "surface's rate: the pose does not matter for the force, on a fixed plate or a moving one. "
+        "It matters for the path, and for control by place.",
         tuple(shown),
         charts=(force_chart(rows),) if rows else (),
     )

@@ -32,7 +32,7 @@ def made_up(runs: int, contact: float = 0.2, force_N: float = 0.05) -> ControlBe
         if job.kind == "control":
             better = 1.0 if job.pose == "vision" else 0.1
             force = force_N if job.law == "hybrid" else better
-            run = ControlRun(force, 1e-3 * better, 1.0, 1.0, 1.0, 0)
+            run = ControlRun(force, 1e-3 * better, 1.0, 1.0, 1.0)
             done.append(Done(job, {}, [run for _ in count]))
         elif job.kind == "pose":
             sizes = {"vision": 1e-3, "contact": contact * 1e-3, "force": contact * 1e-3}

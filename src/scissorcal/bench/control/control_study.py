@@ -29,7 +29,7 @@ from scissorcal.bench.control.world import (
     slow_process,
 )
 from scissorcal.control.contact_loop import ContactLoop
-from scissorcal.control.gains import FORCE_KP, HybridGains, choose_gains
+from scissorcal.control.gains import FORCE_KP, HybridGains, choose_gains, friction_rates
 from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inputs
 from scissorcal.tracking.rotation import cross
 from scissorcal.tracking.rows import CameraPose
@@ -48,6 +48,8 @@ START_ABOVE_M = 3e-3
 RATE_CUTOFF_HZ = 400.0
 SURFACE_CUTOFF_HZ = 100.0
 """Five times as fast as the lightest normal swings on the material (19 Hz)."""
+APPROACH_PER_S = 2.0
+"""The gap is known to 1 mm by vision; from 2.6 mm on the approach has its own speed."""
 TOUCH_TICKS = 100
 SOFTNESS = 0.04
 """Stiffness of soft position control, as a share of the stiff one's."""
@@ -73,7 +75,11 @@ class ControlRun:
     touch_N: float
     touch_bound_N: float
     contact_share: float
-    restarts: int
+
+    @property
+    def touch_ratio(self) -> float:
+        """Peak of the touch over its bound."""
+        return self.touch_N / self.touch_bound_N
 
 
 @dataclass(frozen=True)
@@ -183,14 +189,12 @@ class _Run:
         touched = np.flatnonzero(self.forces > 0.0)
         first = int(touched[0]) if len(touched) else 0
         bound = self.gains.approach_speed * math.sqrt(self.mass / self.compliance)
-        started = self.tracker.started
         return ControlRun(
             force_rms_N=float(np.sqrt(np.mean((late - FORCE_N) ** 2))),
             path_rms_m=float(np.sqrt(np.mean(self.errors[ticks:] ** 2))),
             touch_N=float((self.forces - self.aims[:-1])[first : first + TOUCH_TICKS].max()),
             touch_bound_N=bound + self.hybrid.config.touch_force,
             contact_share=float(np.mean(late > 0.0)),
-            restarts=self.tracker.estimate().counts.restarts if started else 0,
         )
 
     def _measure(self, tick: int, normal: Array) -> tuple[Array, float]:
@@ -303,8 +307,9 @@ def config_of(gains: HybridGains, law: str) -> HybridConfig:
         axes=3,
         normal_law=NormalLaw.FORCE if law == "hybrid" else NormalLaw.POSITION,
         surface_cutoff_Hz=SURFACE_CUTOFF_HZ,
+        approach_rate=APPROACH_PER_S,
         force_most=FORCE_MOST_N,
-        friction_rate=(2e-3, 2e-3, 2e-3),
+        friction_rate=friction_rates(gains, true_arm.MASS_KG, true_arm.COULOMB_N),
         effort_limit=(EFFORT_N, EFFORT_N, EFFORT_N),
         **chosen,
     )

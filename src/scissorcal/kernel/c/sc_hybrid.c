@@ -18,7 +18,6 @@ typedef struct {
     float slip[MOST];     /* of the point over the material, along the surface */
     float gap_rate;
     float gathered[MOST]; /* the path's integral as it would grow */
-    float felt;           /* by how much the surface's rate along the normal is more than given */
     float normal;         /* a_n */
     float fall;           /* rate that is wanted of the gap */
     float answer;         /* h without lambda_d and the integral */
@@ -82,12 +81,12 @@ static int is_pressed(const sc_hybrid_config *config, sc_hybrid *state, const sc
     return pressed;
 }
 
-/* The surface's rate along the normal, felt while it is pressed. */
+/* The surface's rate along the normal, felt while it is pressed; anew after a gap in time. Friction
+ * is compensated by the given rate: the felt one contains the measured rate, and would feed back. */
 static void feel(const sc_hybrid_config *config, sc_hybrid *state, const sc_hybrid_input *in,
                  int pressed, moment *now)
 {
-    now->felt = 0.0f;
-    if (!pressed || config->surface_cutoff_Hz == 0.0f) {
+    if (!pressed || config->surface_cutoff_Hz == 0.0f || in->dt > LONGEST_STEP_S) {
         state->feels = 0;
         return;
     }
@@ -104,7 +103,6 @@ static void feel(const sc_hybrid_config *config, sc_hybrid *state, const sc_hybr
                         in->compliance * (in->force - state->force_before);
     state->surface_rate += corner / (1.0f + corner * now->dt) * moved;
     state->force_before = in->force;
-    now->felt = state->surface_rate - given;
     now->gap_rate = out - state->surface_rate;
 }
 
@@ -215,7 +213,7 @@ static void compensate(const sc_hybrid_config *config, const sc_hybrid_input *in
                        const moment *now, float *effort)
 {
     const int axes = now->point.axes;
-    const float out = now->fall + now->felt + sc_point_dot(axes, in->normal, in->surface_velocity);
+    const float out = now->fall + sc_point_dot(axes, in->normal, in->surface_velocity);
     float wanted[MOST], glide[MOST], rates[MOST];
     for (int i = 0; i < axes; i++) {
         wanted[i] = in->path_rate[i];

@@ -83,7 +83,8 @@ typedef struct {
     float leave_force;     /* below touch_force [N] */
     float leave_s;
     float approach_speed;  /* [m/s] */
-    float approach_rate;   /* from afar the gap shrinks by this share of it [1/s] */
+    float approach_rate;   /* from afar the gap shrinks by this share of it; where the gap is wrong by
+                              more than approach_speed / approach_rate, touching is faster [1/s] */
     float approach_force;  /* above touch_force [N] */
     float friction_share;  /* of dry friction that is compensated */
     float slip_rate;       /* of sliding on the surface, as friction_rate [m/s] */
