@@ -211,6 +211,17 @@ class PoseTracker:
             counts=self._counts,
         )
 
+    def shift_time(self, by_s: float) -> None:
+        """Take all times for so much later: the clock that they are told by has begun anew."""
+        self._times = [time + by_s for time in self._times]
+        self._rows = [replace(row, time_s=row.time_s + by_s) for row in self._rows]
+        for state in self._states:
+            state.time_s += by_s
+        self._last_contact_s += by_s
+        self._used_picture_s += by_s
+        self._used_contact_s += by_s
+        self._felt_since_s += by_s
+
     def _begin(self, seen: CameraPose) -> None:
         state = start_state(
             self._settings, seen.time_s, seen.rotation, seen.place_m, seen.covariance

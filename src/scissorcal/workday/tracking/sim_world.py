@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.plate import plate_pose
-from scissorcal.device.sim.specimen import TouchedPlate, load_specimen
+from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.vision.live import Frame
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FRAMES_HZ = 10.0
-BLACK_EVERY = 8
-JITTER_S = 0.04
 CAMERA_OFFSET_S, CAMERA_DRIFT = 3000.0, 80e-6
 """The camera's clock: when it was switched on, and that it runs faster."""
 STANCE = (0.0, 8.0)
@@ -44,16 +42,34 @@ HAND_SPEED_RAD_PER_S, HAND_STROKES = 0.3, 1000.0
 _LEVEL_PLATE = TouchedPlate(place_mm=(20.0, 10.0, 0.0))
 
 
+@dataclass(frozen=True)
+class SimCamera:
+    """A rendered camera: its rate, by how much more than camera_delay_ms a picture may come late,
+    and every how many pictures one is black."""
+
+    frames_Hz: float = 10.0
+    jitter_s: float = 0.04
+    black_every: int = 8
+
+
 class SimWorld:
     """The plate of the recipe's specimen, moving as fast as the recipe's plate.tracking says.
 
     It sways in all axes and turns about the rig's z, with the stated speeds as rms. A rendered
-    camera sees it ten times a second, by another clock and late by camera_delay_ms to 40 ms
-    more; every eighth picture is black. With ``rig``, a virtual hand taps it with the blade's tip,
-    motors off, in virtual time. ``truth`` is for tests.
+    ``camera`` sees it, by another clock and late. With ``rig``, a virtual hand taps it with the
+    blade's tip, motors off, in virtual time. ``specimen`` takes the place of the recipe's, with
+    its own motion and hand. ``truth`` is for tests.
     """
 
-    def __init__(self, recipe: "Recipe", seed: int, *, rig: bool) -> None:
+    def __init__(
+        self,
+        recipe: "Recipe",
+        seed: int,
+        *,
+        rig: bool,
+        specimen: Specimen | None = None,
+        camera: SimCamera | None = None,
+    ) -> None:
         """Raise InputError where the recipe names no specimen."""
         if recipe.specimen is None:
             raise InputError(
@@ -61,19 +77,22 @@ class SimWorld:
                 'specimen = "office-paper" at its top, or name a camera and a port.'
             )
         self._recipe, self._seed = recipe, seed
-        specimen = load_specimen(recipe.specimen)
-        stands = specimen.plate or _LEVEL_PLATE
-        self._plate = stands.model_copy(update=_sway(recipe, stands.sway_Hz))
+        self._camera = camera or SimCamera()
+        if specimen is None:
+            base = load_specimen(recipe.specimen)
+            stands = base.plate or _LEVEL_PLATE
+            swaying = stands.model_copy(update=_sway(recipe, stands.sway_Hz))
+            hand = base.hand.model_copy(update=HAND)
+            specimen = base.model_copy(update={"plate": swaying, "hand": hand})
+        self._plate = specimen.plate or _LEVEL_PLATE
         self._rng = np.random.default_rng([seed, 12])
         self._link: LockstepLink | None = None
         self._begun_s = 0.0
-        self._first_s = 1.0 / FRAMES_HZ
+        self._first_s = 1.0 / self._camera.frames_Hz
         self._number = 0
         self._late: list[Frame] = []
         if rig:
-            hand = specimen.hand.model_copy(update=HAND)
-            changed = specimen.model_copy(update={"plate": self._plate, "hand": hand})
-            self._link = LockstepLink(changed, np.random.default_rng([seed, 13]))
+            self._link = LockstepLink(specimen, np.random.default_rng([seed, 13]))
 
     @property
     def link(self) -> LockstepLink:
@@ -90,7 +109,7 @@ class SimWorld:
         plate = self.link.rig.plate
         assert plate is not None
         self._begun_s = self.link.virtual_time - plate.time_s
-        self._first_s = self.link.virtual_time + 1.0 / FRAMES_HZ
+        self._first_s = self.link.virtual_time + 1.0 / self._camera.frames_Hz
 
     def truth(self, host_s: float) -> tuple[Array, Array]:
         """True rotation (3, 3) and place (3,) in the rig's frame, at a time of the host's clock."""
@@ -100,25 +119,31 @@ class SimWorld:
     def frames(self, until_s: float = math.inf) -> Iterator[Frame]:
         """Render pictures in the order of their arrival, up to a time of the host's clock."""
         while True:
-            exposed = self._first_s + self._number / FRAMES_HZ
+            exposed = self._first_s + self._number / self._camera.frames_Hz
             soonest = exposed + 1e-3 * self._recipe.plate.tracking.camera_delay_ms
             self._late.sort(key=lambda frame: frame.arrived_s)
             if self._late and self._late[0].arrived_s < min(soonest, until_s):
                 yield self._late.pop(0)
             elif exposed <= until_s:
-                self._late.append(self._render(exposed, soonest + JITTER_S * self._rng.random()))
+                late = self._camera.jitter_s * self._rng.random()
+                self._late.append(self._shot(exposed, soonest + late))
             else:
                 return
 
-    def _render(self, exposed: float, arrives: float) -> Frame:
+    def image(self, exposed: float) -> NDArray[np.uint8]:
+        """What the camera shows at a time of the host's clock, (height, width, 3)."""
         rotation, place = self.truth(exposed)
         scene = sim_plate_scene(self._recipe, self._seed, Pose(rotation, place))
         stance = STANCE
         if self._link is not None:
             rig = self._link.rig
             stance = (1e3 * rig.advance, math.degrees(rig.opening))
-        image = render_frame(scene, self._recipe, stance, self._seed, self._number)
-        if self._number % BLACK_EVERY == BLACK_EVERY - 1:
+        return render_frame(scene, self._recipe, stance, self._seed, self._number)
+
+    def _shot(self, exposed: float, arrives: float) -> Frame:
+        image = self.image(exposed)
+        every = self._camera.black_every
+        if self._number % every == every - 1:
             image = np.zeros_like(image)
         stamp = CAMERA_OFFSET_S + (1.0 + CAMERA_DRIFT) * exposed
         frame = Frame(self._number, exposed - self._first_s, image, None, stamp, arrives)
