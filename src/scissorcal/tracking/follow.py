@@ -75,7 +75,8 @@ class PlateFollower:
 
     The filter's time is the rig's, where there is one, else the camera's. ``camera_delay_s`` passes
     from a picture's exposure to its soonest arrival, which no times of arrival can show.
-    ``contacts`` makes contacts of the rig's samples; without it, samples only tell the time.
+    ``contacts`` makes contacts of the rig's samples; without it, and while ``touching`` is False,
+    samples only tell the time.
     Raises what `ClockWatch.add` does.
     """
 
@@ -96,6 +97,7 @@ class PlateFollower:
         self.pictures: deque[CameraPose] = deque(maxlen=_MOST_ROWS)
         self.contacts: deque[TipContact] = deque(maxlen=_MOST_ROWS)
         self.away: tuple[float, float] | None = None
+        self.touching = True
         self._surface = surface
         self._settings = settings
         self._delay_s = camera_delay_s
@@ -142,7 +144,7 @@ class PlateFollower:
             self._shift(self.rig.fit.own(float(host_s[-1])) - before.own(float(host_s[-1])))
         self._before = None
         self._now_s = max(self._now_s, float(device_s[-1]))
-        if self._tip is None:
+        if self._tip is None or not self.touching:
             return []
         normal = self._normal(float(opening[-1]), float(advance[-1]))
         found = self._tip.take(device_s, opening, advance, drive, normal)
@@ -179,6 +181,11 @@ class PlateFollower:
         host = fit.host(stamp_s) - self._delay_s
         time = rig.own(host)
         return time, math.hypot(fit.sd_s(stamp_s), rig.sd_s(time))
+
+    @property
+    def picture_noise(self) -> Array:
+        """Covariance (6, 6) of what is new in the newest picture. IndexError without one."""
+        return self.pictures[-1].covariance
 
     def estimate(self, host_s: float) -> PoseEstimate | None:
         """The pose at a time of the host's clock; None while there is none.

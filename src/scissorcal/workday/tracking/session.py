@@ -16,7 +16,7 @@ from scissorcal.tracking.settings import CameraErrors, TrackingSettings, setting
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.vision.track import STATES, State
 from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class TrackSession:
         contacts: ContactSource | None = None,
         friction_known: bool = True,
         calibrated: bool = True,
-        recorder: TrackRecorder | None = None,
+        recorder: TrackChannels | None = None,
         base_ns: int = 0,
         tell: Tell | None = None,
     ) -> None:
