@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.sim.hand import minimum_jerk
 from scissorcal.device.sim.plate import plate_pose
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
+from scissorcal.tracking.rotation import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.lens import Pose
+from scissorcal.vision.sim.plate_scene import LEVEL
 from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
 
 if TYPE_CHECKING:
@@ -39,6 +42,11 @@ HAND = {
 """A hand that taps a plate with 3.5 N at the tip, for half a second, at one place after another."""
 HAND_SPEED_RAD_PER_S, HAND_STROKES = 0.3, 1000.0
 
+CARRY_S = 1.5
+"""How long a hand takes to bring a plate from where it is tapped to between the blades."""
+STRENGTH_N = 6.0
+"""Of a hand that taps and cuts: more than the torque of paper, and 5 N at the tip."""
+
 _LEVEL_PLATE = TouchedPlate(place_mm=(20.0, 10.0, 0.0))
 
 
@@ -57,7 +65,9 @@ class SimWorld:
 
     It sways in all axes and turns about the rig's z, with the stated speeds as rms. A rendered
     ``camera`` sees it, by another clock and late. With ``rig``, a virtual hand taps it with the
-    blade's tip, motors off, in virtual time. ``specimen`` takes the place of the recipe's, with
+    blade's tip, motors off, in virtual time. With ``cut`` the plate is the one between the blades
+    that photographs of the seed show; it is tapped at rest where the specimen has it, and then
+    carried there. ``specimen`` takes the place of the recipe's, with
     its own motion and hand. ``truth`` is for tests.
     """
 
@@ -67,6 +77,7 @@ class SimWorld:
         seed: int,
         *,
         rig: bool,
+        cut: bool = False,
         specimen: Specimen | None = None,
         camera: SimCamera | None = None,
     ) -> None:
@@ -78,21 +89,19 @@ class SimWorld:
             )
         self._recipe, self._seed = recipe, seed
         self._camera = camera or SimCamera()
-        if specimen is None:
-            base = load_specimen(recipe.specimen)
-            stands = base.plate or _LEVEL_PLATE
-            swaying = stands.model_copy(update=_sway(recipe, stands.sway_Hz))
-            hand = base.hand.model_copy(update=HAND)
-            specimen = base.model_copy(update={"plate": swaying, "hand": hand})
-        self._plate = specimen.plate or _LEVEL_PLATE
+        specimen = specimen or _swaying(recipe, cut=cut)
+        self._tapped = self._plate = specimen.plate or _LEVEL_PLATE
+        if cut:
+            self._plate = _between_blades(recipe, seed)
         self._rng = np.random.default_rng([seed, 12])
-        self._link: LockstepLink | None = None
+        self._link: _WorldLink | None = None
         self._begun_s = 0.0
+        self._carried_s = -math.inf
         self._first_s = 1.0 / self._camera.frames_Hz
         self._number = 0
         self._late: list[Frame] = []
         if rig:
-            self._link = LockstepLink(specimen, np.random.default_rng([seed, 13]))
+            self._link = _WorldLink(specimen, np.random.default_rng([seed, 13]))
 
     @property
     def link(self) -> LockstepLink:
@@ -101,20 +110,39 @@ class SimWorld:
             raise ValueError("this world has no rig")
         return self._link
 
-    def begin(self, motion: "Motion") -> None:
-        """Put the plate in, and let the hand tap it."""
+    def begin(self, motion: "Motion", *, taps: bool = True) -> None:
+        """Put the plate in where the tip reaches it, and let the hand tap it."""
         motion.configure(ConfigKey.MATERIAL, PLATE)
-        motion.configure(ConfigKey.HAND_STROKES, HAND_STROKES)
-        motion.configure(ConfigKey.HAND_SPEED_rad_per_s, HAND_SPEED_RAD_PER_S)
+        if taps:
+            motion.configure(ConfigKey.HAND_STROKES, HAND_STROKES)
+            motion.configure(ConfigKey.HAND_SPEED_rad_per_s, HAND_SPEED_RAD_PER_S)
         plate = self.link.rig.plate
         assert plate is not None
         self._begun_s = self.link.virtual_time - plate.time_s
         self._first_s = self.link.virtual_time + 1.0 / self._camera.frames_Hz
+        if taps:
+            self._carried_s = math.inf
+
+    def keep_plate(self) -> None:
+        """The plate stays where it is and moves on, whatever is said to the rig about it."""
+        assert self._link is not None
+        self._link.keeps = True
+
+    def carry(self, motion: "Motion") -> None:
+        """Take the plate out of the tip's reach, and bring it between the blades in `CARRY_S`."""
+        motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
+        motion.configure(ConfigKey.MATERIAL, 0.0)
+        self._carried_s = self.link.virtual_time
 
     def truth(self, host_s: float) -> tuple[Array, Array]:
         """True rotation (3, 3) and place (3,) in the rig's frame, at a time of the host's clock."""
-        axes, place = plate_pose(self._plate, host_s - self._begun_s)
-        return np.stack(axes, axis=1), np.array(place)
+        rotation, place = _pose(self._plate, host_s - self._begun_s)
+        share = minimum_jerk(min(max((host_s - self._carried_s) / CARRY_S, 0.0), 1.0))[0]
+        if self._tapped is self._plate or share == 1.0:
+            return rotation, place
+        first, start = _pose(self._tapped, min(host_s, self._carried_s) - self._begun_s)
+        turn = rotation_of(share * rotation_vector(rotation @ first.T))
+        return turn @ first, start + share * (place - start)
 
     def frames(self, until_s: float = math.inf) -> Iterator[Frame]:
         """Render pictures in the order of their arrival, up to a time of the host's clock."""
@@ -149,6 +177,46 @@ class SimWorld:
         frame = Frame(self._number, exposed - self._first_s, image, None, stamp, arrives)
         self._number += 1
         return frame
+
+
+class _WorldLink(LockstepLink):
+    """A virtual rig whose plate may be kept in."""
+
+    keeps = False
+
+    def configure(self, key: int, value: float) -> float:
+        if self.keeps and int(key) == ConfigKey.MATERIAL and self.rig.plate is not None:
+            return float(value)
+        return super().configure(key, value)
+
+
+def _swaying(recipe: "Recipe", *, cut: bool) -> Specimen:
+    """The recipe's specimen with a plate that moves, and a hand that taps it."""
+    base = load_specimen(str(recipe.specimen))
+    plate = base.plate or _LEVEL_PLATE
+    hand = base.hand.model_copy(update={"strength_N": STRENGTH_N} if cut else HAND)
+    swaying = plate if cut else plate.model_copy(update=_sway(recipe, plate.sway_Hz))
+    return base.model_copy(update={"plate": swaying, "hand": hand})
+
+
+def _between_blades(recipe: "Recipe", seed: int) -> TouchedPlate:
+    """The plate where photographs of this seed show it, swaying."""
+    from scipy.spatial.transform import Rotation
+
+    drawn = sim_plate_scene(recipe, seed).rig_plate
+    lean = Rotation.from_matrix(drawn.rotation @ LEVEL.T).as_euler("ZYX", degrees=True)
+    plate = TouchedPlate(
+        place_mm=tuple((1e3 * drawn.shift_m).tolist()),
+        pitch_deg=lean[0],
+        yaw_deg=lean[1],
+        roll_deg=lean[2],
+    )
+    return plate.model_copy(update=_sway(recipe, plate.sway_Hz))
+
+
+def _pose(plate: TouchedPlate, time_s: float) -> tuple[Array, Array]:
+    axes, place = plate_pose(plate, time_s)
+    return np.stack(axes, axis=1), np.array(place)
 
 
 def _sway(recipe: "Recipe", frequency_Hz: float) -> dict[str, object]:
