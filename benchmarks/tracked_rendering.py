@@ -8,7 +8,9 @@ The blade's tip taps the plate, it is carried between the blades, and while they
 noise anew in each. Prints the table of docs/tracking.md.
 """
 
+import argparse
 import math
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -138,7 +138,7 @@ class PlateFollower:
         if self.rig is None or not len(device_s):
             return []
         begun = self.rig.begun_anew
-        before = self.rig.fit if self.rig.known else self._before
+        before = self._line()
         self.rig.add(device_s, host_s)
         if before is not None and (self._before is not None or self.rig.begun_anew > begun):
             self._shift(self.rig.fit.own(float(host_s[-1])) - before.own(float(host_s[-1])))
@@ -175,9 +175,9 @@ class PlateFollower:
         fit = self.camera.fit
         if self.rig is None:
             return stamp_s - self._delay_s, 0.0
-        if not self.rig.known:
+        rig = self._line()
+        if rig is None:
             return math.nan, math.nan
-        rig = self.rig.fit
         host = fit.host(stamp_s) - self._delay_s
         time = rig.own(host)
         return time, math.hypot(fit.sd_s(stamp_s), rig.sd_s(time))
@@ -194,8 +194,9 @@ class PlateFollower:
         """
         if not self.tracker.started:
             return None
-        if self.rig is not None:
-            return self.tracker.estimate(self.rig.fit.own(host_s))
+        rig = self._line()
+        if rig is not None:
+            return self.tracker.estimate(rig.own(host_s))
         return self.tracker.estimate(self.camera.fit.own(host_s + self._delay_s) - self._delay_s)
 
     @property
@@ -204,6 +205,10 @@ class PlateFollower:
         if not self.tracker.started:
             return "waiting"
         return _state(self.tracker.estimate(self._now_s))
+
+    def _line(self) -> ClockFit | None:
+        """The rig's clock, as it was before a restart until it has sent a time again."""
+        return self.rig.fit if self.rig is not None and self.rig.known else self._before
 
     def _shift(self, by_s: float) -> None:
         """Put what is known at the times of a clock that has begun anew, ``by_s`` later."""
@@ -216,7 +221,9 @@ class PlateFollower:
 
     def _contact(self, contact: TipContact) -> FollowedRow:
         self.contacts.append(contact)
-        outcome, nis = self.tracker.contact(contact.time_s, contact.point_m, contact.force_N)
+        outcome, nis = self.tracker.contact(
+            contact.time_s, contact.point_m, contact.force_N, hidden_N=contact.hidden_N
+        )
         row = self._row("contact", contact.time_s, outcome, nis, contact)
         if outcome is Outcome.REFUSED and row.estimate is not None:
             away = self._away(contact, row.estimate)

@@ -209,10 +209,10 @@ class PlateCamera:
         session.follower.touching = taps_s > 0.0
         begun = motion.now_s
         _feed(motion, source, begun + taps_s)
-        if world is not None and self._cut:
-            world.carry(motion)
-            _feed(motion, source, motion.now_s + (CARRY_S if taps_s else 0.0))
         session.follower.touching = False
+        if world is not None and self._cut:
+            world.take_out(motion)
+            _feed(motion, source, motion.now_s + (CARRY_S if taps_s else 0.0))
         while not session.started and motion.now_s - begun < taps_s + PATIENCE_S:
             source(motion.now_s, motion.step())
         _feed(motion, source, motion.now_s + SETTLE_S)

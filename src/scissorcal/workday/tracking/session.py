@@ -176,7 +176,9 @@ class TrackSession:
         follower = self.follower
         if self._drive is not None and follower.pictures:
             touched = [
-                row for row in follower.contacts if row.force_N >= self._used.contact.least_force_N
+                row
+                for row in follower.contacts
+                if row.force_N - row.hidden_N >= self._used.contact.least_force_N
             ]
             self.delay = measure_delay(self._surface, self._used, list(follower.pictures), touched)
 

@@ -44,8 +44,8 @@ HAND_SPEED_RAD_PER_S, HAND_STROKES = 0.3, 1000.0
 
 CARRY_S = 1.5
 """How long a hand takes to bring a plate from where it is tapped to between the blades."""
-STRENGTH_N = 6.0
-"""Of a hand that taps and cuts: more than the torque of paper, and 5 N at the tip."""
+CUTTING_HAND = {**HAND, "strength_N": 6.0, "margin_mm": 1.0}
+"""A hand that taps and cuts: stronger than the torque of paper, and with 5 N at the tip."""
 
 _LEVEL_PLATE = TouchedPlate(place_mm=(20.0, 10.0, 0.0))
 
@@ -128,11 +128,12 @@ class SimWorld:
         assert self._link is not None
         self._link.keeps = True
 
-    def carry(self, motion: "Motion") -> None:
-        """Take the plate out of the tip's reach, and bring it between the blades in `CARRY_S`."""
+    def take_out(self, motion: "Motion") -> None:
+        """Take the plate out of the tip's reach; one that was tapped goes between the blades."""
         motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
         motion.configure(ConfigKey.MATERIAL, 0.0)
-        self._carried_s = self.link.virtual_time
+        if self._carried_s > 0.0:
+            self._carried_s = self.link.virtual_time
 
     def truth(self, host_s: float) -> tuple[Array, Array]:
         """True rotation (3, 3) and place (3,) in the rig's frame, at a time of the host's clock."""
@@ -194,7 +195,7 @@ def _swaying(recipe: "Recipe", *, cut: bool) -> Specimen:
     """The recipe's specimen with a plate that moves, and a hand that taps it."""
     base = load_specimen(str(recipe.specimen))
     plate = base.plate or _LEVEL_PLATE
-    hand = base.hand.model_copy(update={"strength_N": STRENGTH_N} if cut else HAND)
+    hand = base.hand.model_copy(update=CUTTING_HAND if cut else HAND)
     swaying = plate if cut else plate.model_copy(update=_sway(recipe, plate.sway_Hz))
     return base.model_copy(update={"plate": swaying, "hand": hand})
 
