@@ -111,7 +111,9 @@ def _session(recipe: Recipe, truth: Specimen) -> TrackSession:
     delay = recipe.plate.tracking.camera_delay_ms
     about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
     contacts = TipContacts(rig.tip, axis)
-    return TrackSession(recipe, Plane(), about, drive=RigDrive(0.06), contacts=contacts)
+    return TrackSession(
+        recipe, Plane(), about, drive=RigDrive(0.06), contacts=contacts, least_N=0.5 * FORCE_N
+    )
 
 
 def path_error(job: Run, places: Array) -> Array:

@@ -44,8 +44,8 @@ class TipContacts:
     with lever = n dp/d(opening) along the plate's normal n, and the drive of motor and handles.
     Samples are averaged over `EVERY_S`; rate and acceleration are those of a parabola through five
     such means, so a contact comes 20 ms late. While blades stand, dry friction holds any torque
-    up to its level: the force is then known to that level over the lever only, its ``hidden_N``. ``opening`` is the
-    axis as it was identified; without it friction and inertia are left out.
+    up to its level: the force is then known to that level over the lever only, its ``hidden_N``.
+    ``opening`` is the axis as it was identified; without it friction and inertia are left out.
 
     >>> tip = BladePoint(station_m=0.075, offset_m=-0.005, moving_blades=2)
     >>> contacts = TipContacts(tip)

@@ -161,9 +161,9 @@ class PoseTracker:
         """Take a contact at a place (3,) in the rig's frame, with its force along the normal.
 
         What of the force may be dry friction, ``hidden_N``, does not count towards the least of a
-        contact: blades that stand in the air touch nothing. Where a sensor measures all of the force on the tool, ``force_vector_N`` (3,) and the tip's
-        ``velocity_m_per_s`` (3,) tell the normal's direction as well. Raises InputError where a
-        number is not finite.
+        contact: blades that stand in the air touch nothing. Where a sensor measures all of the
+        force on the tool, ``force_vector_N`` (3,) and the tip's ``velocity_m_per_s`` (3,) tell the
+        normal's direction as well. Raises InputError where a number is not finite.
         """
         _check("The contact", time_s, point_m, np.array([force_N]))
         contact = self._smoothed(time_s, point_m, force_N)

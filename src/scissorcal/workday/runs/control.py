@@ -113,7 +113,9 @@ def control_workspace(
         writer = _open_writer(path, link, workspace, path_file, probe) if path else nullcontext()
         with writer as recording, ExitStack() as seeing:
             if eye:
-                known = seeing.enter_context(eye.follow(link, recording))
+                known = seeing.enter_context(
+                    eye.follow(link, recording, held_N=float(points.force.min()))
+                )
             assert known is not None
             job = Job(
                 points=points,

@@ -120,19 +120,22 @@ class PlateCamera:
         writer: "RecordingWriter | None",
         *,
         taps_s: float = 0.0,
+        held_N: float = 0.0,
         say: "Say | None" = None,
     ) -> Iterator[TrackedPose]:
         """Start the camera, look until there is a pose, and yield the source of poses.
 
         The motors are off meanwhile. For ``taps_s`` a person taps the plate with the blade's tip
-        (the virtual hand does, and brings the plate to where it is cut). Rows go to ``writer``.
+        (the virtual hand does, and brings the plate to where it is cut). Where the rig itself holds
+        ``held_N`` at the tip, less than half of it is no contact: blades that set off and stop
+        feign a few tenths of a newton. Rows go to ``writer``.
         Without a pose after `PATIENCE_S` the source says None. Raises as `TrackedPose`.
         """
         feeds.refuse_without_sledge(link)
         virtual = self._world is not None
         base_ns, begun_s = (0, 0.0) if virtual else (time.time_ns(), time.monotonic())
         channels = TrackChannels(writer, base_ns) if writer is not None else None
-        session = self._session = self._new_session(link, channels, base_ns)
+        session = self._session = self._new_session(link, channels, base_ns, 0.5 * held_N)
         with ExitStack() as stack:
             due = self._pictures(stack, begun_s)
             source = TrackedPose(session, due, begun_s, steady=self._cut)
@@ -167,7 +170,7 @@ class PlateCamera:
         )
 
     def _new_session(
-        self, link: "Link", channels: TrackChannels | None, base_ns: int
+        self, link: "Link", channels: TrackChannels | None, base_ns: int, least_N: float
     ) -> TrackSession:
         engine, recipe = self._engine, self._recipe
         contacts, known = inputs.tip_contacts(engine, recipe)
@@ -178,6 +181,7 @@ class PlateCamera:
             drive=inputs.rig_drive(engine, link.identity.handle_radius, link),
             contacts=contacts,
             friction_known=known,
+            least_N=least_N,
             calibrated=self._eye.camera.covariance is not None,
             recorder=channels,
             base_ns=base_ns,

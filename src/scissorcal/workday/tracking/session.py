@@ -60,7 +60,8 @@ class TrackSession:
     """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
-    then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
+    then on. Contacts below ``least_N`` are none, whatever the recipe says. ``base_ns`` is the
+    computer's clock at 0 s of the times of pictures.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class TrackSession:
         drive: RigDrive | None = None,
         contacts: ContactSource | None = None,
         friction_known: bool = True,
+        least_N: float = 0.0,
         calibrated: bool = True,
         recorder: TrackChannels | None = None,
         base_ns: int = 0,
@@ -90,7 +92,7 @@ class TrackSession:
         self._base_ns = base_ns
         self._tell = tell
         self._calibrated = calibrated
-        self._least_N = 0.0 if friction_known else UNKNOWN_FRICTION_N
+        self._least_N = max(least_N, 0.0 if friction_known else UNKNOWN_FRICTION_N)
         self._picture: State | None = None
         self._nis = math.nan
         self._begun_s = self._seen_s = math.nan
