@@ -99,7 +99,7 @@ def test_a_normal_along_the_blades_motion_gives_no_force() -> None:
 
 
 def test_blades_that_stand_in_the_air_touch_nothing() -> None:
-    """Dry friction holds what presses on the handles: up to 0.4 N at the tip would seem to touch."""
+    """Dry friction holds what presses on the handles: 0.35 N at a tip that touches nothing."""
     time = 1e-3 * np.arange(200)
     held = 0.9 * COULOMB
     still = np.full(200, 0.6)

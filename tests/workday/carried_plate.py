@@ -1,4 +1,4 @@
-"""A plate that is tapped, carried between the blades, and moved while they cut; tracked meanwhile."""
+"""A plate that is tapped, carried between the blades and moved while they cut, and is tracked."""
 
 import math
 from collections.abc import Iterator
