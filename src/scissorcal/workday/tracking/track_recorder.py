@@ -66,7 +66,7 @@ class TrackChannels:
         self._writer.mark(TRACK_MARK, json.dumps(asdict(facts)))
 
     def samples(self, samples: NDArray[np.void]) -> None:
-        """Samples of the rig: whoever runs it records them."""
+        """Samples of the rig are recorded by the run itself."""
 
     def picture(self, picture: PlatePicture, time_s: float) -> None:
         """Add a picture, exposed at ``time_s`` of the filter's clock."""
