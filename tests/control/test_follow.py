@@ -103,7 +103,7 @@ def test_a_plate_that_drops_loses_contact_and_is_said_to(monkeypatch: pytest.Mon
     assert run.result is not None
     assert run.result.figures.losses == 1
     assert run.result.figures.touches == 2
-    assert "contact" in failed(run.result.verdicts)
+    assert [one.check for one in failed(run.result.verdicts)] == ["contact"]
 
 
 def test_a_hard_touch_is_told_from_the_force_that_was_wanted() -> None:

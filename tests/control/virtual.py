@@ -166,12 +166,13 @@ def prepare(
     seed: int = 1,
     peak_N: float = 1.0,
     each: Callable[[VirtualRig], None] | None = None,
+    link: LockstepLink | None = None,
     **plate: Any,
 ) -> Run:
     """A virtual rig with a plate, and a job on it; ``each`` is called at each of its ticks."""
-    truth = specimen(**plate)
+    link = link or LockstepLink(specimen(**plate), np.random.default_rng(seed))
+    truth = link.rig.specimen
     assert truth.plate is not None
-    link = LockstepLink(truth, np.random.default_rng(seed))
     kept = Truth()
     tick = link.rig.tick
 

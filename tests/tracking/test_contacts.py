@@ -6,7 +6,10 @@ import pytest
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import FrictionLaw
 from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import EVERY_S, TipContact, TipContacts
+from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.tracker import Outcome, PoseTracker
 
 TIP = BladePoint(station_m=0.075, offset_m=-0.005, moving_blades=2)
 UP = np.array([0.0, 1.0, 0.0])
@@ -93,3 +96,22 @@ def test_without_an_identified_axis_friction_is_taken_for_force() -> None:
 
 def test_a_normal_along_the_blades_motion_gives_no_force() -> None:
     assert TipContacts(TIP, AXIS).take(*samples(0.5, 1.0), np.array([1.0, 0.0, 0.0])) == []
+
+
+def test_blades_that_stand_in_the_air_touch_nothing() -> None:
+    """Dry friction holds what presses on the handles: 0.35 N at a tip that touches nothing."""
+    time = 1e-3 * np.arange(200)
+    held = 0.9 * COULOMB
+    still = np.full(200, 0.6)
+    found = TipContacts(TIP, AXIS).take(time, still, 0.0 * time, OFFSET - held + 0.0 * time, UP)
+    tracker = PoseTracker(Plane())
+    tracker.picture(CameraPose(0.0, np.eye(3), np.zeros(3), 1e-8 * np.eye(6)))
+    assert len(found) > 10
+    for one in found:
+        assert one.force_N > 0.3
+        outcome, _ = tracker.contact(one.time_s, one.point_m, one.force_N, hidden_N=one.hidden_N)
+        assert outcome is Outcome.NO_CONTACT
+    pressed = TipContacts(TIP, AXIS).take(
+        time, still, 0.0 * time, OFFSET - held - 2.0 * 0.034 + 0.0 * time, UP
+    )
+    assert all(one.force_N - one.hidden_N > 1.5 for one in pressed)

@@ -174,3 +174,37 @@ def test_a_turned_plate_gives_the_normal_of_its_face() -> None:
     turn = Rotation.from_rotvec([0.3, -0.4, 0.2]).as_matrix()
     follower.picture(SeenPose(0.0, 0.06, turn, np.zeros(3), 1e-7 * np.eye(6)))
     assert follower._normal(0.3, 0.0) == pytest.approx(turn[:, 2])
+
+
+@pytest.mark.parametrize("expected", [True, False])
+def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
+    """As by a new motion: the filter's times go along, so that no picture is too late or early."""
+    world = a_world(1)
+    rng = np.random.default_rng(0)
+    follower = PlateFollower(
+        Plane(), settings_for(MOVING), camera_delay_s=SHORTEST_S, rig=True, contacts=None
+    )
+    waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
+    waiting.sort(key=lambda one: one[0])
+    none, began_anew_s, base = np.zeros(50), 3.0, 7.0
+    for end in np.arange(0.05, MOVING.seconds, 0.05):
+        if base and end > began_anew_s:
+            base = 7.0 - began_anew_s - 4.0
+            if expected and end < began_anew_s + 0.06:
+                follower.restart_rig()
+        true = end - 0.05 + 1e-3 * np.arange(1, 51)
+        follower.samples(base + true, true + 5e-5 + rng.exponential(1e-4, 50), none, none, none)
+        while waiting and waiting[0][0] <= end:
+            at, seen = waiting.pop(0)
+            stamp = _on(CAMERA, seen.exposed_s)
+            pose = SeenPose(stamp, at, seen.rotation, seen.place_m, seen.covariance, seen.certain)
+            follower.picture(pose)
+    counts = follower.tracker.estimate().counts
+    assert (counts.restarts, counts.late_pictures) == (0, 0)
+    assert counts.pictures > 0.9 * len(world.pictures) - counts.refused_pictures - 5
+    found = follower.estimate(MOVING.seconds)
+    assert found is not None
+    assert found.picture_age_s < 0.3
+    assert found.time_s == pytest.approx(base + MOVING.seconds, abs=5e-3)
+    assert follower.rig is not None
+    assert len(follower.rig.jumps) == (0 if expected else 1)

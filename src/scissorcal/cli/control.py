@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.options import (
+    Baud,
+    Device,
+    Folder,
+    PlateCamera,
+    Realtime,
+    Seed,
+    Yes,
+    positive,
+)
 from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.tracked import tracked_facts
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.control import Controlled
@@ -38,6 +48,7 @@ def control(
             help="Where the plate stands in the rig's plane; as it was fitted if not given.",
         ),
     ] = None,
+    camera: PlateCamera = "none",
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     realtime: Realtime = False,
     yes: Yes = False,
@@ -49,7 +60,9 @@ def control(
 
     Both motors move the tip; nobody holds the handles. Friction of both axes must be fitted
     ('scissorcal capture friction', with --axis advance too), and the recipe states the plate's
-    surface and stiffness. With --device sim the specimen's plate is pressed on.
+    surface and stiffness. With --camera the plate may move: its pose follows from pictures and
+    from the tip's contacts, as 'scissorcal track' has it. With --device sim the specimen's plate is
+    pressed on.
 
     \b
     Example:
@@ -70,6 +83,7 @@ def control(
             force_N=force,
             speed_mm_per_s=speed,
             pose=pose,
+            camera=camera,
             record=not no_record,
             seed=seed,
             baud=baud,
@@ -82,7 +96,11 @@ def control(
     del result["verdicts"]
     files = [controlled.recording] if controlled.recording else []
     verdicts = controlled.result.verdicts
-    return Answer({**result, "rig": controlled.rig}, _text(controlled), verdicts, files)
+    tracked = controlled.tracked
+    if tracked:
+        verdicts += tracked.verdicts
+    facts = {"rig": controlled.rig, "tracked": tracked_facts(tracked)}
+    return Answer({**result, **facts}, _text(controlled), verdicts, files)
 
 
 def _text(controlled: "Controlled") -> str:
@@ -99,6 +117,8 @@ def _text(controlled: "Controlled") -> str:
         f"{100 * figures.limited_share:.1f} % of the ticks at a limit",
         "",
     ]
+    if controlled.tracked:
+        lines.insert(-1, controlled.tracked.sentence)
     rows = [["gain", "", ""]]
     rows += [
         ["damping along the normal", f"{done.gains.contact_kd:.0f}", "1/s"],

@@ -73,6 +73,17 @@ Axis = Annotated[
 ]
 
 
+PlateCamera = Annotated[
+    str,
+    typer.Option(
+        "--camera",
+        metavar="NUMBER|sim|none",
+        help="A camera by its number that follows the plate while it runs, sim: a rendered plate "
+        "(with --device sim), or none.",
+    ),
+]
+
+
 def positive(value: float | None) -> float | None:
     """Accept a number above zero, or none; for options of which 0 makes no sense."""
     if value is not None and not value > 0.0:

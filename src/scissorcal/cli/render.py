@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.options import (
+    Baud,
+    Device,
+    Folder,
+    PlateCamera,
+    Realtime,
+    Seed,
+    Yes,
+    positive,
+)
 from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.tracked import tracked_facts
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.render import Rendered
@@ -29,6 +39,16 @@ def render(
     rate_rad_per_s: Annotated[
         float, typer.Option(callback=positive, help="Speed of the virtual hand.")
     ] = 0.3,
+    camera: PlateCamera = "none",
+    taps: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Before rendering, with the motors off: tap the plate with the blade's tip, at "
+            "several places, so that contact tells its height.",
+        ),
+    ] = 0.0,
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     realtime: Realtime = False,
     yes: Yes = False,
@@ -39,7 +59,8 @@ def render(
     """Render the cut on a rig: hold the handles and close them.
 
     The loop runs in C, in a separate process, within the recipe's limits. With --device sim a
-    virtual hand makes the strokes, in virtual time unless --realtime is given.
+    virtual hand makes the strokes, in virtual time unless --realtime is given. With --camera a
+    plate whose pose the scene estimates may move while it is cut.
 
     \b
     Example:
@@ -70,12 +91,17 @@ def render(
             progress=view.show,
             confirm=view.confirm,
             say=note,
+            camera=camera,
+            taps_s=taps,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts
+    if rendered.tracked:
+        verdicts += rendered.tracked.verdicts
     del result["verdicts"]
     files = [rendered.recording] if rendered.recording else []
-    return Answer({**result, "rig": rendered.rig}, _text(rendered), verdicts, files)
+    facts = {"rig": rendered.rig, "tracked": tracked_facts(rendered.tracked)}
+    return Answer({**result, **facts}, _text(rendered), verdicts, files)
 
 
 def _text(rendered: "Rendered") -> str:
@@ -96,6 +122,7 @@ def _text(rendered: "Rendered") -> str:
         f"largest torque {result.largest_torque_Nm:.3g} N m",
         result.admission.summary,
         *([result.plate.summary] if result.plate else []),
+        *([rendered.tracked.sentence] if rendered.tracked else []),
         "",
     ]
     ledger = [["energy", "mJ"]]

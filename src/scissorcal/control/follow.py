@@ -1,6 +1,7 @@
 """Press on a plate's surface and follow a path along it: the outer loop, on a motion."""
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -27,6 +28,7 @@ from scissorcal.device.capture import servo_config
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
+from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
@@ -267,7 +269,8 @@ class _Run:
 
 def _first_pose(source: PoseSource, link: Link) -> PlatePose:
     """The pose by which a path is laid, before anything moves."""
-    pose = source(0.0, np.zeros(0, dtype=np.void))
+    now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
+    pose = source(now_s, np.zeros(0, dtype=np.void))
     if pose is None or not pose.tracked:
         why = f" ({pose.why})" if pose is not None and pose.why else ""
         raise DeviceError(

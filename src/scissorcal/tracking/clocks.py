@@ -163,6 +163,11 @@ class ClockWatch:
         return self._fit is not None
 
     @property
+    def begun_anew(self) -> int:
+        """How often the line began anew, after jumps and what looked like them."""
+        return len(self._begun_anew)
+
+    @property
     def fit(self) -> ClockFit:
         """The newest line. DeviceError before the first pair."""
         if self._fit is None:

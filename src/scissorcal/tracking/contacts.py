@@ -23,11 +23,15 @@ _FITTED = 5
 
 @dataclass(frozen=True, eq=False)
 class TipContact:
-    """Where the tip was at ``time_s`` (s), in the rig's frame, and its force along the normal."""
+    """Where the tip was at ``time_s`` (s), in the rig's frame, and its force along the normal.
+
+    ``hidden_N`` of the force may be dry friction of blades that stand.
+    """
 
     time_s: float
     point_m: Array
     force_N: float
+    hidden_N: float = 0.0
 
 
 class TipContacts:
@@ -40,8 +44,8 @@ class TipContacts:
     with lever = n dp/d(opening) along the plate's normal n, and the drive of motor and handles.
     Samples are averaged over `EVERY_S`; rate and acceleration are those of a parabola through five
     such means, so a contact comes 20 ms late. While blades stand, dry friction holds any torque
-    up to its level: the force is then known to that level over the lever only. ``opening`` is the
-    axis as it was identified; without it friction and inertia are left out.
+    up to its level: the force is then known to that level over the lever only, its ``hidden_N``.
+    ``opening`` is the axis as it was identified; without it friction and inertia are left out.
 
     >>> tip = BladePoint(station_m=0.075, offset_m=-0.005, moving_blades=2)
     >>> contacts = TipContacts(tip)
@@ -99,13 +103,17 @@ class TipContacts:
         lever = float(normal @ self._tip.jacobian((opening, advance))[:, 0])
         if abs(lever) < LEAST_LEVER_M:
             return None
-        borne = -drive
-        if self._axis is not None:
-            borne += bend * self._axis.inertia + float(self._axis.effort(opening, rate))
+        borne, held = -drive, 0.0
+        axis = self._axis
+        if axis is not None:
+            borne += bend * axis.inertia + float(axis.effort(opening, rate))
+            if abs(rate) < axis.rest_rate:
+                ends = axis.effort(opening, np.array([-axis.rest_rate, axis.rest_rate]))
+                held = 0.5 * float(ends[1] - ends[0])
         force = float(borne) / lever
-        return (
-            TipContact(time, self.place(opening, advance), force) if math.isfinite(force) else None
-        )
+        if not math.isfinite(force):
+            return None
+        return TipContact(time, self.place(opening, advance), force, held / abs(lever))
 
 
 def _parabola(means: Iterable[tuple[float, float, float, float]]) -> tuple[float, float]:

@@ -117,7 +117,9 @@ def replay_cost(
         if isinstance(row, CameraPose):
             (outcome, nis), gate = tracker.picture(row), settings.camera.gate
         else:
-            outcome, nis = tracker.contact(row.time_s, row.point_m, row.force_N)
+            outcome, nis = tracker.contact(
+                row.time_s, row.point_m, row.force_N, hidden_N=row.hidden_N
+            )
             gate = settings.contact.gate
         time = row.time_s - (later_s if isinstance(row, CameraPose) else 0.0)
         if outcome in (Outcome.USED, Outcome.REFUSED) and time > settled:

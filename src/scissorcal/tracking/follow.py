@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.model.surface import Surface
-from scissorcal.tracking.clocks import ClockWatch
+from scissorcal.tracking.clocks import ClockFit, ClockWatch
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import TrackingSettings
@@ -75,7 +75,8 @@ class PlateFollower:
 
     The filter's time is the rig's, where there is one, else the camera's. ``camera_delay_s`` passes
     from a picture's exposure to its soonest arrival, which no times of arrival can show.
-    ``contacts`` makes contacts of the rig's samples; without it, samples only tell the time.
+    ``contacts`` makes contacts of the rig's samples; without it, and while ``touching`` is False,
+    samples only tell the time.
     Raises what `ClockWatch.add` does.
     """
 
@@ -89,18 +90,20 @@ class PlateFollower:
         contacts: ContactSource | None = None,
     ) -> None:
         self.camera = ClockWatch("The camera's clock", CAMERA_REMEDY)
-        self.rig = ClockWatch("The rig's clock", RIG_REMEDY) if rig else None
+        self.rig = _rig_clock() if rig else None
         self.tracker = PoseTracker(surface, settings)
         self.outcomes: Counter[tuple[str, Outcome]] = Counter()
         self.nis: dict[str, list[float]] = {"picture": [], "contact": []}
         self.pictures: deque[CameraPose] = deque(maxlen=_MOST_ROWS)
         self.contacts: deque[TipContact] = deque(maxlen=_MOST_ROWS)
         self.away: tuple[float, float] | None = None
+        self.touching = True
         self._surface = surface
         self._settings = settings
         self._delay_s = camera_delay_s
         self._tip = contacts
         self._now_s = -math.inf
+        self._before: ClockFit | None = None
 
     def assume(self, settings: TrackingSettings) -> None:
         """Take other settings, before there is a pose: those that the first picture tells of."""
@@ -120,15 +123,28 @@ class PlateFollower:
         outcome, nis = self.tracker.picture(pose)
         return self._row("picture", self._now_s, outcome, nis)
 
+    def restart_rig(self) -> None:
+        """Expect that the rig's clock begins anew with the next samples, as by a new motion.
+
+        The pose stays, and the jump is not held against the clock.
+        """
+        if self.rig is not None and self.rig.known:
+            self._before, self.rig = self.rig.fit, _rig_clock()
+
     def samples(
         self, device_s: Array, host_s: Array, opening: Array, advance: Array, drive: Array
     ) -> list[FollowedRow]:
         """Take a rig's samples, (n,) each, as `TipContacts.take`; ``host_s`` is when they came."""
         if self.rig is None or not len(device_s):
             return []
+        begun = self.rig.begun_anew
+        before = self._line()
         self.rig.add(device_s, host_s)
+        if before is not None and (self._before is not None or self.rig.begun_anew > begun):
+            self._shift(self.rig.fit.own(float(host_s[-1])) - before.own(float(host_s[-1])))
+        self._before = None
         self._now_s = max(self._now_s, float(device_s[-1]))
-        if self._tip is None:
+        if self._tip is None or not self.touching:
             return []
         normal = self._normal(float(opening[-1]), float(advance[-1]))
         found = self._tip.take(device_s, opening, advance, drive, normal)
@@ -159,12 +175,17 @@ class PlateFollower:
         fit = self.camera.fit
         if self.rig is None:
             return stamp_s - self._delay_s, 0.0
-        if not self.rig.known:
+        rig = self._line()
+        if rig is None:
             return math.nan, math.nan
-        rig = self.rig.fit
         host = fit.host(stamp_s) - self._delay_s
         time = rig.own(host)
         return time, math.hypot(fit.sd_s(stamp_s), rig.sd_s(time))
+
+    @property
+    def picture_noise(self) -> Array:
+        """Covariance (6, 6) of what is new in the newest picture. IndexError without one."""
+        return self.pictures[-1].covariance
 
     def estimate(self, host_s: float) -> PoseEstimate | None:
         """The pose at a time of the host's clock; None while there is none.
@@ -173,8 +194,9 @@ class PlateFollower:
         """
         if not self.tracker.started:
             return None
-        if self.rig is not None:
-            return self.tracker.estimate(self.rig.fit.own(host_s))
+        rig = self._line()
+        if rig is not None:
+            return self.tracker.estimate(rig.own(host_s))
         return self.tracker.estimate(self.camera.fit.own(host_s + self._delay_s) - self._delay_s)
 
     @property
@@ -184,9 +206,24 @@ class PlateFollower:
             return "waiting"
         return _state(self.tracker.estimate(self._now_s))
 
+    def _line(self) -> ClockFit | None:
+        """The rig's clock, as it was before a restart until it has sent a time again."""
+        return self.rig.fit if self.rig is not None and self.rig.known else self._before
+
+    def _shift(self, by_s: float) -> None:
+        """Put what is known at the times of a clock that has begun anew, ``by_s`` later."""
+        self.tracker.shift_time(by_s)
+        self._now_s += by_s
+        for known in (self.pictures, self.contacts):
+            for _ in range(len(known)):  # once round
+                row = known.popleft()
+                known.append(replace(row, time_s=row.time_s + by_s))  # type: ignore[arg-type]
+
     def _contact(self, contact: TipContact) -> FollowedRow:
         self.contacts.append(contact)
-        outcome, nis = self.tracker.contact(contact.time_s, contact.point_m, contact.force_N)
+        outcome, nis = self.tracker.contact(
+            contact.time_s, contact.point_m, contact.force_N, hidden_N=contact.hidden_N
+        )
         row = self._row("contact", contact.time_s, outcome, nis, contact)
         if outcome is Outcome.REFUSED and row.estimate is not None:
             away = self._away(contact, row.estimate)
@@ -225,6 +262,10 @@ class PlateFollower:
         here = self._surface.at((contact.point_m - found.place_m) @ found.rotation)
         gap = here.level / float(np.linalg.norm(here.gradient))
         return gap + found.compliance_m_per_N * contact.force_N - found.contact_offset_m
+
+
+def _rig_clock() -> ClockWatch:
+    return ClockWatch("The rig's clock", RIG_REMEDY)
 
 
 def _state(estimate: PoseEstimate) -> str:

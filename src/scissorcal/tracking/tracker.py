@@ -156,16 +156,18 @@ class PoseTracker:
         force_N: float,
         force_vector_N: Array | None = None,
         velocity_m_per_s: Array | None = None,
+        hidden_N: float = 0.0,
     ) -> tuple[Outcome, float]:
         """Take a contact at a place (3,) in the rig's frame, with its force along the normal.
 
-        Where a sensor measures all of the force on the tool, ``force_vector_N`` (3,) and the tip's
-        ``velocity_m_per_s`` (3,) tell the normal's direction as well. Raises InputError where a
-        number is not finite.
+        What of the force may be dry friction, ``hidden_N``, does not count towards the least of a
+        contact: blades that stand in the air touch nothing. Where a sensor measures all of the
+        force on the tool, ``force_vector_N`` (3,) and the tip's ``velocity_m_per_s`` (3,) tell the
+        normal's direction as well. Raises InputError where a number is not finite.
         """
         _check("The contact", time_s, point_m, np.array([force_N]))
         contact = self._smoothed(time_s, point_m, force_N)
-        if force_N < self._settings.contact.least_force_N:
+        if force_N - hidden_N < self._settings.contact.least_force_N:
             return Outcome.NO_CONTACT, math.nan
         if not self.started:
             return Outcome.WAITING, math.nan
@@ -210,6 +212,17 @@ class PoseTracker:
             contact_age_s=state.time_s - self._used_contact_s,
             counts=self._counts,
         )
+
+    def shift_time(self, by_s: float) -> None:
+        """Take all times for so much later: the clock that they are told by has begun anew."""
+        self._times = [time + by_s for time in self._times]
+        self._rows = [replace(row, time_s=row.time_s + by_s) for row in self._rows]
+        for state in self._states:
+            state.time_s += by_s
+        self._last_contact_s += by_s
+        self._used_picture_s += by_s
+        self._used_contact_s += by_s
+        self._felt_since_s += by_s
 
     def _begin(self, seen: CameraPose) -> None:
         state = start_state(

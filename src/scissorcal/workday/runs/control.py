@@ -1,7 +1,7 @@
 """Follow a path on a plate with a workspace's rig, and record it."""
 
 import math
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from scissorcal.recording import RecordingWriter
     from scissorcal.recording.probe import ProbeResult
     from scissorcal.tracking.plate_pose import PoseSource
+    from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
 
+NONE = "none"
 LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
 LACK_OF_FIT = 0.03
@@ -40,11 +42,15 @@ UNMEASURED_NOISE_Nm = 1e-3
 
 @dataclass(frozen=True)
 class Controlled:
-    """A path that was followed: its result, its recording (None if not wanted), and the rig."""
+    """A path that was followed: its result, its recording (None if not wanted), and the rig.
+
+    ``tracked`` is what became of a camera's pictures and of contacts, None without a camera.
+    """
 
     result: "ControlResult"
     recording: Path | None
     rig: str
+    tracked: "TrackedRun | None" = None
 
 
 def control_workspace(
@@ -55,6 +61,7 @@ def control_workspace(
     force_N: float = 2.0,
     speed_mm_per_s: float = 10.0,
     pose: str | None = None,
+    camera: str = NONE,
     source: "PoseSource | None" = None,
     record: bool = True,
     seed: int = 0,
@@ -68,13 +75,16 @@ def control_workspace(
 
     ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. The plate stands
     where ``source`` says, or ``pose`` ("X_MM,Y_MM,PITCH_DEG": its origin in the rig's plane and its
-    turn about the pivot's axis), or where the fit of its photographs found it. Mass, inertia and
+    turn about the pivot's axis), or where ``camera`` (a camera's number, or "sim" with the device
+    "sim") and contacts have it while the path is followed, or where the fit of its photographs
+    found it. Mass, inertia and
     friction are those of the fits of both axes; the surface and what it is made of are the recipe's
-    (plate.surface, plate.touch). Samples and telemetry go to captures/control-<stamp>.mcap unless
-    ``record`` is False. Otherwise as `render_workspace`.
+    (plate.surface, plate.touch). Samples, and telemetry go to captures/control-<stamp>.mcap unless
+    ``record`` is False; with them the rows of a track. Otherwise as `render_workspace`.
 
-    Raises MissingError where a fit or the pose is missing, and what
-    `scissorcal.control.follow.control` raises.
+    Raises MissingError where a fit or the pose is missing, InputError where the pose is stated
+    twice or the camera does not go with the device, and what `scissorcal.control.follow.control`
+    raises.
     """
     from scissorcal.control.follow import Job, control
     from scissorcal.control.path_file import read_path
@@ -84,24 +94,36 @@ def control_workspace(
     recipe = workspace.recipe()
     engine = Engine.of(workspace)
     points = read_path(path_file).stated(force_N, 1e-3 * speed_mm_per_s)
-    known = source or _pose_source(engine, pose)
+    eye = _camera(engine, camera, device, pose, seed=seed, realtime=realtime)
+    known = None if eye else source or _pose_source(engine, pose)
     touch = recipe.plate.touch
-    job = Job(
-        points=points,
-        surface=plate_surface(recipe.plate.surface, workspace.root),
-        source=known,
-        material=Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
-        length_m=1e-3 * recipe.material.sheet_length_mm,
-    )
     fits = _fits(engine)
     edge = blade_edge(engine, recipe)
     line = line_of(recipe, baud)
-    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
+    with ExitStack() as stack:
+        opened = (
+            eye.open_rig(device, seed, line)
+            if eye
+            else open_rig(device, recipe.specimen, seed, realtime=realtime, line=line)
+        )
+        link = stack.enter_context(opened)
         rig = f"{link.identity.name} {link.identity.serial}"
         probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording("control") if record else None
         writer = _open_writer(path, link, workspace, path_file, probe) if path else nullcontext()
-        with writer as recording:
+        with writer as recording, ExitStack() as seeing:
+            if eye:
+                known = seeing.enter_context(
+                    eye.follow(link, recording, held_N=float(points.force.min()))
+                )
+            assert known is not None
+            job = Job(
+                points=points,
+                surface=plate_surface(recipe.plate.surface, workspace.root),
+                source=known,
+                material=Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
+                length_m=1e-3 * recipe.material.sheet_length_mm,
+            )
             done = control(
                 link,
                 recipe,
@@ -112,9 +134,23 @@ def control_workspace(
                 confirm=confirm,
                 probe=probe,
             )
+            seeing.close()
             if recording is not None:
-                recording.note(_note(done, pose))
-    return Controlled(done, path, rig)
+                recording.note(_note(done, pose, camera))
+    return Controlled(done, path, rig, eye.tracked() if eye else None)
+
+
+def _camera(
+    engine: Engine, camera: str, device: str, pose: str | None, *, seed: int, realtime: bool
+) -> "PlateCamera | None":
+    """The camera that follows the plate; None without one."""
+    from scissorcal.workday.tracking.plate_camera import PlateCamera
+
+    if camera == NONE:
+        return None
+    if pose is not None:
+        raise InputError("The plate stands where --pose or where --camera has it: give one.")
+    return PlateCamera(engine, engine.recipe, camera, device, seed=seed, realtime=realtime)
 
 
 def stated_pose(text: str) -> "PoseSource":
@@ -253,9 +289,10 @@ def _open_writer(
     return writer
 
 
-def _note(done: "ControlResult", pose: str | None) -> str:
+def _note(done: "ControlResult", pose: str | None, camera: str) -> str:
     figures = done.figures
     where = "as it was stated" if pose else "as it was fitted"
+    where = where if camera == NONE else "where it was tracked"
     return (
         f"Followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N, the plate standing "
         f"{where}: force off by {figures.force_rms_N:.3f} N (rms), path by "

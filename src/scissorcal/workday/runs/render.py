@@ -2,12 +2,12 @@
 
 import json
 import math
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
@@ -21,15 +21,22 @@ if TYPE_CHECKING:
     from scissorcal.package import ModelPackage
     from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
     from scissorcal.render.watch import Progress
+    from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
+
+NONE = "none"
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """A finished rendering: its result, its recording (None if not wanted), and the rig."""
+    """A finished rendering: its result, its recording (None if not wanted), and the rig.
+
+    ``tracked`` is what became of a camera's pictures and of taps, None without a camera.
+    """
 
     result: "RenderResult"
     recording: Path | None
     rig: str
+    tracked: "TrackedRun | None" = None
 
 
 def render_workspace(
@@ -47,6 +54,8 @@ def render_workspace(
     confirm: "Confirm | None" = None,
     say: "Say | None" = None,
     plate: "PoseSource | None" = None,
+    camera: str = NONE,
+    taps_s: float = 0.0,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
@@ -54,8 +63,11 @@ def render_workspace(
     virtual time unless ``realtime``; ``baud`` takes the place of the recipe's rate. The samples go
     to captures/render-<stamp>.mcap unless ``record`` is False. A rig without a probe that counts is
     probed first (`ensure_probed`), and ``say`` tells so. ``plate`` tracks a plate whose pose the
-    scene estimates; without it the pose fitted to photographs is taken. Raises MissingError
-    where there is no package or no pose, and what opening it, the rig and the rendering raise.
+    scene estimates, or ``camera`` does (a camera's number, or "sim" with the device "sim"); without
+    them the pose fitted to photographs is taken. Before the rendering a person taps the tracked
+    plate with the blade's tip for ``taps_s``, motors off. Raises MissingError where there is no
+    package or no pose, InputError where a camera is named for a known pose or does not go with the
+    device, and what opening them and the rendering raise.
     """
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
@@ -63,8 +75,15 @@ def render_workspace(
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
+    eye = _camera(workspace, package, camera, device, taps_s, seed=seed, realtime=realtime)
     line = line_of(recipe, baud)
-    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
+    with ExitStack() as stack:
+        opened = (
+            eye.open_rig(device, seed, line)
+            if eye
+            else open_rig(device, recipe.specimen, seed, realtime=realtime, line=line)
+        )
+        link = stack.enter_context(opened)
         rig = f"{link.identity.name} {link.identity.serial}"
         probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording("render") if record else None
@@ -75,7 +94,9 @@ def render_workspace(
             if path
             else nullcontext()
         )
-        with recording as writer:
+        with recording as writer, ExitStack() as seeing:
+            if eye:
+                plate = seeing.enter_context(eye.follow(link, writer, taps_s=taps_s, say=say))
             done = render(
                 link,
                 package,
@@ -91,7 +112,36 @@ def render_workspace(
             )
     if package_path is None:
         _write_admission(workspace.package_path(recipe), done, rig)
-    return Rendered(done, path, rig)
+    return Rendered(done, path, rig, eye.tracked() if eye else None)
+
+
+def _camera(
+    workspace: Workspace,
+    package: "ModelPackage",
+    camera: str,
+    device: str,
+    taps_s: float,
+    *,
+    seed: int,
+    realtime: bool,
+) -> "PlateCamera | None":
+    """The camera that follows the plate of an estimated scene; None without one."""
+    from scissorcal.workday.tracking.plate_camera import PlateCamera
+
+    if camera == NONE:
+        if taps_s:
+            raise InputError("Taps tell where a tracked plate is: name a camera too (--camera).")
+        return None
+    if package.manifest.plate_pose == "known":
+        raise InputError(
+            f"The scene of {package.manifest.name} has a known plate pose, so no camera is used in "
+            'its rendering: leave --camera out, or set plate_pose = "estimated" in [scene] and run '
+            "'scissorcal package build'."
+        )
+    engine = Engine.of(workspace)
+    return PlateCamera(
+        engine, engine.recipe, camera, device, seed=seed, realtime=realtime, cut=True
+    )
 
 
 def _known_rig(workspace: Workspace, package: "ModelPackage") -> "RigFacts":

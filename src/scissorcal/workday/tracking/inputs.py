@@ -27,10 +27,17 @@ REST_RATE_RAD_PER_S = 0.02
 """Below it blades are taken to stand, and dry friction to hold a share of its level."""
 
 
-def plate_eye(engine: Engine, recipe: "Recipe", *, needs_rig: bool) -> "PlateEye":
+def plate_eye(
+    engine: Engine,
+    recipe: "Recipe",
+    *,
+    needs_rig: bool,
+    otherwise: str = "track with --device none",
+) -> "PlateEye":
     """The fitted camera, and the rig's frame if its card tells all of it.
 
-    MissingError where there is no camera's fit, or where contacts need a frame that is not known.
+    MissingError where there is no camera's fit, or where contacts need a frame that is not known;
+    ``otherwise`` is what can be done without it.
     """
     from scissorcal.calibration.plate.fit import plate_target
     from scissorcal.workday.runs.plate import locate_workspace_rig
@@ -44,8 +51,7 @@ def plate_eye(engine: Engine, recipe: "Recipe", *, needs_rig: bool) -> "PlateEye
         raise MissingError(
             f"The camera's place in the rig's frame is not known{told}, so contacts and pictures "
             "cannot be told together: photograph the rig card at several advances and openings "
-            "('scissorcal capture plate --image rig-*.jpg --stances stances.csv'), or track with "
-            "--device none."
+            f"('scissorcal capture plate --image rig-*.jpg --stances stances.csv'), or {otherwise}."
         )
     back = plate_target(recipe).inverse()
     return PlateEye(fitted.camera, back, rig, recipe.fit.plate.priors)

@@ -16,7 +16,7 @@ from scissorcal.tracking.settings import CameraErrors, TrackingSettings, setting
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.vision.track import STATES, State
 from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,8 @@ class TrackSession:
     """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
-    then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
+    then on. Contacts below ``least_N`` are none, whatever the recipe says. ``base_ns`` is the
+    computer's clock at 0 s of the times of pictures.
     """
 
     def __init__(
@@ -72,8 +73,9 @@ class TrackSession:
         drive: RigDrive | None = None,
         contacts: ContactSource | None = None,
         friction_known: bool = True,
+        least_N: float = 0.0,
         calibrated: bool = True,
-        recorder: TrackRecorder | None = None,
+        recorder: TrackChannels | None = None,
         base_ns: int = 0,
         tell: Tell | None = None,
     ) -> None:
@@ -90,7 +92,7 @@ class TrackSession:
         self._base_ns = base_ns
         self._tell = tell
         self._calibrated = calibrated
-        self._least_N = 0.0 if friction_known else UNKNOWN_FRICTION_N
+        self._least_N = max(least_N, 0.0 if friction_known else UNKNOWN_FRICTION_N)
         self._picture: State | None = None
         self._nis = math.nan
         self._begun_s = self._seen_s = math.nan
@@ -176,7 +178,9 @@ class TrackSession:
         follower = self.follower
         if self._drive is not None and follower.pictures:
             touched = [
-                row for row in follower.contacts if row.force_N >= self._used.contact.least_force_N
+                row
+                for row in follower.contacts
+                if row.force_N - row.hidden_N >= self._used.contact.least_force_N
             ]
             self.delay = measure_delay(self._surface, self._used, list(follower.pictures), touched)
 

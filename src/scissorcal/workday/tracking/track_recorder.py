@@ -48,19 +48,14 @@ class TrackAbout:
     shared: tuple[tuple[float, ...], ...] | None = None
 
 
-class TrackRecorder:
-    """Writes what a track was given and what it found into captures/track-<stamp>.mcap.
+class TrackChannels:
+    """Writes what a camera showed and what the filter knew into a recording that others keep too.
 
     ``base_ns`` is the computer's clock at 0 s of the times that rows are given with.
     """
 
-    def __init__(
-        self, path: Path, recipe_toml: str, device: Mapping[str, Any], radius_m: float, base_ns: int
-    ) -> None:
-        self.path = path
-        self._writer = RecordingWriter(
-            path, "track", Joint("rotary"), recipe_toml, device, radius_m
-        )
+    def __init__(self, writer: RecordingWriter, base_ns: int) -> None:
+        self._writer = writer
         self._base_ns = base_ns
         self._rows = 0
         self._frame = "camera"
@@ -71,8 +66,7 @@ class TrackRecorder:
         self._writer.mark(TRACK_MARK, json.dumps(asdict(facts)))
 
     def samples(self, samples: NDArray[np.void]) -> None:
-        """Add samples of the rig."""
-        self._writer.append(samples)
+        """Samples of the rig are recorded by the run itself."""
 
     def picture(self, picture: PlatePicture, time_s: float) -> None:
         """Add a picture, exposed at ``time_s`` of the filter's clock."""
@@ -128,6 +122,25 @@ class TrackRecorder:
         """Rows of the pose so far."""
         return self._rows
 
+    def _times(self, host_s: float) -> NDArray[np.int64]:
+        return np.array([self._base_ns + round(1e9 * host_s)], dtype=np.int64)
+
+
+class TrackRecorder(TrackChannels):
+    """Writes what a track was given and what it found into captures/track-<stamp>.mcap."""
+
+    def __init__(
+        self, path: Path, recipe_toml: str, device: Mapping[str, Any], radius_m: float, base_ns: int
+    ) -> None:
+        self.path = path
+        joint = Joint("rotary")
+        writer = RecordingWriter(path, "track", joint, recipe_toml, device, radius_m)
+        super().__init__(writer, base_ns)
+
+    def samples(self, samples: NDArray[np.void]) -> None:
+        """Add samples of the rig."""
+        self._writer.append(samples)
+
     def close(self, *, keep: bool, note: str = "") -> Path | None:
         """Finish the file, with a last sentence; with ``keep`` False it is removed."""
         if note:
@@ -137,9 +150,6 @@ class TrackRecorder:
             return path
         path.unlink()
         return None
-
-    def _times(self, host_s: float) -> NDArray[np.int64]:
-        return np.array([self._base_ns + round(1e9 * host_s)], dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,227 @@
+"""A camera that follows the plate while the rig controls or renders."""
+
+import math
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError
+from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+from scissorcal.verdicts import Verdict
+from scissorcal.vision.live import frames_of
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.rigs import SIM, open_rig, set_line
+from scissorcal.workday.tracking import feeds, inputs
+from scissorcal.workday.tracking.camera_thread import CameraThread
+from scissorcal.workday.tracking.pictures import PlatePicture
+from scissorcal.workday.tracking.pose_source import Due, TrackedPose
+from scissorcal.workday.tracking.session import TrackSession
+from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
+from scissorcal.workday.tracking.track_recorder import TrackChannels
+
+if TYPE_CHECKING:
+    from scissorcal.device.link import Link
+    from scissorcal.device.motion import Motion
+    from scissorcal.recipe.schema import Line, Recipe
+    from scissorcal.recording import RecordingWriter
+    from scissorcal.workday.runs.probe import Say
+
+PATIENCE_S = 10.0
+"""For so long a first pose is waited for."""
+SETTLE_S = 0.5
+"""From then on until the rig runs: 15 pictures at 30 Hz, which tell how the plate moves."""
+MOST_AT_ONCE = 30
+"""Pictures at a look: while a person is asked, none is taken, and all at once would hold the loop's
+supervisor up."""
+TAP = (
+    "Motors off: tap the plate with the blade's tip at several places for {:g} s, then bring it to "
+    "where it is cut."
+)
+
+
+@dataclass(frozen=True)
+class TrackedRun:
+    """What became of pictures and contacts in a run, with the pose's state at its end.
+
+    ``poses`` of ``pictures`` had one; ``sd_mm`` and ``sd_deg`` are those of the pose's worst axis,
+    NaN without a pose.
+    """
+
+    source: str
+    state: str
+    pictures: int
+    poses: int
+    sd_mm: float
+    sd_deg: float
+    figures: TrackFigures
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The pictures and contacts in one line."""
+        counts = self.figures.contacts
+        return (
+            f"tracked by {self.source}: {self.poses} poses in {self.pictures} pictures, "
+            f"{self.figures.pictures.refused} refused; {counts.used} contacts used, "
+            f"{counts.refused} refused; {self.figures.restarts} restarts; the plate is known to "
+            f"{self.sd_mm:.2g} mm and {self.sd_deg:.2g} deg"
+        )
+
+
+class PlateCamera:
+    """The camera that a run names, with the simulated world that it shows where that is "sim".
+
+    ``cut`` says that the run renders: nothing real is between the blades then, so contacts are
+    taken from taps before it alone, and the pose has play (`SteadyPose`). Opened before anything
+    moves. Raises InputError where camera and device do not show one plate; MissingError where the
+    camera's fit or its place in the rig's frame is missing.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        recipe: "Recipe",
+        camera: str,
+        device: str,
+        *,
+        seed: int = 0,
+        realtime: bool = False,
+        cut: bool = False,
+    ) -> None:
+        feeds.refuse_strange_pairs(camera, device)
+        if camera == SIM and realtime:
+            raise InputError(
+                "--camera sim runs in virtual time, with the virtual rig: leave --realtime out."
+            )
+        self._engine, self._recipe, self._camera, self._cut = engine, recipe, camera, cut
+        self._eye = inputs.plate_eye(engine, recipe, needs_rig=True, otherwise="state the pose")
+        self._about = inputs.track_about(engine, recipe, camera, self._eye)
+        world = camera == SIM
+        self._world = SimWorld(recipe, seed, rig=True, cut=cut) if world else None
+        self._session: TrackSession | None = None
+
+    @contextmanager
+    def open_rig(self, device: str, seed: int, line: "Line") -> "Iterator[Link]":
+        """The rig on ``device``, or that of the simulated world; as `scissorcal.workday.rigs`."""
+        if self._world is None:
+            with open_rig(device, self._recipe.specimen, seed, line=line) as link:
+                yield link
+            return
+        with self._world.link as link:
+            set_line(link, line)
+            yield link
+
+    @contextmanager
+    def follow(
+        self,
+        link: "Link",
+        writer: "RecordingWriter | None",
+        *,
+        taps_s: float = 0.0,
+        held_N: float = 0.0,
+        say: "Say | None" = None,
+    ) -> Iterator[TrackedPose]:
+        """Start the camera, look until there is a pose, and yield the source of poses.
+
+        The motors are off meanwhile. For ``taps_s`` a person taps the plate with the blade's tip
+        (the virtual hand does, and brings the plate to where it is cut). Where the rig itself holds
+        ``held_N`` at the tip, less than half of it is no contact: blades that set off and stop
+        feign a few tenths of a newton. Rows go to ``writer``.
+        Without a pose after `PATIENCE_S` the source says None. Raises as `TrackedPose`.
+        """
+        feeds.refuse_without_sledge(link)
+        virtual = self._world is not None
+        base_ns, begun_s = (0, 0.0) if virtual else (time.time_ns(), time.monotonic())
+        channels = TrackChannels(writer, base_ns) if writer is not None else None
+        session = self._session = self._new_session(link, channels, base_ns, 0.5 * held_N)
+        with ExitStack() as stack:
+            due = self._pictures(stack, begun_s)
+            source = TrackedPose(session, due, begun_s, steady=self._cut)
+            with feeds.idle_rig(link, self._recipe) as motion:
+                if taps_s and say is not None:
+                    say(TAP.format(taps_s))
+                self._look(motion, source, session, taps_s)
+            session.follower.restart_rig()
+            session.follower.touching = not self._cut
+            yield source
+            session.finish()
+
+    def tracked(self) -> TrackedRun:
+        """What became of it; after `follow`."""
+        session = self._session
+        assert session is not None
+        figures = track_figures(session.follower, session.delay)
+        sd_mm = sd_deg = math.nan
+        if session.started:
+            variances = session.follower.tracker.estimate().covariance.diagonal()
+            sd_mm = 1e3 * math.sqrt(float(variances[3:].max()))
+            sd_deg = math.degrees(math.sqrt(float(variances[:3].max())))
+        return TrackedRun(
+            source=f"camera {self._about.source}",
+            state=session.follower.state,
+            pictures=session.states.total(),
+            poses=session.states["seen"] + session.states["ambiguous"],
+            sd_mm=sd_mm,
+            sd_deg=sd_deg,
+            figures=figures,
+            verdicts=track_verdicts(figures),
+        )
+
+    def _new_session(
+        self, link: "Link", channels: TrackChannels | None, base_ns: int, least_N: float
+    ) -> TrackSession:
+        engine, recipe = self._engine, self._recipe
+        contacts, known = inputs.tip_contacts(engine, recipe)
+        return TrackSession(
+            recipe,
+            inputs.surface_of(engine, recipe),
+            self._about,
+            drive=inputs.rig_drive(engine, link.identity.handle_radius, link),
+            contacts=contacts,
+            friction_known=known,
+            least_N=least_N,
+            calibrated=self._eye.camera.covariance is not None,
+            recorder=channels,
+            base_ns=base_ns,
+        )
+
+    def _pictures(self, stack: ExitStack, begun_s: float) -> Due:
+        eye, world = self._eye, self._world
+        if world is not None:
+            return lambda now_s: map(eye.picture, eye.locate(world.frames(now_s)))
+        thread = CameraThread(frames_of(self._camera), eye.locate)
+        stack.enter_context(closing(thread))
+
+        def due(now_s: float) -> Iterable[PlatePicture]:
+            for found in thread.due()[-MOST_AT_ONCE:]:
+                picture = eye.picture(found)
+                yield replace(picture, arrived_s=picture.arrived_s - begun_s)
+
+        return due
+
+    def _look(
+        self, motion: "Motion", source: TrackedPose, session: TrackSession, taps_s: float
+    ) -> None:
+        """Feed the source with the motors off: through the taps, and until there is a pose."""
+        world = self._world
+        if world is not None:
+            world.begin(motion, taps=taps_s > 0.0)
+            if not self._cut:
+                world.keep_plate()
+        session.follower.touching = taps_s > 0.0
+        begun = motion.now_s
+        _feed(motion, source, begun + taps_s)
+        session.follower.touching = False
+        if world is not None and self._cut:
+            world.take_out(motion)
+            _feed(motion, source, motion.now_s + (CARRY_S if taps_s else 0.0))
+        while not session.started and motion.now_s - begun < taps_s + PATIENCE_S:
+            source(motion.now_s, motion.step())
+        _feed(motion, source, motion.now_s + SETTLE_S)
+
+
+def _feed(motion: "Motion", source: TrackedPose, until_s: float) -> None:
+    while motion.now_s < until_s:
+        source(motion.now_s, motion.step())

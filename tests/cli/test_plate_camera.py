@@ -1,0 +1,133 @@
+"""--camera of 'control' and 'render': what is refused, what is recorded, what is said."""
+
+from pathlib import Path
+
+import pytest
+
+from scissorcal.recording import read_recording, read_telemetry
+from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE
+from scissorcal.workday.runs.capture import capture_advance_into, capture_into
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.workspace import Workspace
+from tests.cli.conftest import Cli
+from tests.package.fits import recipe as known_recipe
+from tests.render.conftest import on_estimated_plate, package_for
+
+SIM = ("--device", "sim", "--camera", "sim")
+
+
+@pytest.fixture
+def calibrated(cli: Cli, workspace: Path, album: Path) -> Path:
+    """A workspace with a camera and the rig's frame."""
+    cli("import", album / "camera.yml")
+    cards = sorted(album.glob("rig-*.jpg"))
+    said = cli("capture", "plate", "-i", *cards, "--stances", album / "stances.csv")
+    assert said.code == 0
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def packages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Packages whose plate's pose is known, or estimated between two moving blades."""
+    known, both = (tmp_path_factory.mktemp(name) for name in ("known", "both"))
+    package_for(known, known_recipe(), energy=0.52)
+    package_for(both, on_estimated_plate("both"), energy=0.52)
+    return {"known": known / "package.zip", "both": both / "package.zip"}
+
+
+def recordings(workspace: Path) -> list[Path]:
+    return sorted((workspace / "captures").glob("*.mcap"))
+
+
+def test_a_known_pose_takes_no_camera(
+    cli: Cli, calibrated: Path, packages: dict[str, Path]
+) -> None:
+    said = cli("render", *SIM, "--package", packages["known"])
+    assert said.code == 2
+    assert "has a known plate pose, so no camera is used" in said.err
+    assert recordings(calibrated) == []
+    assert not Workspace(calibrated).probe_path.exists(), "nothing of it runs"
+
+
+def test_a_pose_is_stated_once(cli: Cli, calibrated: Path) -> None:
+    path = calibrated / "path.csv"
+    path.write_text("x_mm\n10\n30\n")
+    said = cli("control", *SIM, "--path", path, "--pose", "20,10,3")
+    assert said.code == 2
+    assert "give one" in said.err
+
+
+def test_cameras_that_do_not_go_with_the_rig_are_refused(
+    cli: Cli, calibrated: Path, packages: dict[str, Path]
+) -> None:
+    render = ("render", "--package", packages["both"])
+    said = cli(*render, "--device", "sim", "--camera", "0")
+    assert said.code == 2
+    assert "do not show the same plate" in said.err
+    said = cli(*render, "--device", "/dev/ttyUSB9", "--camera", "plate.avi")
+    assert said.code == 2
+    assert "was recorded at another time" in said.err
+    said = cli(*render, *SIM, "--realtime")
+    assert said.code == 2
+    assert "leave --realtime out" in said.err
+    said = cli(*render, "--device", "sim", "--taps", "3")
+    assert said.code == 2
+    assert "name a camera too" in said.err
+
+
+def test_without_the_rigs_frame_it_says_what_to_photograph(
+    cli: Cli, workspace: Path, album: Path, packages: dict[str, Path]
+) -> None:
+    said = cli("render", *SIM, "--package", packages["both"])
+    assert said.code == 5
+    assert "camera" in said.err
+    cli("import", album / "camera.yml")
+    said = cli("render", *SIM, "--package", packages["both"])
+    assert said.code == 5
+    assert "photograph the rig card" in said.err
+    assert recordings(workspace) == []
+
+
+def test_a_rendering_is_tracked_and_keeps_the_rows_of_a_track(
+    cli: Cli, calibrated: Path, packages: dict[str, Path]
+) -> None:
+    words = ("render", *SIM, "--package", packages["both"], "--seconds", "1.5", "--json")
+    said = cli(*words)
+    assert said.code in (0, 3), said.err
+    result = said.envelope["result"]
+    assert result["plate"]["estimates"] == pytest.approx(150, abs=10)
+    assert result["plate"]["lost"] == 0
+    tracked = result["tracked"]
+    assert tracked["source"] == "camera sim"
+    assert tracked["figures"]["pictures"]["used"] > 12
+    assert tracked["figures"]["contacts"]["used"] == 0, "nothing real is between the blades"
+    assert {"clock jumps", "refused pictures"} <= {v["check"] for v in said.envelope["verdicts"]}
+    (path,) = recordings(calibrated)
+    assert read_recording(path).kind == "render"
+    poses = read_telemetry(path, POSE)
+    assert len(poses) == len(read_telemetry(path, FRAME)) > 12
+    assert len(read_telemetry(path, PICTURE)) == tracked["pictures"]
+    assert (poses["covariance"].reshape(-1, 6, 6)[:, 3, 3] > 0.0).all()
+
+
+@pytest.mark.slow
+def test_a_path_is_followed_on_a_tracked_plate(cli: Cli, calibrated: Path) -> None:
+    workspace = Workspace(calibrated)
+    capture_into(workspace, "friction", "sim", designed=False)
+    capture_advance_into(workspace, "sim")
+    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    path = calibrated / "path.csv"
+    path.write_text("x_mm\n10\n25\n")
+    said = cli("control", *SIM, "--path", path, "--force", "2", "--json")
+    assert said.code == 0, said.err
+    result = said.envelope["result"]
+    assert result["figures"]["force_rms_N"] < 0.12
+    assert (result["figures"]["losses"], result["figures"]["let_goes"]) == (0, 0)
+    tracked = result["tracked"]
+    assert tracked["state"] in ("fused", "pictures")
+    assert tracked["figures"]["contacts"]["used"] > 100
+    assert tracked["figures"]["contacts"]["refused"] == 0
+    assert tracked["figures"]["rig"]["jumps"] == 0
+    (made,) = (one for one in recordings(calibrated) if one.name.startswith("control"))
+    assert set(read_telemetry(made, POSE)["source"].tolist()) == {0, 1}
+    assert "where it was tracked" in read_recording(made).notes[-1]
