@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.control import follow
 from scissorcal.control.follow import Job, control
-from scissorcal.control.mechanics import AxisFacts, RigMechanics
+from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
 from scissorcal.control.result import ControlResult
 from scissorcal.control.settings import Material
@@ -20,6 +20,7 @@ from scissorcal.device.sim.truth import true_parameters
 from scissorcal.kernel import ControlFlag, HybridFlag
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import FrictionLaw
+from scissorcal.model.mechanism import AxisLaw
 from scissorcal.model.surface import Plane, Surface
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recording.probe import Estimate, ProbeResult
@@ -50,10 +51,9 @@ def mechanics(truth: Specimen) -> RigMechanics:
     sledge = FrictionLaw({"coulomb": advance.coulomb_N, "viscous": advance.viscous_N_s_per_m})
     return RigMechanics(
         tip=BladePoint(length, offset, blade.moving_blades),
-        opening=AxisFacts(
-            values["inertia"], 1e-6, FrictionLaw(law, centre), values["offset"], 4e-4, "truth"
-        ),
-        advance=AxisFacts(advance.mass_kg, 0.01, sledge, 0.0, 0.02, "truth"),
+        opening=AxisLaw(values["inertia"], FrictionLaw(law, centre), values["offset"]),
+        advance=AxisLaw(advance.mass_kg, sledge),
+        friction_sd=4e-4,
         delay_s=DELAY_S,
         torque_sd=1e-3,
     )

@@ -201,11 +201,15 @@ def test_what_is_felt_of_a_surface_begins_anew_with_each_touch_and_after_a_gap_i
         )
         return float(law.step(inputs)["gap_rate"][0])
 
-    assert gap_rate(1.0, 0.01) == pytest.approx(-0.01)
-    corner = 2.0 * math.pi * 100.0
-    felt = 0.01 + corner / (1.0 + corner * 1e-3) * (1e-3 * -0.01 + 1e-4 * 0.5)
+    def follows(before: float, rise: float) -> float:
+        corner = 2.0 * math.pi * 100.0
+        return before + corner / (1.0 + corner * 1e-3) * (-1e-3 * before + 1e-4 * rise)
+
+    felt = follows(0.01, 0.0)
+    assert gap_rate(1.0, 0.01) == pytest.approx(-felt, rel=1e-5)
+    felt = follows(felt, 0.5)
     assert gap_rate(1.5, 0.03) == pytest.approx(-felt, rel=1e-5)
     assert gap_rate(0.05, 0.04) == pytest.approx(-0.04)  # a bounce
-    assert gap_rate(1.0, 0.02) == pytest.approx(-0.02)
+    assert gap_rate(1.0, 0.02) == pytest.approx(-follows(0.02, 0.0), rel=1e-5)
     assert gap_rate(3.0, 0.05, dt=0.5) == pytest.approx(-0.05)
-    assert gap_rate(3.0, 0.02) == pytest.approx(-0.02)
+    assert gap_rate(3.0, 0.02) == pytest.approx(-follows(0.02, 0.0), rel=1e-5)

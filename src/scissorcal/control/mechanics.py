@@ -11,6 +11,7 @@ from scissorcal.control.contours import Foot
 from scissorcal.kernel import AxisFriction, Identity
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import FrictionLaw, angle_slope, friction_level
+from scissorcal.model.mechanism import AxisLaw
 
 Array = NDArray[np.float64]
 
@@ -20,33 +21,20 @@ FASTEST_m_per_s = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class AxisFacts:
-    """One axis: its inertia (kg m^2 or kg) with its standard deviation, and its friction.
-
-    ``offset`` is the constant effort that the drive bears besides; ``friction_sd`` the standard
-    deviation of friction while it slides, in N m or N. ``source`` says where all of it is from.
-    """
-
-    inertia: float
-    inertia_sd: float
-    friction: FrictionLaw
-    offset: float
-    friction_sd: float
-    source: str
-
-
-@dataclass(frozen=True, eq=False)
 class RigMechanics:
     """A rig that presses with its upper blade's tip.
 
-    ``delay_s`` passes from a measurement to the effort that answers it, motor included;
-    ``torque_sd`` is the noise (N m) of a measured torque, ``torque_zero_Nm`` and ``handle_zero_N``
-    are what the sensors show with motors off and nobody at the handles.
+    ``opening`` and ``advance`` are the axes as identified; ``friction_sd`` (N m) is the standard
+    deviation of the opening's friction while it slides. ``delay_s`` passes from a measurement to
+    the effort that answers it, motor included; ``torque_sd`` (N m) is a measured torque's noise,
+    ``torque_zero_Nm`` and ``handle_zero_N`` are what the sensors show with motors off and nobody at
+    the handles.
     """
 
     tip: BladePoint
-    opening: AxisFacts
-    advance: AxisFacts
+    opening: AxisLaw
+    advance: AxisLaw
+    friction_sd: float
     delay_s: float
     torque_sd: float
     torque_zero_Nm: float = 0.0

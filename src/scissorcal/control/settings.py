@@ -54,12 +54,11 @@ class Material:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run of CONTROL is configured with, and the openings (rad) that its path needs."""
+    """What a run of CONTROL is configured with, and the least and largest mass (kg) on its path."""
 
     config: ControlConfig
     gains: HybridGains
     masses_kg: tuple[float, float]
-    opening_rad: tuple[float, float]
 
 
 def control_settings(
@@ -119,7 +118,7 @@ def control_settings(
     ]
     gains = _slower_integral(choose_gains(loops, material.peak_N), loops)
     config = _config(rig, identity, material, gains, largest, (torque_limit, force_limit))
-    return Settings(config, gains, (min(masses), max(masses)), (min(openings), max(openings)))
+    return Settings(config, gains, (min(masses), max(masses)))
 
 
 def _slower_integral(gains: HybridGains, loops: list[ContactLoop]) -> HybridGains:
@@ -142,7 +141,7 @@ def _config(
     advance = axis_friction(rig.advance.friction, FASTEST_m_per_s)
     lever = rig.tip.station_m / rig.tip.moving_blades
     held = opening.largest / lever
-    noise = math.hypot(rig.opening.friction_sd, 0.3 * rig.torque_sd)
+    noise = math.hypot(rig.friction_sd, 0.3 * rig.torque_sd)
     law = HybridConfig(
         axes=2,
         contact_kd=gains.contact_kd,
@@ -249,13 +248,13 @@ def _largest_force(
     slides = np.abs(rig.slide_at(foot, opening))
     press = np.abs(rig.press_at(foot, opening)) + friction * slides
     found = []
-    for facts, by, limit, fastest in zip(
+    for axis, by, limit, fastest in zip(
         (rig.opening, rig.advance),
         press,
         efforts,
         (FASTEST_rad_per_s, FASTEST_m_per_s),
         strict=True,
     ):
-        dry = axis_friction(facts.friction, fastest).largest + abs(facts.offset)
+        dry = axis_friction(axis.friction, fastest).largest + abs(axis.offset)
         found.append((SHARE_OF_LIMIT * limit - dry) / by if by > 0.0 else math.inf)
     return min(found)

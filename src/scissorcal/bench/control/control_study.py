@@ -309,7 +309,7 @@ def config_of(gains: HybridGains, law: str) -> HybridConfig:
         surface_cutoff_Hz=SURFACE_CUTOFF_HZ,
         approach_rate=APPROACH_PER_S,
         force_most=FORCE_MOST_N,
-        friction_rate=friction_rates(gains, true_arm.MASS_KG, true_arm.COULOMB_N),
+        friction_rate=friction_rates(gains, true_arm.MASS_KG.tolist(), true_arm.COULOMB_N.tolist()),
         effort_limit=(EFFORT_N, EFFORT_N, EFFORT_N),
         **chosen,
     )

@@ -18,11 +18,13 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.control.follow import Progress
-    from scissorcal.control.mechanics import AxisFacts, RigMechanics
+    from scissorcal.control.mechanics import RigMechanics
     from scissorcal.control.result import ControlResult
     from scissorcal.device.link import Link
     from scissorcal.device.loading import Confirm
     from scissorcal.model.edge import Edge
+    from scissorcal.model.friction import FrictionLaw
+    from scissorcal.model.mechanism import AxisLaw
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
     from scissorcal.recording.probe import ProbeResult
@@ -79,7 +81,7 @@ def control_workspace(
     "sim") and contacts have it while the path is followed, or where the fit of its photographs
     found it. Mass, inertia and
     friction are those of the fits of both axes; the surface and what it is made of are the recipe's
-    (plate.surface, plate.touch). Samples, and telemetry go to captures/control-<stamp>.mcap unless
+    (plate.surface, plate.touch). Samples and telemetry go to captures/control-<stamp>.mcap unless
     ``record`` is False; with them the rows of a track. Otherwise as `render_workspace`.
 
     Raises MissingError where a fit or the pose is missing, InputError where the pose is stated
@@ -94,6 +96,10 @@ def control_workspace(
     recipe = workspace.recipe()
     engine = Engine.of(workspace)
     points = read_path(path_file).stated(force_N, 1e-3 * speed_mm_per_s)
+    if source is not None and (pose is not None or camera != NONE):
+        raise InputError(
+            "The plate's pose comes from a source, a stated pose or a camera: give one."
+        )
     eye = _camera(engine, camera, device, pose, seed=seed, realtime=realtime)
     known = None if eye else source or _pose_source(engine, pose)
     touch = recipe.plate.touch
@@ -136,7 +142,7 @@ def control_workspace(
             )
             seeing.close()
             if recording is not None:
-                recording.note(_note(done, pose, camera))
+                recording.note(_note(done, _told(pose, camera, source)))
     return Controlled(done, path, rig, eye.tracked() if eye else None)
 
 
@@ -223,15 +229,17 @@ def _mechanics(
     link: "Link",
     probe: "ProbeResult",
 ) -> "RigMechanics":
-    from scissorcal.control.mechanics import FASTEST_m_per_s, FASTEST_rad_per_s, RigMechanics
+    from scissorcal.control.mechanics import RigMechanics
     from scissorcal.model.blade_point import BladePoint
 
     tick_s = link.identity.tick_us * 1e-6
     zero = probe.torque_zero_Nm
+    opening = axis_of_fit(fits[0], "kg m^2")
     return RigMechanics(
         tip=BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades),
-        opening=axis_of_fit(fits[0], SLOW * FASTEST_rad_per_s, "kg m^2"),
-        advance=axis_of_fit(fits[1], SLOW * FASTEST_m_per_s, "kg"),
+        opening=opening,
+        advance=axis_of_fit(fits[1], "kg"),
+        friction_sd=_sliding_sd(fits[0], opening.friction),
         delay_s=LATE_TICKS * tick_s if probe.delay_s is None else max(probe.delay_s.mean, 0.0),
         torque_sd=probe.rest.torque_noise_Nm or UNMEASURED_NOISE_Nm,
         torque_zero_Nm=0.0 if zero is None else zero.mean,
@@ -239,35 +247,38 @@ def _mechanics(
     )
 
 
-def axis_of_fit(fit: "FitResult", slow: float, unit: str) -> "AxisFacts":
-    """One axis from its fit of friction, at the medians of the posterior."""
-    import numpy as np
-
-    from scissorcal.control.mechanics import AxisFacts
-    from scissorcal.model.friction import FrictionLaw, friction_torque
+def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
+    """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
+    from scissorcal.model.mechanism import AxisLaw
 
     values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
-    sds = {p.name: p.sd for p in fit.parameters}
     if not values.get("inertia", 0.0) > 0.0:
         raise MissingError(
             f"The fit of {fit.what} has no inertia in {unit}: capture friction with an excitation "
             f"('scissorcal capture {fit.words}'), then 'scissorcal fit {fit.words}'."
         )
+    return AxisLaw.of_fit(values, _centre(fit), 0.0)
+
+
+def _centre(fit: "FitResult") -> float:
+    import numpy as np
+
     centre = float(fit.structure.get("angle_center", float("nan")))
-    centre = centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))
-    law = FrictionLaw.of_fit(values, centre)
-    names = [p.name for p in fit.parameters]
-    drawn = {name: fit.draws[:, [i]] for i, name in enumerate(names)}
-    sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, np.array([-slow, slow]))
-    level = float(np.abs(friction_torque(law, centre, np.array([-slow, slow]))).max())
-    return AxisFacts(
-        inertia=values["inertia"],
-        inertia_sd=sds.get("inertia", 0.0),
-        friction=law,
-        offset=values.get("offset", 0.0),
-        friction_sd=math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level),
-        source=f"the fit of {fit.what}",
-    )
+    return centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))
+
+
+def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
+    """Standard deviation of the opening's friction while it slides slowly, N m."""
+    import numpy as np
+
+    from scissorcal.control.mechanics import FASTEST_rad_per_s
+    from scissorcal.model.friction import FrictionLaw, friction_torque
+
+    rates, centre = SLOW * FASTEST_rad_per_s * np.array([-1.0, 1.0]), _centre(fit)
+    drawn = {p.name: fit.draws[:, [i]] for i, p in enumerate(fit.parameters)}
+    sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, rates)
+    level = float(np.abs(friction_torque(law, centre, rates)).max())
+    return math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level)
 
 
 def _open_writer(
@@ -289,12 +300,17 @@ def _open_writer(
     return writer
 
 
-def _note(done: "ControlResult", pose: str | None, camera: str) -> str:
+def _told(pose: str | None, camera: str, source: "PoseSource | None") -> str:
+    """Where the plate's pose was from, as an end of a sentence."""
+    if pose is not None:
+        return "as it was stated"
+    return "where it was tracked" if source or camera != NONE else "as it was fitted"
+
+
+def _note(done: "ControlResult", told: str) -> str:
     figures = done.figures
-    where = "as it was stated" if pose else "as it was fitted"
-    where = where if camera == NONE else "where it was tracked"
     return (
         f"Followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N, the plate standing "
-        f"{where}: force off by {figures.force_rms_N:.3f} N (rms), path by "
+        f"{told}: force off by {figures.force_rms_N:.3f} N (rms), path by "
         f"{figures.path_rms_mm:.3f} mm (rms)."
     )

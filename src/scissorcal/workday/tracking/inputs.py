@@ -1,5 +1,6 @@
 """What a track builds on: the camera's fit, the rig's frame, the tip, and where the plate was."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +74,6 @@ def track_about(
 def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]":
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
     from scissorcal.model.blade_point import BladePoint
-    from scissorcal.model.mechanism import AxisLaw
     from scissorcal.tracking.contacts import TipContacts
     from scissorcal.workday.runs.control import axis_of_fit, blade_edge
 
@@ -81,9 +81,8 @@ def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]"
     tip = BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades)
     if "friction" not in available(engine, ("friction",)):
         return TipContacts(tip), False
-    axis = axis_of_fit(load_result(engine, "friction"), 0.5, "kg m^2")
-    law = AxisLaw(axis.inertia, axis.friction, axis.offset, REST_RATE_RAD_PER_S)
-    return TipContacts(tip, law), True
+    law = axis_of_fit(load_result(engine, "friction"), "kg m^2")
+    return TipContacts(tip, replace(law, rest_rate=REST_RATE_RAD_PER_S)), True
 
 
 def rig_drive(engine: Engine, radius_m: float, link: "Link | None" = None) -> RigDrive:
