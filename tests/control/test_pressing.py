@@ -81,7 +81,7 @@ def test_the_force_holds_along_a_curved_path(title: str) -> None:
 
 
 def test_a_surface_that_moves_untold_is_felt() -> None:
-    """2 mm at 1 Hz, which the law is told to rest: measured 0.061 N rms; felt, 0.040 N: friction is not."""
+    """2 mm at 1 Hz, which the law is told to rest: 0.061 N rms, and 0.040 N where it is felt."""
     swaying, untold = replace(SOFT, swing_m=2e-3), Known(rising=0.0)
     rms = []
     for cutoff in (0.0, 100.0):
