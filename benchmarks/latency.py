@@ -1,6 +1,6 @@
 """Felt lag of rendering and capture against a bare C loop, on a device that paces itself.
 
-    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy]
+    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy track]
         [--seconds 10] [--rounds 3] [--no-rights]
 
 A device in C on a pseudo-terminal (benchmarks/latency_c/device.c) counts the lag in ticks by
@@ -8,7 +8,8 @@ A device in C on a pseudo-terminal (benchmarks/latency_c/device.c) counts the la
 on. Against it run, one after the other in each round: the shortest loop in C that answers
 (benchmarks/latency_c/echo.c), a rendering and a capture that are recorded, each idle and with a
 busy Python thread beside it: a thread of the same process for rendering and capture, a process
-for the bare loop. Ratios are medians over the rounds of the figure over the bare loop's of the same
+for the bare loop. With ``track`` the thread follows a plate instead, by 100 contacts and 33 late
+pictures a second, and the bare loop is idle. Ratios are medians over the rounds of the figure over the bare loop's of the same
 round. ``--no-rights`` takes real-time priority and locked memory from the loops (not from the
 device, which in a lab has a processor of its own).
 """
@@ -20,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -47,8 +49,8 @@ def main() -> None:
     parser.add_argument("--run", nargs=4, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.run:
-        subject, port, seconds, busy = options.run
-        run_host(subject, port, float(seconds), busy == "busy")
+        subject, port, seconds, load = options.run
+        run_host(subject, port, float(seconds), load)
         return
     found = []
     with tempfile.TemporaryDirectory() as folder:
@@ -114,13 +116,13 @@ def measure(
     return {"subject": subject, **figures, "host": own_view}
 
 
-def run_host(subject: str, port: str, seconds: float, busy: bool) -> None:
+def run_host(subject: str, port: str, seconds: float, load: str) -> None:
     """Render or capture, recorded into the current folder; print the host's own figures."""
     from scissorcal.device.link import open_link
     from scissorcal.kernel import ConfigKey
 
-    if busy:
-        threading.Thread(target=spin, daemon=True).start()
+    if load != "idle":
+        threading.Thread(target={"busy": spin, "track": track}[load], daemon=True).start()
     with open_link(port) as link, tempfile.TemporaryDirectory() as folder:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
         path = Path(folder) / "recording.mcap"
@@ -135,6 +137,20 @@ def spin() -> None:
     """Keep a processor and the interpreter busy."""
     while True:
         pass
+
+
+def track() -> None:
+    """Feed a pose filter as a track does, in real time."""
+    from benchmarks.tracking_rows import LATE_ROWS, Fed
+    from scissorcal.model.surface import Plane
+
+    fed = Fed(Plane(), LATE_ROWS)
+    due = time.monotonic()
+    while True:
+        fed.between()
+        fed.picture()
+        due += 0.03
+        time.sleep(max(due - time.monotonic(), 0.0))
 
 
 def render_on(link: Any, path: Path, seconds: float) -> Any:

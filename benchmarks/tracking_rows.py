@@ -33,9 +33,9 @@ def main() -> None:
     print("| row | us | times the solution of 24 equations |")
     print("|---|---|---|")
     for name, surface in (("plane", Plane()), ("cylinder", Cylinder(0.03)), ("probed", _probed())):
-        print(_line(f"contact, {name}", _Fed(surface).contact, yardstick))
+        print(_line(f"contact, {name}", Fed(surface).contact, yardstick))
     for late in (0, LATE_ROWS):
-        fed = _Fed(Plane(), late)
+        fed = Fed(Plane(), late)
         print(_line(f"picture, {late} contacts late", fed.picture, yardstick, fed.between))
 
 
@@ -47,7 +47,7 @@ def _probed() -> HeightField:
     return surface
 
 
-class _Fed:
+class Fed:
     """A tracker with half a second of rows, and the next ones."""
 
     def __init__(self, surface: Surface, late: int = 0) -> None:
