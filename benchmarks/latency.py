@@ -9,9 +9,9 @@ on. Against it run, one after the other in each round: the shortest loop in C th
 (benchmarks/latency_c/echo.c), a rendering and a capture that are recorded, each idle and with a
 busy Python thread beside it: a thread of the same process for rendering and capture, a process
 for the bare loop. With ``track`` the thread follows a plate instead, by 100 contacts and 33 late
-pictures a second, and the bare loop is idle. Ratios are medians over the rounds of the figure over the bare loop's of the same
-round. ``--no-rights`` takes real-time priority and locked memory from the loops (not from the
-device, which in a lab has a processor of its own).
+pictures a second, and the bare loop is idle. Ratios are medians over the rounds of the figure over
+the bare loop's of the same round. ``--no-rights`` takes real-time priority and locked memory from
+the loops (not from the device, which in a lab has a processor of its own).
 """
 
 import argparse
@@ -142,6 +142,7 @@ def spin() -> None:
 def track() -> None:
     """Feed a pose filter as a track does, in real time."""
     from benchmarks.tracking_rows import LATE_ROWS, Fed
+
     from scissorcal.model.surface import Plane
 
     fed = Fed(Plane(), LATE_ROWS)
