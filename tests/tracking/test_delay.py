@@ -65,7 +65,10 @@ def test_a_long_track_is_measured_by_its_end() -> None:
     kept, touched = _last(pictures, contacts)
     assert len(touched) == 2000
     assert kept[0].time_s == pytest.approx(touched[0].time_s - 1.0)
-    assert _last(pictures, contacts[:100]) == (pictures, contacts[:100])
+    kept, touched = _last(pictures, contacts[1000:1100])
+    assert touched == contacts[1000:1100]
+    assert kept[0].time_s == pytest.approx(9.0)
+    assert kept[-1].time_s <= touched[-1].time_s + 0.1, "none from long after the last contact"
 
 
 def test_pictures_without_contacts_show_none() -> None:

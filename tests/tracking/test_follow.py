@@ -155,6 +155,40 @@ def test_a_camera_alone_keeps_its_own_time() -> None:
     assert follower.samples(*[np.zeros(1)] * 5) == []
 
 
+def test_pictures_without_a_pose_let_it_age() -> None:
+    """The target is hidden: the pose coasts, and is known less and less."""
+    follower = PlateFollower(Plane(), settings_for(MOVING))
+    for number in range(30):
+        at = number / 30.0
+        follower.picture(SeenPose(at, at, np.eye(3), np.zeros(3), 1e-7 * np.eye(6)))
+    known = follower.now()
+    assert known is not None
+    assert follower.state == "pictures"
+    for number in range(30, 180):
+        follower.blank(number / 30.0)
+    found = follower.now()
+    assert found is not None
+    assert follower.state == "coasting"
+    assert found.picture_age_s == pytest.approx(5.0)
+    assert found.covariance[3, 3] > 100.0 * known.covariance[3, 3]
+
+
+@pytest.mark.parametrize("jump_s", [-60.0, 60.0])
+def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
+    follower = PlateFollower(Plane(), settings_for(MOVING))
+    outcomes = []
+    for number in range(120):
+        at = number / 30.0
+        stamp = 100.0 + at + (jump_s if number >= 60 else 0.0)
+        pose = SeenPose(stamp, at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+        row = follower.picture(pose)
+        assert row is not None
+        outcomes.append(row.outcome)
+    assert Outcome.TOO_LATE not in outcomes[65:]
+    assert outcomes[65:].count(Outcome.USED) > 50
+    assert len(follower.camera.jumps) == 1
+
+
 def test_a_camera_whose_clock_stands_ends_it() -> None:
     follower = PlateFollower(Plane(), settings_for(MOVING))
     seen = SeenPose(1.0, 0.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))

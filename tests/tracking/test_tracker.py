@@ -12,6 +12,7 @@ from scissorcal.bench.control.world import Scenario, World, circle, make_world, 
 from scissorcal.errors import InputError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.settings import ForceErrors, TrackingSettings
 from scissorcal.tracking.tracker import Outcome, PoseTracker
 
 MOVING = Scenario("moving", moving=True, seconds=2.0)
@@ -112,6 +113,22 @@ def test_a_picture_older_than_the_horizon_is_counted_and_left_out() -> None:
     outcome, _ = tracker.picture(pose_at(1.0, np.eye(3), np.zeros(3)))
     assert outcome is Outcome.TOO_LATE
     assert tracker.estimate().counts.late_pictures == 1
+
+
+def test_forces_from_before_a_restart_are_forgotten() -> None:
+    """States stay in the order of their times."""
+    settings = TrackingSettings(force=ForceErrors(zero_sd_N=0.05, every_s=0.1))
+    tracker = PoseTracker(Plane(), settings)
+    tracker.picture(pose_at(0.0, np.eye(3), np.zeros(3)))
+    push, still = np.array([0.0, 0.0, 2.0]), np.zeros(3)
+    for number in range(1, 8):
+        tracker.contact(0.01 * number, np.zeros(3), 2.0, push, still)
+    tracker._restart = True
+    tracker.picture(pose_at(0.14, np.eye(3), np.zeros(3)))
+    for number in range(15, 40):
+        tracker.contact(0.01 * number, np.zeros(3), 2.0, push, still)
+    assert tracker._times == sorted(tracker._times)
+    assert [state.time_s for state in tracker._states] == pytest.approx(tracker._times)
 
 
 def test_a_light_touch_is_no_contact() -> None:

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,12 @@ from scissorcal.errors import DeviceError, InputError
 from scissorcal.vision.live import Frame, timed
 from scissorcal.vision.track import Tracked
 from scissorcal.workday.tracking.camera_thread import CameraThread
-from scissorcal.workday.tracking.feeds import refuse_strange_pairs, refuse_without_sledge
+from scissorcal.workday.tracking.feeds import (
+    live_feed,
+    refuse_strange_pairs,
+    refuse_without_sledge,
+)
+from scissorcal.workday.tracking.pictures import PlatePicture
 
 
 def a_frame(number: int, rate_Hz: float = 30.0, stamp_s: float = float("nan")) -> Frame:
@@ -68,6 +74,33 @@ def test_what_ends_a_camera_is_raised_after_its_last_picture() -> None:
     with pytest.raises(DeviceError, match="is gone"):
         thread.due()
     thread.close()
+
+
+def test_a_feed_ends_with_what_ended_its_camera() -> None:
+    """Also where the camera fails while its last picture is being located."""
+    failing = threading.Event()
+
+    def camera() -> Iterator[Frame]:
+        yield a_frame(0)
+        failing.wait()
+        raise DeviceError("The camera is gone.")
+
+    def slow(frames: Iterable[Frame]) -> Iterator[Tracked]:
+        for found in seen(frames):
+            failing.set()
+            time.sleep(0.05)
+            yield found
+
+    class Eye:
+        locate = staticmethod(slow)
+
+        @staticmethod
+        def picture(found: Tracked) -> PlatePicture:
+            return PlatePicture(found.frame.number, 0.0, time.monotonic(), "no target", 0)
+
+    with ExitStack() as stack, pytest.raises(DeviceError, match="is gone"):
+        for _ in live_feed(stack, Eye(), camera(), None).events:  # type: ignore[arg-type]
+            pass
 
 
 def test_a_camera_that_hangs_does_not_hold_up_the_end() -> None:

@@ -88,10 +88,12 @@ class PlateTracking(Section):
         description="noise of the force at the tip: 4 mN m of torque at 75 mm",
     )
     friction_sd: _SizeOrNone = Field(
-        default=0.1, description="how well plate.touch.friction is known: a half"
+        default=0.1,
+        description="how well plate.touch.friction is known: a half; for the direction of forces",
     )
     force_zero_sd_N: _SizeOrNone | None = Field(
         default=None,
-        description="how well the zero of a sensor of the whole force on the tool is known; "
+        description="for an arm that measures the whole force on its tool (from Python; the rig "
+        "measures none): how well that sensor's zero is known; "
         "without it the direction of forces is not used (0.05 N takes away what it tells)",
     )

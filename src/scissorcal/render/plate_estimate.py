@@ -12,16 +12,17 @@ from scissorcal.tracking.plate_pose import PoseSource, fixed_pose
 class PlateReport:
     """How an estimated plate was rendered.
 
-    ``estimates`` came, of which ``lost`` (the source had lost the plate), ``uncertain`` (too
-    uncertain for the scene's tolerance), ``leapt`` and ``unreachable`` (stands where it cannot be
-    rendered) were not used. ``falls`` counts how often the force fell, ``out_s`` is for how long of
-    the ``seconds`` of rendering it was below its own for it. ``widest`` is the largest half width
-    of the torque's interval by the pose among estimates that were used, as a share. ``sentences``
-    tell of each kind once.
+    ``estimates`` came, of which ``lost`` (the source had lost the plate), ``late``, ``uncertain``
+    (too uncertain for the scene's tolerance), ``leapt`` and ``unreachable`` (stands where it cannot
+    be rendered) were not used. ``falls`` counts how often the force fell, ``out_s`` is for how long
+    of the ``seconds`` of rendering it was below its own for it. ``widest`` is the largest half
+    width of the torque's interval by the pose among estimates that were used, as a share.
+    ``sentences`` tell of each kind once.
     """
 
     estimates: int
     lost: int
+    late: int
     uncertain: int
     leapt: int
     unreachable: int
@@ -34,7 +35,7 @@ class PlateReport:
     @property
     def summary(self) -> str:
         """How the plate was followed, in a line."""
-        refused = self.lost + self.uncertain + self.leapt + self.unreachable
+        refused = self.lost + self.late + self.uncertain + self.leapt + self.unreachable
         return (
             f"plate: {self.estimates} estimates of its pose, {refused} not used; it leaves the "
             f"torque uncertain by up to {self.widest:.1%}; without its force for {self.out_s:.1f} s"

@@ -123,6 +123,7 @@ class PlatePlacer:
         return PlateReport(
             estimates=self._estimates,
             lost=self._refused["lost"],
+            late=self._refused["late"],
             uncertain=self._refused["uncertain"],
             leapt=self._refused["leapt"],
             unreachable=self._refused["unreachable"],

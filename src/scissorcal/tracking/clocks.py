@@ -290,7 +290,10 @@ class ClockWatch:
         if abs(jump.by_s) < _LATE_S:
             when = "since" if jump.by_s < 0.0 else "until then"
             or_late = f" (or what it sent came so much later {when})"
-        return f"It jumped {way} by {1e3 * abs(jump.by_s):.3g} ms{or_late}. {self._remedy}"
+        by = (
+            f"{abs(jump.by_s):.3g} s" if abs(jump.by_s) >= 1.0 else f"{1e3 * abs(jump.by_s):.3g} ms"
+        )
+        return f"It jumped {way} by {by}{or_late}. {self._remedy}"
 
 
 def _under(x: Array, y: Array) -> tuple[float, float]:

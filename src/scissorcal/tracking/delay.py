@@ -57,7 +57,7 @@ def measure_delay(
 
     ``pictures`` and ``contacts`` are those that a `PlateFollower` was given, at the times that it
     took them for. Costs some seventeen replays of the last `MOST_CONTACTS` contacts, and of the
-    pictures since the first of them.
+    pictures from the first to the last of them.
     """
     pictures, contacts = _last(pictures, contacts)
     if len(pictures) < FEWEST or len(contacts) < FEWEST:
@@ -130,12 +130,12 @@ def replay_cost(
 def _last(
     pictures: Sequence[CameraPose], contacts: Sequence[TipContact]
 ) -> tuple[Sequence[CameraPose], Sequence[TipContact]]:
-    """The newest rows, from a second before the first of the newest contacts on."""
-    if len(contacts) <= MOST_CONTACTS:
+    """The newest contacts, and pictures from a second before the first of them to the last."""
+    if not contacts:
         return pictures, contacts
     contacts = contacts[-MOST_CONTACTS:]
-    since = contacts[0].time_s - _SETTLED_S
-    return [seen for seen in pictures if seen.time_s >= since], contacts
+    since, until = contacts[0].time_s - _SETTLED_S, contacts[-1].time_s + REACH_S
+    return [seen for seen in pictures if since <= seen.time_s <= until], contacts
 
 
 def _unknown(later_s: float, sd_s: float, why: str) -> DelayFit:

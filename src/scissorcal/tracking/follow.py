@@ -19,9 +19,7 @@ Array = NDArray[np.float64]
 
 RECENT_S = 0.5
 """A pose rests on what came within so long."""
-CAMERA_REMEDY = (
-    "Use another camera or driver, or let times of arrival count (a camera that states no time)."
-)
+CAMERA_REMEDY = "Use another camera or driver."
 RIG_REMEDY = "Restart the device, and check its clock with 'scissorcal device doctor'."
 
 _MOST_ROWS = 30_000
@@ -152,7 +150,11 @@ class PlateFollower:
 
     def picture(self, seen: SeenPose) -> FollowedRow | None:
         """Take a picture's pose; None while the rig has sent no time to put it at."""
+        begun = self.camera.begun_anew
+        before = self.camera.fit if self.tracker.started else None
         self.camera.add([seen.stamp_s], [seen.arrived_s])
+        if self.rig is None and before is not None and self.camera.begun_anew > begun:
+            self._shift(self.camera.fit.own(seen.arrived_s) - before.own(seen.arrived_s))
         time, sd = self.exposed(seen.stamp_s)
         if math.isnan(time):
             return None
@@ -165,6 +167,12 @@ class PlateFollower:
         outcome, nis = self.tracker.picture(pose)
         self._now_s = max(self._now_s, time)
         return self._row("picture", time, outcome, nis)
+
+    def blank(self, stamp_s: float) -> None:
+        """Take a picture without a pose: time passes, and the pose is known less and less."""
+        if self.tracker.started and self.camera.known:
+            time, _ = self.exposed(stamp_s)
+            self._now_s = max(self._now_s, time)
 
     def exposed(self, stamp_s: float) -> tuple[float, float]:
         """The filter's time of a picture's exposure, and its standard deviation (s).
@@ -187,6 +195,10 @@ class PlateFollower:
         """Covariance (6, 6) of what is new in the newest picture. IndexError without one."""
         return self.pictures[-1].covariance
 
+    def now(self) -> PoseEstimate | None:
+        """The pose at the newest time that came; None while there is none."""
+        return self.tracker.estimate(self._now_s) if self.tracker.started else None
+
     def estimate(self, host_s: float) -> PoseEstimate | None:
         """The pose at a time of the host's clock; None while there is none.
 
@@ -202,9 +214,8 @@ class PlateFollower:
     @property
     def state(self) -> str:
         """What the pose rests on: waiting, fused, pictures, contacts or coasting."""
-        if not self.tracker.started:
-            return "waiting"
-        return _state(self.tracker.estimate(self._now_s))
+        now = self.now()
+        return _state(now) if now else "waiting"
 
     def _line(self) -> ClockFit | None:
         """The rig's clock, as it was before a restart until it has sent a time again."""

@@ -88,7 +88,6 @@ class ContactErrors:
     least_force_N: float = 0.3
     gate: float = CONTACT_GATE
     refused_until_restart: int = 100
-    iterations: int = 1
 
 
 @dataclass(frozen=True)

@@ -234,6 +234,7 @@ class PoseTracker:
         self._times, self._rows, self._states = [seen.time_s], [seen], [state]
         self._refused_pictures = self._refused_contacts = 0
         self._restart = False
+        self._felt = []
         self._used_picture_s, self._used_contact_s = seen.time_s, -math.inf
         for row in later:
             if not isinstance(row, CameraPose):
@@ -292,8 +293,9 @@ class PoseTracker:
             return
         middle = [np.mean(part, axis=0) for part in zip(*self._felt, strict=True)]
         halfway = 0.5 * (self._felt_since_s + time_s)
-        self._insert(ForceDirection(halfway, middle[0], middle[1], middle[2], len(self._felt)))
-        self._felt = []
+        count, self._felt = len(self._felt), []
+        if halfway >= self._times[0]:
+            self._insert(ForceDirection(halfway, middle[0], middle[1], middle[2], count))
 
 
 def _check(what: str, time_s: float, *numbers: Array) -> None:

@@ -249,7 +249,8 @@ def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
     follower = session.follower
     delay = session.delay
     figures = track_figures(follower, delay)
-    found = follower.tracker.estimate()
+    found = follower.now()
+    assert found is not None
     pose = Pose.from_matrix(found.rotation, found.place_m)
     sds = np.sqrt(np.diag(found.covariance))
     pictures = sum(session.states.values())

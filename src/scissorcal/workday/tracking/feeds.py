@@ -144,8 +144,8 @@ def _live(
         for one in found:
             picture = eye.picture(one)
             yield replace(picture, arrived_s=picture.arrived_s - begun)
-        if camera.ended and motion is None:
-            return
+        if not found and camera.ended and motion is None:
+            return  # `due` has raised what ended the camera, if anything did
         if time.monotonic() - last > NO_PICTURE_S:
             raise DeviceError(
                 f"The camera has given no picture for {NO_PICTURE_S:g} s: check its cable, and "

@@ -154,6 +154,8 @@ class TrackSession:
                 )
             )
             self._gap(picture.arrived_s)
+        else:
+            self.follower.blank(stamp)
         if self._recorder is not None:
             self._recorder.picture(picture, math.nan if row is None else row.time_s)
         if row is not None:
@@ -238,7 +240,7 @@ class TrackSession:
         if self._tell is None:
             return
         follower = self.follower
-        estimate = follower.tracker.estimate() if self.started else None
+        estimate = follower.now()
         self._tell(
             TrackMark(
                 self.elapsed_s,
