@@ -13,6 +13,10 @@ _SizeOrNone = Annotated[float, Field(ge=0, le=1e4, allow_inf_nan=False)]
 _SdOrFit = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] | Literal["auto"]
 
 
+LONGEST_DELAY_MS = 1000.0
+"""Of a camera, either way: a pose that is predicted for longer says little."""
+
+
 class PlateTracking(Section):
     """What 'scissorcal track' assumes of plate, camera and contact: standard deviations and times.
 
@@ -45,7 +49,9 @@ class PlateTracking(Section):
         description="constant error of turn in all pictures; 0.1 where the camera's file has no "
         "covariance: what 'fit plate' finds between halves of real pictures",
     )
-    camera_delay_ms: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)] = Field(
+    camera_delay_ms: Annotated[
+        float, Field(ge=-LONGEST_DELAY_MS, le=LONGEST_DELAY_MS, allow_inf_nan=False)
+    ] = Field(
         default=0.0,
         description="from a picture's exposure to its time stamp, beyond the shortest delay of its "
         "arrival, which times of arrival cannot show; 'scissorcal track' measures it where it can",
