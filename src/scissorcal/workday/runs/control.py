@@ -81,8 +81,9 @@ def control_workspace(
     "sim") and contacts have it while the path is followed, or where the fit of its photographs
     found it. A person is asked for the plate before a source or camera looks for it, else once the
     blades are over its place. Mass, inertia and friction are those of the fits of both axes; the
-    surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and telemetry go to captures/control-<stamp>.mcap unless
-    ``record`` is False; with them the rows of a track. Otherwise as `render_workspace`.
+    surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and
+    telemetry go to captures/control-<stamp>.mcap unless ``record`` is False; with them the rows of
+    a track. Otherwise as `render_workspace`.
 
     Raises MissingError where a fit or the pose is missing, InputError where the pose is stated
     twice or the camera does not go with the device, and what `scissorcal.control.follow.control`

@@ -173,7 +173,7 @@ def read_track(path: Path) -> RecordedTrack:
     recording = read_recording(path)
     if recording.kind != "track":
         raise InputError(
-            f"{path} is not the recording of a track but of '{recording.kind}', so it does not have "
+            f"{path} is not the recording of a track but of '{recording.kind}', so it has not "
             "all that a pose followed from: name one that 'scissorcal track' wrote "
             "(captures/track-*.mcap)."
         )
