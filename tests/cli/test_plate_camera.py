@@ -132,11 +132,12 @@ def test_without_the_rigs_frame_it_says_what_to_photograph(
 ) -> None:
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "camera" in said.err
+    assert "run 'scissorcal fit camera' first" in said.err
     cli("import", album / "camera.yml")
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "photograph the rig card" in said.err
+    assert "'scissorcal capture plate --camera sim --stances sim'" in said.err
+    assert "known" in said.err
     assert recordings(workspace) == []
 
 

@@ -131,7 +131,7 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
     assert events[-2][1:] == events[-1][1:], "nothing moved since"
     with pytest.raises(InputError, match="A person must be asked"):
         control_workspace(fitted, "port", path_of(fitted), camera="0", record=False)
-    assert len(events) == 2
+    assert [what for what, *_ in events].count("looked") == 1
 
 
 @pytest.mark.parametrize("text", ["", "1", "1,2,3,4", "a,b", "1,nan", "1;2"])

@@ -130,7 +130,9 @@ def _opened(
     engine: Engine, recipe: "Recipe", camera: str, device: str, seed: int, baud: int | None
 ) -> Iterator[_Opened]:
     """Open camera and device, or the simulated world of both."""
-    eye = inputs.plate_eye(engine, recipe, needs_rig=device != NONE) if camera != NONE else None
+    eye = None
+    if camera != NONE:
+        eye = inputs.plate_eye(engine, recipe, camera, needs_rig=device != NONE)
     with ExitStack() as stack:
         if SIM in (camera, device):
             world = SimWorld(recipe, seed, rig=device == SIM)

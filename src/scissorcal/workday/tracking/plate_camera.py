@@ -96,7 +96,10 @@ class PlateCamera:
                 "--camera sim runs in virtual time, with the virtual rig: leave --realtime out."
             )
         self._engine, self._recipe, self._camera, self._cut = engine, recipe, camera, cut
-        self._eye = inputs.plate_eye(engine, recipe, needs_rig=True, otherwise="state the pose")
+        without = "state the pose with --pose"
+        if cut:
+            without = 'set plate_pose = "known" in [scene], and build the package again'
+        self._eye = inputs.plate_eye(engine, recipe, camera, needs_rig=True, otherwise=without)
         self._about = inputs.track_about(engine, recipe, camera, self._eye)
         world = camera == SIM
         self._world = SimWorld(recipe, seed, rig=True, cut=cut) if world else None
