@@ -14,7 +14,7 @@ _SdOrFit = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] | Literal[
 
 CLAMPED_mm_per_s, CLAMPED_deg_per_s = 0.01, 0.002
 """How a clamped plate creeps."""
-LONGEST_DELAY_MS = 1000.0
+LONGEST_DELAY_MS = 1000
 """Of a camera, either way: a pose that is predicted for longer says little."""
 
 
