@@ -1,13 +1,17 @@
 """--camera of 'control' and 'render': what is refused, what is recorded, what is said."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from scissorcal.errors import DeviceError
 from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE
+from scissorcal.vision.live import Frame
 from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.workspace import Workspace
 from tests.cli.conftest import Cli
 from tests.package.fits import recipe as known_recipe
@@ -75,16 +79,65 @@ def test_cameras_that_do_not_go_with_the_rig_are_refused(
     assert "name a camera too" in said.err
 
 
+def test_taps_of_a_plate_that_may_not_be_carried_are_refused(
+    cli: Cli, calibrated: Path, packages: dict[str, Path]
+) -> None:
+    words = ("render", *SIM, "--package", packages["both"], "--taps", "3")
+    recipe = Workspace(calibrated).recipe_path
+    text = recipe.read_text()
+    for stated in ("", "\n[plate.tracking]\nspeed_mm_per_s = 5\n"):
+        recipe.write_text(text + stated)
+        said = cli(*words)
+        assert said.code == 2
+        assert "speed_mm_per_s = 5 and turn_deg_per_s = 2 in [plate.tracking]" in said.err
+    assert recordings(calibrated) == []
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (DeviceError("The camera 0 was unplugged."), "The camera 0 was unplugged."),
+        (None, "There is no pose of the plate after 10 s"),
+    ],
+)
+def test_without_a_first_pose_the_camera_says_why(
+    cli: Cli,
+    calibrated: Path,
+    packages: dict[str, Path],
+    monkeypatch: pytest.MonkeyPatch,
+    error: DeviceError | None,
+    words: str,
+) -> None:
+    asked: list[float] = []
+
+    def frames(self: SimWorld, until_s: float) -> Iterator[Frame]:
+        asked.append(until_s)
+        if error is not None:
+            raise error
+        return iter(())
+
+    monkeypatch.setattr(SimWorld, "frames", frames)
+    said = cli("render", *SIM, "--package", packages["both"], "--no-record")
+    assert said.code == 4
+    assert words in said.err
+    if error is None:
+        assert "The camera gave no picture." in said.err
+        assert asked[-1] - asked[0] == pytest.approx(10.0, abs=0.2)
+    else:
+        assert len(asked) == 1, "nothing is waited for"
+
+
 def test_without_the_rigs_frame_it_says_what_to_photograph(
     cli: Cli, workspace: Path, album: Path, packages: dict[str, Path]
 ) -> None:
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "camera" in said.err
+    assert "run 'scissorcal fit camera' first" in said.err
     cli("import", album / "camera.yml")
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "photograph the rig card" in said.err
+    assert "'scissorcal capture plate --camera sim --stances sim'" in said.err
+    assert "known" in said.err
     assert recordings(workspace) == []
 
 
@@ -108,6 +161,10 @@ def test_a_rendering_is_tracked_and_keeps_the_rows_of_a_track(
     assert len(poses) == len(read_telemetry(path, FRAME)) > 12
     assert len(read_telemetry(path, PICTURE)) == tracked["pictures"]
     assert (poses["covariance"].reshape(-1, 6, 6)[:, 3, 3] > 0.0).all()
+    again = cli("track", "--camera", path)
+    assert again.code == 2
+    assert "is not the recording of a track but of 'render'" in again.err
+    assert "captures/track-*.mcap" in again.err
 
 
 @pytest.mark.slow

@@ -236,6 +236,13 @@ def test_a_recording_that_is_no_track_is_refused(
     assert "is not the recording of a track" in said.err
 
 
+@pytest.mark.parametrize("delay", ["nan", "-5000", "1000.1"])
+def test_a_delay_that_is_none_is_refused(cli: Cli, workspace: Path, delay: str) -> None:
+    said = cli("track", "--camera", "sim", f"--camera-delay-ms={delay}")
+    assert said.code == 2
+    assert "from -1000 to 1000" in said.err
+
+
 def test_a_video_without_the_target_leaves_nothing(
     cli: Cli, workspace: Path, album: Path, tmp_path: Path
 ) -> None:

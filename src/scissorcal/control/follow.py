@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.control.contours import Foot, contour_at, foot_of
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
+from scissorcal.control.plate_request import put_plate, refuse_nobody
 from scissorcal.control.result import (
     ControlResult,
     control_figures,
@@ -50,15 +51,9 @@ HIGHER_M = 5e-3
 """By how much the tip passes over the highest place of the path on its way to the start."""
 HANDLE_N = 1.0
 LIFT_WAIT_S = 2.0
-PLATE = 2.0
-"""MATERIAL that puts a virtual rig's plate in."""
 STALE_S = 0.1
 MOST_GAP_SD_M = 7e-4
 """A third of the gap within which the tip looks for the surface."""
-REQUEST = (
-    "Put the plate in its place, and keep hands off the handles and away from the blades: they "
-    "open, move over the plate and press on it."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +61,8 @@ class Job:
     """What shall be done: a path on a surface, where the plate stands, and what it is made of.
 
     ``points`` state force and speed throughout; ``length_m`` is the plate's along its x axis.
+    ``tracked`` says that the source looks for a plate that is in its place already, because
+    `ask_for_plate` asked for it: then its pose is asked for again before the tip is lowered.
     """
 
     points: SurfacePoints
@@ -73,6 +70,7 @@ class Job:
     source: PoseSource
     material: Material
     length_m: float
+    tracked: bool = False
 
 
 def control(
@@ -92,21 +90,20 @@ def control(
     presses; then it is lifted. The inner loop runs in C (docs/control.md); here the pose source is
     asked about 100 times a second, and what follows from it goes to the servo: without a pose the
     tip is lifted, the path waits, and after 2 s the run ends. On a simulator the specimen's plate
-    is put in; elsewhere ``confirm`` asks a person for it. ``writer`` records samples and telemetry.
+    is put in; elsewhere ``confirm`` asks a person for it, unless the job says that it is tracked in
+    its place. ``writer`` records samples and telemetry.
 
     Raises InputError, before anything moves, for a path, force or stiffness that cannot be had, and
-    where nobody can be asked; DeviceError where no pose comes or the rig fails. The motors are
-    released in any case.
+    where nobody can be asked; DeviceError where no pose comes, where a tracked one is lost before
+    the tip is lowered, or the rig fails. The motors are released in any case.
     """
     identity = link.identity
-    if not is_simulator(identity) and confirm is None:
-        raise InputError(
-            "A person must be asked to put the plate in its place: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
+    if not job.tracked:
+        refuse_nobody(identity, confirm)
     gains = capture_gains(recipe, identity, "friction", Probed.of(probe))
     tell = progress or _silent
-    pose = _first_pose(job.source, link)
+    now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
+    pose = _pose_now(job.source, now_s, "nothing was moved")
     contour = map_contour(job.points, job.surface, pose, job.length_m)
     path = time_path(job.points, contour, identity.tick_us * 1e-6)
     settings = control_settings(
@@ -124,9 +121,14 @@ def control(
         every_s=EVERY_S,
         control=settings.config,
     ) as motion:
-        _prepare(motion, rig, contour, start_foot(job.points, contour, job.surface, pose), run)
-        _put_plate(motion, confirm)
-        _lower(motion, rig, start_foot(job.points, contour, job.surface, pose), run)
+        start = start_foot(job.points, contour, job.surface, pose)
+        _prepare(motion, rig, run)
+        _move_over(motion, rig, contour, start, run)
+        if job.tracked and not is_simulator(identity):
+            start = _start_again(motion, rig, run)
+        else:
+            put_plate(motion, confirm)
+        _lower(motion, rig, start, run)
         run.follow(motion)
         if is_simulator(identity):
             motion.configure(ConfigKey.MATERIAL, 0.0)
@@ -160,7 +162,7 @@ class _Run:
         writer: RecordingWriter | None,
         tell: Progress,
     ) -> None:
-        self._job, self._rig, self._contour, self._path = job, rig, contour, path
+        self.job, self._rig, self._contour, self._path = job, rig, contour, path
         self._settings = settings
         self._writer, self._tell = writer, tell
         self._rows: list[NDArray[np.void]] = []
@@ -204,7 +206,7 @@ class _Run:
 
     def _send(self, motion: Motion, samples: Samples, *, lift: bool) -> None:
         now = motion.now_s
-        pose = self._job.source(now, samples)
+        pose = self.job.source(now, samples)
         foot = self._foot(motion, pose, now)
         if pose is None or foot is None:
             return
@@ -222,7 +224,7 @@ class _Run:
             return None
         pose = pose.at(now)
         place = self._rig.tip.place(motion.position)
-        foot = foot_of(self._job.surface, pose, float(place[0]), float(place[1]))
+        foot = foot_of(self.job.surface, pose, float(place[0]), float(place[1]))
         if foot is None:
             self._note("left", "The tip left the surface: it was lifted.")
             return None
@@ -267,14 +269,13 @@ class _Run:
         return f"following the path of {1e3 * self._path.way:.1f} mm"
 
 
-def _first_pose(source: PoseSource, link: Link) -> PlatePose:
-    """The pose by which a path is laid, before anything moves."""
-    now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
+def _pose_now(source: PoseSource, now_s: float, so: str) -> PlatePose:
+    """The pose by which a path is laid, or its start approached."""
     pose = source(now_s, np.zeros(0, dtype=np.void))
     if pose is None or not pose.tracked:
         why = f" ({pose.why})" if pose is not None and pose.why else ""
         raise DeviceError(
-            f"There is no pose of the plate{why}, so nothing was moved: check the camera and that "
+            f"There is no pose of the plate{why}, so {so}: check the camera and that "
             "it sees the plate's target, or state the pose."
         )
     return pose
@@ -288,16 +289,20 @@ def _gap_sd(pose: PlatePose, foot: Foot) -> float:
     return math.sqrt(max(float(slope @ pose.covariance @ slope), 0.0))
 
 
-def _prepare(
-    motion: Motion, rig: RigMechanics, contour: ContourMap, start: Foot, run: _Run
-) -> None:
-    """Bring the tip over the path's start, higher than anything on it."""
+def _prepare(motion: Motion, rig: RigMechanics, run: _Run) -> None:
+    """See, with the motors off, that nobody holds the handles."""
     if is_simulator(motion.identity):
         motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
         motion.configure(ConfigKey.MATERIAL, 0.0)
     for samples in motion.idle(0.3):
         run.take(samples, "motors off, looking whether the handles are free")
         _refuse_held(samples, rig)
+
+
+def _move_over(
+    motion: Motion, rig: RigMechanics, contour: ContourMap, start: Foot, run: _Run
+) -> None:
+    """Bring the tip over the path's start, higher than anything on it."""
     top = max(foot.point[1] for foot in contour.feet) + LIFT_M + HIGHER_M
     opening = rig.opening_at(top)
     most = motion.identity.opening_max - math.radians(0.5)
@@ -310,20 +315,36 @@ def _prepare(
         run.take(samples, "moving the tip over the path's start")
 
 
-def _put_plate(motion: Motion, confirm: Confirm | None) -> None:
-    if is_simulator(motion.identity):
-        motion.configure(ConfigKey.MATERIAL, PLATE)
-        return
-    assert confirm is not None
-    with motion.paused():
-        confirm(REQUEST)
+def _start_again(motion: Motion, rig: RigMechanics, run: _Run) -> Foot:
+    """Where the path starts by the pose that the source has now, and the tip moved over it.
+
+    The plate may have gone on since its first pose. Raises DeviceError where the pose is lost or
+    too uncertain, InputError where the path cannot be reached any more; the tip is not lowered.
+    """
+    job = run.job
+    pose = _pose_now(job.source, motion.now_s, "the tip was not lowered")
+    contour = map_contour(job.points, job.surface, pose, job.length_m)
+    start = start_foot(job.points, contour, job.surface, pose)
+    sd = _gap_sd(pose, start)
+    if sd > MOST_GAP_SD_M:
+        raise DeviceError(
+            f"The plate's pose leaves the surface's place uncertain by {1e3 * sd:.2f} mm, and "
+            f"{1e3 * MOST_GAP_SD_M:g} mm are allowed, so the tip was not lowered: check that the "
+            "camera sees the plate's target while the blades are over the plate."
+        )
+    _move_over(motion, rig, contour, start, run)
+    return start
 
 
 def _lower(motion: Motion, rig: RigMechanics, start: Foot, run: _Run) -> None:
     """Lower the tip to just above the path's start."""
     opening, advance = motion.position
     above = rig.opening_at(start.point[1] + LIFT_M)
-    assert above is not None
+    if above is None:
+        raise InputError(
+            f"The path's start is {1e3 * start.point[1]:.1f} mm above the pivot, where the blade's "
+            "tip does not reach: put the plate nearer to the blades."
+        )
     builder = PathBuilder(opening, advance, motion.tick_s)
     builder.open_to(above, APPROACH_SPEED, TURN_ACCELERATION)
     builder.rest(0.1)

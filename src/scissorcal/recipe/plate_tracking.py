@@ -12,6 +12,11 @@ _Size = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
 _SizeOrNone = Annotated[float, Field(ge=0, le=1e4, allow_inf_nan=False)]
 _SdOrFit = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] | Literal["auto"]
 
+CLAMPED_mm_per_s, CLAMPED_deg_per_s = 0.01, 0.002
+"""How a clamped plate creeps."""
+LONGEST_DELAY_MS = 1000
+"""Of a camera, either way: a pose that is predicted for longer says little."""
+
 
 class PlateTracking(Section):
     """What 'scissorcal track' assumes of plate, camera and contact: standard deviations and times.
@@ -22,12 +27,12 @@ class PlateTracking(Section):
     """
 
     speed_mm_per_s: _Size = Field(
-        default=0.01,
+        default=CLAMPED_mm_per_s,
         description="usual speed of the plate in each axis: a clamped one creeps by thermal "
         "expansion and by cutting forces, less than the camera sees; 20 where a hand holds it",
     )
     turn_deg_per_s: _Size = Field(
-        default=0.002,
+        default=CLAMPED_deg_per_s,
         description="usual rate of its turning about each axis: 0.01 mm/s at 0.3 m from where it "
         "is clamped; 5 where a hand holds it",
     )
@@ -45,7 +50,9 @@ class PlateTracking(Section):
         description="constant error of turn in all pictures; 0.1 where the camera's file has no "
         "covariance: what 'fit plate' finds between halves of real pictures",
     )
-    camera_delay_ms: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)] = Field(
+    camera_delay_ms: Annotated[
+        float, Field(ge=-LONGEST_DELAY_MS, le=LONGEST_DELAY_MS, allow_inf_nan=False)
+    ] = Field(
         default=0.0,
         description="from a picture's exposure to its time stamp, beyond the shortest delay of its "
         "arrival, which times of arrival cannot show; 'scissorcal track' measures it where it can",

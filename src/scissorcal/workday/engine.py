@@ -82,7 +82,7 @@ class Engine:
             waits = state.state in WAITING or (state.state == "failed" and not state.content)
             if waits and not item.endswith("?") and self._counts(step, item):
                 return self.leads_to(_plain(item))
-        return self.state(name).command
+        return self.state(name).command or f"scissorcal {name}"  # a step that no scene requires
 
     def refresh(self) -> None:
         """Forget what was worked out, after a result was written."""

@@ -2,15 +2,22 @@
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.control.plate_request import REQUEST_FIRST
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.errors import DeviceError, InputError, MissingError
+from scissorcal.kernel import Capability
 from scissorcal.recording import read_attachments, read_recording, read_telemetry
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.verdicts import failed
+from scissorcal.workday.runs import control as runs_control
 from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 from scissorcal.workday.runs.control import control_workspace, stated_pose
 from scissorcal.workday.runs.fit import fit_workspace
@@ -81,8 +88,6 @@ def test_without_friction_of_the_sledge_it_says_what_to_run(
 
 
 def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -> None:
-    from scissorcal.device.lockstep import LockstepLink
-
     made = LockstepLink.configure
 
     def refuse(self: LockstepLink, key: int, value: float) -> float:
@@ -93,6 +98,40 @@ def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -
         patch.setattr(LockstepLink, "configure", refuse)
         with pytest.raises(Exception, match="give the virtual rig's specimen a plate"):
             control_workspace(fitted, "sim", path_of(fitted), pose="20,10,3", record=False)
+
+
+def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
+    fitted: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a rig that says that it is real."""
+    link = LockstepLink("office-paper", np.random.default_rng(1))
+    real = int(link.identity.capabilities) & ~int(Capability.SIMULATOR)
+    link.identity = link.identity._replace(capabilities=real)
+    events: list[tuple[str, float, float]] = []
+
+    def note(what: str) -> None:
+        events.append((what, link.rig.opening, link.rig.advance))
+
+    class Eye:
+        @contextmanager
+        def open_rig(self, *given: Any) -> Iterator[LockstepLink]:
+            yield link
+
+        @contextmanager
+        def follow(self, *given: Any, **held: float) -> Iterator[None]:
+            note("looked")
+            raise DeviceError("There is no pose of the plate.")
+            yield
+
+    monkeypatch.setattr(runs_control, "_camera", lambda *given, **more: Eye())
+    with pytest.raises(DeviceError, match="no pose"):
+        control_workspace(fitted, "port", path_of(fitted), camera="0", confirm=note, record=False)
+    (asked, *_), (looked, *_) = events[-2:]
+    assert (asked, looked) == (REQUEST_FIRST, "looked")
+    assert events[-2][1:] == events[-1][1:], "nothing moved since"
+    with pytest.raises(InputError, match="A person must be asked"):
+        control_workspace(fitted, "port", path_of(fitted), camera="0", record=False)
+    assert [what for what, *_ in events].count("looked") == 1
 
 
 @pytest.mark.parametrize("text", ["", "1", "1,2,3,4", "a,b", "1,nan", "1;2"])

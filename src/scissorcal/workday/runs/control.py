@@ -79,10 +79,11 @@ def control_workspace(
     where ``source`` says, or ``pose`` ("X_MM,Y_MM,PITCH_DEG": its origin in the rig's plane and its
     turn about the pivot's axis), or where ``camera`` (a camera's number, or "sim" with the device
     "sim") and contacts have it while the path is followed, or where the fit of its photographs
-    found it. Mass, inertia and
-    friction are those of the fits of both axes; the surface and what it is made of are the recipe's
-    (plate.surface, plate.touch). Samples and telemetry go to captures/control-<stamp>.mcap unless
-    ``record`` is False; with them the rows of a track. Otherwise as `render_workspace`.
+    found it. A person is asked for the plate before a source or camera looks for it, else once the
+    blades are over its place. Mass, inertia and friction are those of the fits of both axes; the
+    surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and
+    telemetry go to captures/control-<stamp>.mcap unless ``record`` is False; with them the rows of
+    a track. Otherwise as `render_workspace`.
 
     Raises MissingError where a fit or the pose is missing, InputError where the pose is stated
     twice or the camera does not go with the device, and what `scissorcal.control.follow.control`
@@ -90,6 +91,7 @@ def control_workspace(
     """
     from scissorcal.control.follow import Job, control
     from scissorcal.control.path_file import read_path
+    from scissorcal.control.plate_request import ask_for_plate
     from scissorcal.control.settings import Material
     from scissorcal.recipe.plate_surface import plate_surface
 
@@ -115,6 +117,9 @@ def control_workspace(
         link = stack.enter_context(opened)
         rig = f"{link.identity.name} {link.identity.serial}"
         probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
+        tracked = eye is not None or source is not None
+        if tracked:
+            ask_for_plate(link.identity, confirm)
         path = workspace.new_recording("control") if record else None
         writer = _open_writer(path, link, workspace, path_file, probe) if path else nullcontext()
         with writer as recording, ExitStack() as seeing:
@@ -129,6 +134,7 @@ def control_workspace(
                 source=known,
                 material=Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
                 length_m=1e-3 * recipe.material.sheet_length_mm,
+                tracked=tracked,
             )
             done = control(
                 link,

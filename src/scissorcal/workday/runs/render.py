@@ -19,6 +19,7 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
     from scissorcal.package import ModelPackage
+    from scissorcal.recipe.plate_tracking import PlateTracking
     from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
     from scissorcal.render.watch import Progress
     from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
@@ -139,8 +140,25 @@ def _camera(
             "'scissorcal package build'."
         )
     engine = Engine.of(workspace)
+    if taps_s:
+        _refuse_clamped(engine.recipe.plate.tracking)
     return PlateCamera(
         engine, engine.recipe, camera, device, seed=seed, realtime=realtime, cut=True
+    )
+
+
+def _refuse_clamped(tracking: "PlateTracking") -> None:
+    """Pictures of a plate that is carried would be refused, and what taps told would be lost."""
+    from scissorcal.recipe.plate_tracking import CLAMPED_deg_per_s, CLAMPED_mm_per_s
+
+    speed, turn = tracking.speed_mm_per_s, tracking.turn_deg_per_s
+    if speed > CLAMPED_mm_per_s and turn > CLAMPED_deg_per_s:
+        return
+    raise InputError(
+        f"plate.tracking takes the plate to be clamped ({speed:g} mm/s, {turn:g} deg/s), and after "
+        "taps it is carried to where it is cut: state how it is moved, such as speed_mm_per_s = 5 "
+        "and turn_deg_per_s = 2 in [plate.tracking], or leave --taps out. Of a plate that stays "
+        "where it was tapped, state a little more than a clamped one's (0.02 and 0.004)."
     )
 
 

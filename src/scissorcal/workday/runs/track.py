@@ -11,6 +11,7 @@ import numpy as np
 
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
+from scissorcal.recipe.plate_tracking import LONGEST_DELAY_MS
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
@@ -129,7 +130,9 @@ def _opened(
     engine: Engine, recipe: "Recipe", camera: str, device: str, seed: int, baud: int | None
 ) -> Iterator[_Opened]:
     """Open camera and device, or the simulated world of both."""
-    eye = inputs.plate_eye(engine, recipe, needs_rig=device != NONE) if camera != NONE else None
+    eye = None
+    if camera != NONE:
+        eye = inputs.plate_eye(engine, recipe, camera, needs_rig=device != NONE)
     with ExitStack() as stack:
         if SIM in (camera, device):
             world = SimWorld(recipe, seed, rig=device == SIM)
@@ -194,10 +197,10 @@ def _again(
     engine: Engine, path: Path, camera_delay_ms: float | None, tell: Tell | None
 ) -> TrackResult:
     """Follow what a track was given once more, by the recipe as it is now; record nothing."""
+    recipe = _with_delay(engine.recipe, camera_delay_ms)
     track = read_track(path)
     camera = load_result(engine, "camera")
     inputs.refuse_other_camera(path, track, camera)
-    recipe = _with_delay(engine.recipe, camera_delay_ms)
     about = replace(track.about, camera_delay_ms=recipe.plate.tracking.camera_delay_ms)
     contacts, known = inputs.tip_contacts(engine, recipe) if len(track.samples) else (None, True)
     session = TrackSession(
@@ -294,6 +297,11 @@ def _notes(session: TrackSession) -> tuple[str, ...]:
 def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
     if camera_delay_ms is None:
         return recipe
+    if not abs(camera_delay_ms) <= LONGEST_DELAY_MS:
+        raise InputError(
+            f"--camera-delay-ms {camera_delay_ms:g} is no camera's delay: give a number of "
+            f"milliseconds from {-LONGEST_DELAY_MS:g} to {LONGEST_DELAY_MS:g}."
+        )
     tracking = recipe.plate.tracking.model_copy(update={"camera_delay_ms": camera_delay_ms})
     plate = recipe.plate.model_copy(update={"tracking": tracking})
     return recipe.model_copy(update={"plate": plate})

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.tracking.session import RigDrive
 from scissorcal.workday.tracking.track_recorder import RecordedTrack, TrackAbout
@@ -31,6 +32,7 @@ REST_RATE_RAD_PER_S = 0.02
 def plate_eye(
     engine: Engine,
     recipe: "Recipe",
+    camera: str,
     *,
     needs_rig: bool,
     otherwise: str = "track with --device none",
@@ -38,7 +40,7 @@ def plate_eye(
     """The fitted camera, and the rig's frame if its card tells all of it.
 
     MissingError where there is no camera's fit, or where contacts need a frame that is not known;
-    ``otherwise`` is what can be done without it.
+    ``otherwise`` is what can be done without it, ``camera`` the one that the run names.
     """
     from scissorcal.calibration.plate.fit import plate_target
     from scissorcal.workday.runs.plate import locate_workspace_rig
@@ -48,11 +50,16 @@ def plate_eye(
     located = locate_workspace_rig(engine, fitted.camera)
     rig = None if located is None or located.untold else located
     if rig is None and needs_rig:
+        photographs = (
+            "--camera sim --stances sim"
+            if camera == SIM
+            else "--image rig-*.jpg --stances stances.csv"
+        )
         told = f" ({', '.join(located.untold)} is not determined)" if located else ""
         raise MissingError(
             f"The camera's place in the rig's frame is not known{told}, so contacts and pictures "
             "cannot be told together: photograph the rig card at several advances and openings "
-            f"('scissorcal capture plate --image rig-*.jpg --stances stances.csv'), or {otherwise}."
+            f"('scissorcal capture plate {photographs}'), or {otherwise}."
         )
     back = plate_target(recipe).inverse()
     return PlateEye(fitted.camera, back, rig, recipe.fit.plate.priors)

@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError
+from scissorcal.errors import DeviceError, InputError
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import frames_of
@@ -96,7 +96,10 @@ class PlateCamera:
                 "--camera sim runs in virtual time, with the virtual rig: leave --realtime out."
             )
         self._engine, self._recipe, self._camera, self._cut = engine, recipe, camera, cut
-        self._eye = inputs.plate_eye(engine, recipe, needs_rig=True, otherwise="state the pose")
+        without = "state the pose with --pose"
+        if cut:
+            without = 'set plate_pose = "known" in [scene], and build the package again'
+        self._eye = inputs.plate_eye(engine, recipe, camera, needs_rig=True, otherwise=without)
         self._about = inputs.track_about(engine, recipe, camera, self._eye)
         world = camera == SIM
         self._world = SimWorld(recipe, seed, rig=True, cut=cut) if world else None
@@ -129,7 +132,8 @@ class PlateCamera:
         (the virtual hand does, and brings the plate to where it is cut). Where the rig itself holds
         ``held_N`` at the tip, less than half of it is no contact: blades that set off and stop
         feign a few tenths of a newton. Rows go to ``writer``.
-        Without a pose after `PATIENCE_S` the source says None. Raises as `TrackedPose`.
+        Raises DeviceError, nothing having moved, where the camera fails meanwhile, with its own
+        sentence, and where no picture gave a pose within `PATIENCE_S`; later as `TrackedPose`.
         """
         feeds.refuse_without_sledge(link)
         virtual = self._world is not None
@@ -218,10 +222,22 @@ class PlateCamera:
             world.take_out(motion)
             _feed(motion, source, motion.now_s + (CARRY_S if taps_s else 0.0))
         while not session.started and motion.now_s - begun < taps_s + PATIENCE_S:
-            source(motion.now_s, motion.step())
+            _ask(motion, source)
+        if not session.started:
+            raise DeviceError(
+                f"There is no pose of the plate after {PATIENCE_S:g} s, so nothing was moved. "
+                f"{session.why_waiting()} Check that the camera sees the plate's target."
+            )
         _feed(motion, source, motion.now_s + SETTLE_S)
 
 
 def _feed(motion: "Motion", source: TrackedPose, until_s: float) -> None:
     while motion.now_s < until_s:
-        source(motion.now_s, motion.step())
+        _ask(motion, source)
+
+
+def _ask(motion: "Motion", source: TrackedPose) -> None:
+    """Pass on a block of samples; a camera that fails before anything moves ends the run."""
+    source(motion.now_s, motion.step())
+    if source.failed:
+        raise DeviceError(source.failed)

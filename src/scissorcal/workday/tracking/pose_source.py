@@ -19,10 +19,12 @@ class TrackedPose:
     """A `scissorcal.tracking.plate_pose.PoseSource`: call it with the time (s) and new samples.
 
     It feeds the session with both samples and pictures, and answers with the pose predicted for
-    that time, None while there is none. ``begun_s`` is that clock's time at 0 s of the session's.
+    that time, None while there is none. ``failed`` is the sentence of what ended the camera, empty
+    while it runs. ``begun_s`` is that clock's time at 0 s of the session's.
     A pose that rests on neither pictures nor contacts any more is not ``tracked``, and says why;
-    so is one whose camera ``due`` has reported as failed. With ``steady`` the pose rests while only
-    the noise of pictures moves it (`SteadyPose`), as a rendering needs it.
+    so is one whose camera or camera's clock has failed, whatever contacts still come. With
+    ``steady`` the pose rests while only the noise of pictures moves it (`SteadyPose`), as a
+    rendering needs it.
     """
 
     def __init__(
@@ -32,20 +34,19 @@ class TrackedPose:
         self._due = due
         self._begun_s = begun_s
         self._steady = SteadyPose() if steady else None
-        self._failed = ""
+        self.failed = ""
 
     def __call__(self, now_s: float, samples: NDArray[np.void]) -> PlatePose | None:
-        """The plate's pose at ``now_s``. Raises DeviceError where a clock fails."""
+        """The plate's pose at ``now_s``. Raises DeviceError where the rig's clock fails."""
         session = self._session
         session.take_samples(samples)
-        for picture in self._pictures(now_s):
-            session.take_picture(picture)
+        self._look(now_s)
         found = session.follower.estimate(now_s - self._begun_s)
         if found is None:
             return None
         old = min(found.picture_age_s, found.contact_age_s)
-        tracked = session.follower.state != "coasting"
-        why = self._failed or f"neither pictures nor contacts came for {old:.1f} s"
+        tracked = not self.failed and session.follower.state != "coasting"
+        why = self.failed or f"neither pictures nor contacts came for {old:.1f} s"
         pose = PlatePose(
             time=now_s,
             rotation=found.rotation,
@@ -60,12 +61,12 @@ class TrackedPose:
             return self._steady.held(pose, session.follower.picture_noise)
         return pose
 
-    def _pictures(self, now_s: float) -> Iterable[PlatePicture]:
-        """Those that are due; a camera that fails is a plate that is lost, not a rig that fails."""
-        if self._failed:
-            return ()
+    def _look(self, now_s: float) -> None:
+        """Take what is due; a camera that fails is a plate that is lost, not a rig that fails."""
+        if self.failed:
+            return
         try:
-            return list(self._due(now_s))
+            for picture in self._due(now_s):
+                self._session.take_picture(picture)
         except DeviceError as error:
-            self._failed = str(error)
-            return ()
+            self.failed = str(error)

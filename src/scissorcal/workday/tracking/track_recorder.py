@@ -167,13 +167,20 @@ class RecordedTrack:
 def read_track(path: Path) -> RecordedTrack:
     """Read what a track was given, to follow it again with other settings.
 
-    Raises InputError where the file is no track, and what `read_recording` does.
+    A rendering's or control's recording has pictures too, but not the taps before it, and not when
+    contacts counted. Raises InputError where the file is no track, and what `read_recording` does.
     """
     recording = read_recording(path)
+    if recording.kind != "track":
+        raise InputError(
+            f"{path} is not the recording of a track but of '{recording.kind}', so it has not "
+            "all that a pose followed from: name one that 'scissorcal track' wrote "
+            "(captures/track-*.mcap)."
+        )
     stated = [value for name, value in recording.marks if name == TRACK_MARK]
     rows = read_telemetry(path, PICTURE)
     if not stated:
-        raise InputError(f"{path} is not the recording of a track: name one that 'track' wrote.")
+        raise InputError(f"{path} ended before the track had a pose: name another track.")
     facts = json.loads(stated[-1])
     shared = facts["shared"]
     about = TrackAbout(**{**facts, "shared": tuple(map(tuple, shared)) if shared else None})
