@@ -42,6 +42,7 @@ CASES = (
     SLOWER,
     replace(SLOWER, name="the same, without taps", taps=False),
     replace(SLOWER, name="without taps, 12 % allowed", taps=False, tolerance_percent=12.0),
+    replace(SLOWER, name="rig's bias as by default", contact_bias_mm=0.05, contact_bias_deg=0.2),
     replace(SLOWER, name="without play", steady=False),
     replace(SLOWER, name="noise of pictures 4 times as large", noise=4.0),
     replace(SLOWER, name="10 Hz", frames_Hz=10.0),

@@ -64,6 +64,9 @@ class Case:
     tolerance_percent: float = 7.0
     rendered: bool = False
     steady: bool = True
+    contact_bias_mm: float = 0.0
+    contact_bias_deg: float = 0.0
+    """Of the rig's places, as stated; those of this virtual rig have none."""
 
     @property
     def recipe(self) -> Recipe:
@@ -72,6 +75,8 @@ class Case:
             "[plate.tracking]",
             f"speed_mm_per_s = {self.speed_mm_per_s}",
             f"turn_deg_per_s = {self.turn_deg_per_s}",
+            f"contact_bias_mm = {self.contact_bias_mm}",
+            f"contact_bias_deg = {self.contact_bias_deg}",
         )
         found = parse_recipe("\n".join([TEXT, *lines]))
         scene = found.scene.model_copy(
