@@ -16,8 +16,8 @@ from scissorcal.tracking.settings import (
 )
 
 AT_REST = PlateMotion(0.001e-3, math.radians(0.0002), 0.5)
-"""This world's fixed plates do not creep; a recipe's 0.01 mm/s would be 0.028 mm after 8 s, more than
-the 0.018 mm to which contacts locate the rim of a disc."""
+"""This world's fixed plates do not creep; a recipe's 0.01 mm/s would be 0.028 mm after 8 s, more
+than the 0.018 mm to which contacts locate the rim of a disc."""
 MOVING = PlateMotion(SPEED_M_PER_S, SPIN_RAD_PER_S, 0.5)
 FIXED_PLATE = Scenario("fixed")
 FIXED_LONG = Scenario("fixed, 40 s", seconds=40.0)
