@@ -3,6 +3,7 @@
 import queue
 import threading
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 from scissorcal.vision.live import Frame
 from scissorcal.vision.track import Tracked
@@ -46,12 +47,10 @@ class CameraThread:
         Raises what ended the camera.
         """
         found: list[Tracked] = []
-        try:
+        with suppress(queue.Empty):
             found.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
             while True:
                 found.append(self._found.get_nowait())
-        except queue.Empty:
-            pass
         if not found and self._error is not None and self.ended:
             raise self._error
         return found
