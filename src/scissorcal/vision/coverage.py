@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from scissorcal.vision.geometry.camera import usual_camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.targets.boards import Board
 from scissorcal.vision.targets.detect import SMALL_PX, Detection
 
 Array = NDArray[np.float64]
@@ -103,15 +102,9 @@ def _places(pixels: Array, width: int, height: int) -> frozenset[str]:
 
 
 def _size(detection: Detection, width: int, height: int) -> str:
-    across, down = _squares(detection.board)
-    span = detection.square_px * max(across / width, down / height)
+    board = detection.board
+    span = detection.px_per_m * max(board.width_m / width, board.height_m / height)
     return SIZES[0] if span < _FAR else SIZES[2] if span > _NEAR else SIZES[1]
-
-
-def _squares(board: Board) -> tuple[float, float]:
-    """Width and height of a board in what ``Detection.square_px`` is the size of."""
-    unit = board.marker_m if board.kind == "markers" else board.square_m
-    return board.width_m / unit, board.height_m / unit
 
 
 def _slant(detection: Detection, width: int, height: int) -> str:

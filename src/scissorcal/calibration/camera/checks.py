@@ -15,7 +15,6 @@ Array = NDArray[np.float64]
 
 FEWEST_VIEWS = 3
 FEWEST_CORNERS = 200
-LEAST_SHARE = 0.5
 MOST_FOCAL_SHARE = 0.005
 MOST_SD_PX = 0.5
 LEAST_P = 0.01
@@ -70,18 +69,39 @@ def refuse_undetermined(bundle: Bundle, width: int, height: int) -> None:
 def camera_verdicts(
     camera: Camera,
     views: Sequence[ViewError],
-    share: float,
     places: PixelMap,
     cross: CrossValidation | None,
 ) -> tuple[Verdict, ...]:
-    """Judge a fitted camera: focal length, views, corners, coverage, projection, two halves."""
+    """Judge a fitted camera: focal length, views, corners, projection, two halves."""
     return (
         _focal(camera),
         _outlying(views),
         _corners(views),
-        _coverage(share),
         _projection(places),
         _halves(cross),
+    )
+
+
+def uncovered_notes(places: PixelMap, share: float) -> tuple[str, ...]:
+    """What the part of the picture without corners means for what is measured there; may be empty.
+
+    It is no verdict on the camera: the fits of blade and plate judge where these lie.
+    """
+    error = places.error_px
+    known = error <= MOST_SD_PX
+    if known.all():
+        return ()
+    worst = float(error.max())
+    most = (
+        f"{worst:.2g} px at worst"
+        if np.isfinite(worst)
+        else "a place may not be in the picture at all"
+    )
+    return (
+        f"Corners were seen in {100 * share:.0f} % of the picture. A projected point is known to "
+        f"{MOST_SD_PX:g} px in {100 * known.mean():.0f} % of it; elsewhere the camera is "
+        f"extrapolated ({most}). Keep blade and plate out of that part, or add photographs with "
+        "the board there.",
     )
 
 
@@ -114,12 +134,6 @@ def _corners(views: Sequence[ViewError]) -> Verdict:
     why = f"{count} corners were seen in {len(views)} photographs"
     remedy = f"{why}; {FEWEST_CORNERS} are wanted: add photographs."
     return judge(_SCOPE, "corners", count, FEWEST_CORNERS, f"{why}.", remedy)
-
-
-def _coverage(share: float) -> Verdict:
-    why = f"Corners were seen over {100 * share:.0f} % of the picture"
-    remedy = f"{why}: bring the board into its corners too, and nearer."
-    return judge(_SCOPE, "coverage", share, LEAST_SHARE, f"{why}.", remedy)
 
 
 def _projection(places: PixelMap) -> Verdict:

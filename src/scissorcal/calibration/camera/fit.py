@@ -15,6 +15,7 @@ from scissorcal.calibration.camera.checks import (
     refuse_outside,
     refuse_parallel,
     refuse_undetermined,
+    uncovered_notes,
 )
 from scissorcal.calibration.camera.result import CameraFit, ViewError
 from scissorcal.calibration.camera.uncertainty import (
@@ -81,7 +82,8 @@ def fit_camera(
     camera = Camera.of(bundle.camera, width, height, spread.covariance)
     region, share = seen_region([view.pixels for view in views], width, height)
     tell(0.85, "camera: two halves apart")
-    places, cross = pixel_map(camera, spread, halves(views, bundle), region)
+    rivals = [one.bundle.camera for one in compared if one.row.equivalent and not one.row.chosen]
+    places, cross = pixel_map(camera, spread, halves(views, bundle), region, rivals)
     rows = _views(photos, bundle)
     return CameraFit(
         camera=camera,
@@ -98,9 +100,10 @@ def fit_camera(
         region_share=share,
         pixel_map=places,
         cross=cross,
-        verdicts=camera_verdicts(camera, rows, share, places, cross),
+        verdicts=camera_verdicts(camera, rows, places, cross),
         inputs_hash=inputs_hash,
         sources=tuple(photo.name for photo in photos),
+        notes=uncovered_notes(places, share),
     )
 
 

@@ -44,7 +44,9 @@ class PixelMap:
     best rotation of the camera, since every use of a camera estimates its own pose.
     ``difference_px`` (rows, columns): difference between the cameras fitted to two independent
     halves of the photographs, after the best rotation; None with too few photographs. ``inside``
-    marks places near which corners were seen.
+    marks places near which corners were seen. ``model_px`` (rows, columns): largest difference to
+    a candidate model that predicts unseen photographs as well, after the best rotation; None where
+    there is no such candidate. NaN is a place that a model does not project to.
     """
 
     x: Annotated[Array, Stored(("x",))]
@@ -52,6 +54,27 @@ class PixelMap:
     sd_px: Annotated[Array, _MAP]
     inside: Annotated[NDArray[np.bool_], _MAP]
     difference_px: Annotated[Array | None, _MAP] = None
+    model_px: Annotated[Array | None, _MAP] = None
+
+    @property
+    def error_px(self) -> Array:
+        """Standard error of a projected point per coordinate, (rows, columns); inf if unknown.
+
+        Its standard deviation and the difference of equally good models together: where no corner
+        was seen, the former holds for the chosen model alone.
+        """
+        model = 0.0 if self.model_px is None else self.model_px
+        return np.nan_to_num(np.sqrt(self.sd_px**2 + 0.5 * model**2), nan=np.inf)
+
+    def worst_px(self, pixels: Array) -> float:
+        """Largest ``error_px`` at pixels (n, 2): that of the worst corner of their grid cells."""
+        worst = self.error_px
+        for axis in (0, 1):
+            low, high = np.delete(worst, -1, axis), np.delete(worst, 0, axis)
+            worst = np.maximum(low, high)
+        column = np.clip(np.searchsorted(self.x, pixels[:, 0]) - 1, 0, len(self.x) - 2)
+        row = np.clip(np.searchsorted(self.y, pixels[:, 1]) - 1, 0, len(self.y) - 2)
+        return float(worst[row, column].max())
 
 
 @dataclass(frozen=True)

@@ -74,9 +74,16 @@ def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] 
 
 
 def pixel_map(
-    camera: Camera, spread: Spread, parts: tuple[Bundle, Bundle] | None, region: Array
+    camera: Camera,
+    spread: Spread,
+    parts: tuple[Bundle, Bundle] | None,
+    region: Array,
+    rivals: Sequence[Array] = (),
 ) -> tuple[PixelMap, CrossValidation | None]:
     """Lay the projection's uncertainty and the two halves' difference over the picture.
+
+    ``rivals`` are the parameters (9,) of models that predict unseen photographs as well as the
+    chosen one: how far they differ from it is what the choice of a model leaves open.
 
     Two cameras are compared as a user would notice: a direction seen by one is turned by the
     rotation that makes both agree best over the valid region, and projected by the other.
@@ -97,13 +104,14 @@ def pixel_map(
     variance = np.einsum("npi,ij,npj->n", slope, spread.covariance, slope) / 2.0
     shape = (GRID[1], GRID[0])
     sd = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan).reshape(shape)
+    model = _apart(pixels, camera.parameters, rivals, within, shape)
     if parts is None:
-        return PixelMap(x, y, sd, inside.reshape(shape)), None
-    difference = _difference(pixels, parts, within)
+        return PixelMap(x, y, sd, inside.reshape(shape), None, model), None
+    difference = _difference(pixels, parts[0].camera, parts[1].camera, within)
     covariance = sum(camera_covariance(part, spread.stretch).covariance for part in parts)
     cross = _judged(difference, slope, np.asarray(covariance), within)
     length = np.linalg.norm(difference, axis=1).reshape(shape)
-    return PixelMap(x, y, sd, inside.reshape(shape), length), cross
+    return PixelMap(x, y, sd, inside.reshape(shape), length, model), cross
 
 
 def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Array:
@@ -116,20 +124,35 @@ def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Arr
     return np.asarray((own - turn @ absorbed).reshape(-1, 2, 9))
 
 
-def _difference(pixels: Array, parts: tuple[Bundle, Bundle], within: NDArray[np.bool_]) -> Array:
-    """Where the second half's camera sees what the first one sees at ``pixels``, less those."""
-    rays = Camera.of(parts[0].camera, 0, 0).rays(pixels)
+def _apart(
+    pixels: Array,
+    chosen: Array,
+    rivals: Sequence[Array],
+    within: NDArray[np.bool_],
+    shape: tuple[int, int],
+) -> Array | None:
+    """Largest distance between what a rival sees at ``pixels`` and what the chosen camera does."""
+    if not rivals:
+        return None
+    lengths = [
+        np.linalg.norm(_difference(pixels, chosen, rival, within), axis=1) for rival in rivals
+    ]
+    return np.asarray(np.max(lengths, axis=0).reshape(shape))
+
+
+def _difference(pixels: Array, first: Array, second: Array, within: NDArray[np.bool_]) -> Array:
+    """Where the second camera (9,) sees what the first one sees at ``pixels``, less those."""
+    rays = Camera.of(first, 0, 0).rays(pixels)
     points = np.column_stack([rays, np.ones(len(rays))])
     used = within & np.isfinite(rays).all(axis=1)
     safe = np.nan_to_num(points)
     pose = np.zeros(6)
-    parameters = parts[1].camera
     for _ in range(_TURN_STEPS):
-        seen, by_pose, _ = projected(safe, pose, parameters)
+        seen, by_pose, _ = projected(safe, pose, second)
         rows = np.repeat(used, 2)
         step, *_ = np.linalg.lstsq(by_pose[rows][:, :3], (pixels - seen)[used].ravel(), rcond=None)
         pose[:3] += step
-    seen, _, _ = projected(safe, pose, parameters)
+    seen, _, _ = projected(safe, pose, second)
     return np.asarray(np.where(np.isfinite(rays), seen - pixels, np.nan))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.result import Halves, PlateView
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
@@ -25,16 +26,17 @@ def plate_verdicts(
     views: Sequence[PlateView],
     halves: Halves | None,
     camera: Camera,
+    there: CameraThere | None,
     rig: RigPose | None,
 ) -> tuple[Verdict, ...]:
-    """Judge a plate's pose."""
+    """Judge a plate's pose. ``there`` is what the camera's fit knows of where the target was."""
     return (
         _one_pose(whole),
         _at_rest(views),
         _residuals(whole),
         _halves(halves),
         _size(views),
-        _camera(camera),
+        _camera(camera, there),
         _rig(rig),
     )
 
@@ -99,7 +101,7 @@ def _size(views: Sequence[PlateView]) -> Verdict:
     return judge(SCOPE, "size", least, SMALL_PX, why, why + remedy)
 
 
-def _camera(camera: Camera) -> Verdict:
+def _camera(camera: Camera, there: CameraThere | None) -> Verdict:
     if camera.covariance is None:
         why = (
             "The camera has no covariance, so the pose treats it as exact. Run 'scissorcal fit "
@@ -107,7 +109,9 @@ def _camera(camera: Camera) -> Verdict:
         )
         return not_evaluated(SCOPE, "camera", why)
     why = "The pose's covariance includes the camera's."
-    return Verdict(SCOPE, "camera", "pass", None, None, why)
+    if there is None:
+        return Verdict(SCOPE, "camera", "pass", None, None, why)
+    return there.verdict(SCOPE, why)
 
 
 def _rig(rig: RigPose | None) -> Verdict:

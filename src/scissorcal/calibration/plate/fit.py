@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.camera.result import PixelMap
+from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.errors import InputError, MissingError, VerdictError
@@ -41,6 +43,7 @@ def fit_plate(
     priors: PlatePriors = PlatePriors(),
     plate_target: Pose = UNMOVED,
     rig: RigPose | None = None,
+    places: PixelMap | None = None,
     inputs_hash: str = "",
 ) -> PlateFit:
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
@@ -49,6 +52,7 @@ def fit_plate(
     from its near edge, z out of its upper face. Camera and plate are taken to be at rest; a
     photograph of another pose is detected by fitting it alone. Both poses that a plane allows
     are refined and kept. ``priors`` are the recipe's. ``rig`` takes the pose into the rig's frame.
+    ``places`` is how well the camera is known over the picture, from its fit.
 
     Raises MissingError without a photograph, InputError where photographs show different targets,
     VerdictError where the corners determine no pose.
@@ -90,10 +94,18 @@ def fit_plate(
         halves=halves,
         rms_px=whole.rms_px,
         noise_px=whole.sd_px,
-        verdicts=plate_verdicts(whole, views, halves, camera, rig),
+        verdicts=plate_verdicts(whole, views, halves, camera, _there(photos, places), rig),
         inputs_hash=inputs_hash,
         sources=tuple(photo.name for photo in photos),
     )
+
+
+def _there(photos: Sequence[PlatePhoto], places: PixelMap | None) -> CameraThere | None:
+    if places is None:
+        return None
+    pixels = np.concatenate([photo.detection.pixels for photo in photos])
+    scale = min(photo.detection.px_per_m for photo in photos)
+    return CameraThere.of(places, pixels, scale)
 
 
 def plate_target(recipe: "Recipe") -> Pose:

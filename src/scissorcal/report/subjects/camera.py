@@ -129,12 +129,15 @@ def _candidates(fit: CameraFit) -> Panel:
 
 def _uncertainty(fit: CameraFit, places: PixelMap) -> Panel:
     inside = np.asarray(places.inside, dtype=np.bool_)
-    sd = np.asarray(places.sd_px, dtype=np.float64)
-    seen = sd[inside & np.isfinite(sd)]
+    error = np.where(np.isfinite(places.error_px), places.error_px, np.nan)
+    seen = error[inside & np.isfinite(error)]
     middle = significant(float(np.median(seen)), 2) if len(seen) else "not available"
     most = f", at most {significant(float(seen.max()), 2)} px" if len(seen) else ""
-    caption = f"Standard deviation in px: {middle} px (median){most} where corners were seen."
-    charts = [_map(fit, places, sd, "sd", "Uncertainty of a projected point", caption)]
+    caption = (
+        f"Standard error in px: {middle} px (median){most} where corners were seen. Models "
+        "that predict unseen photographs as well count by their difference."
+    )
+    charts = [_map(fit, places, error, "sd", "Uncertainty of a projected point", caption)]
     sentence = (
         f"Corners were seen in {percent(finite(fit.region_share))} of the picture; outside the "
         "dashed outline the camera is extrapolated."

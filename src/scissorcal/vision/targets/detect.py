@@ -63,6 +63,12 @@ class Detection:
         """Places (n, 3) of the corners in the board's frame, metres."""
         return np.asarray(self.board.points[self.ids])
 
+    @property
+    def px_per_m(self) -> float:
+        """Pixels to a metre of the board."""
+        board = self.board
+        return self.square_px / (board.marker_m if board.kind == "markers" else board.square_m)
+
 
 def find_board(
     photo: Photo, board: Board, *, window_px: int | None = None, explain: bool = True

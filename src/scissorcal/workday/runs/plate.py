@@ -18,6 +18,7 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.geometry.rig_frame import RigPose
@@ -72,7 +73,8 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate, plate_target
     from scissorcal.workday.runs.fit import Made, load_result
 
-    camera: Camera = load_result(engine, "camera").camera
+    fitted: CameraFit = load_result(engine, "camera")
+    camera = fitted.camera
     newest = photo_captures(engine.workspace, "plate")[-1:]
     photos = []
     for capture in newest:
@@ -87,6 +89,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
         priors=engine.recipe.fit.plate.priors,
         plate_target=plate_target(engine.recipe),
         rig=locate_workspace_rig(engine, camera),
+        places=fitted.pixel_map,
         inputs_hash=request.inputs_hash,
     )
     return Made(result, lambda folder: _draw(newest, result, camera, engine, folder))
