@@ -83,7 +83,7 @@ def test_a_signature_travels_with_the_package_and_is_void_once_the_report_change
     assert said.code == 0
     signed = said.envelope["result"]
     digest = hashlib.sha256(recorded.report_json.read_bytes()).hexdigest()
-    assert signed["report_sha256"] == digest
+    assert signed["content"]["report/report.json"] == digest
     assert set(signed["fit_hashes"]) == {"friction", "cut"}
     schema = json.loads((schemas_dir() / "signature.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(json.loads(recorded.signature_path.read_text(encoding="utf-8")), schema)
@@ -111,7 +111,7 @@ def test_a_signature_travels_with_the_package_and_is_void_once_the_report_change
     recorded.report_json.write_text(whole.replace("accepted", "x") + " ", encoding="utf-8")
     steps = {s["name"]: s for s in cli("plan", "--json").envelope["result"]["steps"]}
     assert steps["report sign"]["state"] == "stale"
-    assert "changed since it was signed" in steps["report sign"]["found"]
+    assert "report/report.json was changed since it was signed" in steps["report sign"]["found"]
     assert steps["package build"]["state"] == "stale"
     recorded.report_json.write_text(whole, encoding="utf-8")
 

@@ -12,7 +12,6 @@ import pytest
 from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package import (
-    REVIEW_FORMAT,
     FailedFitsWarning,
     PackageSummary,
     Review,
@@ -277,13 +276,12 @@ def test_a_package_carries_its_review_and_nothing_else_changes(
         ("reject", hashes, "fail", "should not be rendered: its report was rejected"),
         ("accept", {"cut": "another"}, "fail", "has a review of other fits"),
     ):
-        given = Review(
-            format=REVIEW_FORMAT,
+        given = Review.of(
             name="A. Reviewer",
             decision=decision,
             note="bends",
             time_utc="2025-01-31T15:02:00Z",
-            report_sha256="0" * 64,
+            content={"report/report.json": "0" * 64},
             fit_hashes=fits,
         )
         path = tmp_path / f"{decision}-{len(fits)}.zip"

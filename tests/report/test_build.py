@@ -13,9 +13,11 @@ import pytest
 
 from scissorcal.calibration.result import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
-from scissorcal.package import REVIEW_FORMAT, Review
+from scissorcal.package import Review
+from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.report import Fact, FactSheet, build_report, sign_page
+from scissorcal.report.signature_block import unsigned_digest
 from scissorcal.report.twin import schema_text
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
@@ -158,7 +160,7 @@ def test_a_signature_shows_on_the_page_and_leaves_the_twin_as_it_was(tmp_path: P
     plain = built(tmp_path, [linear_fit()], [])
     assert "Not signed" in plain.page.text
     before = (tmp_path / "report.json").read_bytes()
-    review = review_of(before)
+    review = review_of((tmp_path / "report.html").read_text(encoding="utf-8"), before)
     sign_page(tmp_path / "report.html", review)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Signed by <strong>A. &lt;b&gt; Lovelace</strong> on" in page
@@ -172,22 +174,24 @@ def test_a_signature_shows_on_the_page_and_leaves_the_twin_as_it_was(tmp_path: P
 
 
 def test_a_signature_of_another_report_is_not_shown(tmp_path: Path) -> None:
-    other = review_of(b"another report")
+    other = review_of("another page", b"another report")
     assert "Not signed" in built(tmp_path, [linear_fit()], [], review=other).page.text
     (tmp_path / "report.html").write_text("no page", encoding="utf-8")
     with pytest.raises(InputError, match="cannot take the signature"):
         sign_page(tmp_path / "report.html", other)
 
 
-def review_of(twin: bytes) -> Review:
-    """An accepted review of a twin, by someone whose name holds markup."""
-    return Review(
-        format=REVIEW_FORMAT,
+def review_of(page: str, twin: bytes) -> Review:
+    """An accepted review of a page and its twin, by someone whose name holds markup."""
+    return Review.of(
         name="A. <b> Lovelace",
         decision="accept",
         note="",
         time_utc="2025-02-01T08:00:00Z",
-        report_sha256=hashlib.sha256(twin).hexdigest(),
+        content={
+            REPORT_PAGE: unsigned_digest(page),
+            REPORT_TWIN: hashlib.sha256(twin).hexdigest(),
+        },
         fit_hashes={"friction": "1f"},
     )
 

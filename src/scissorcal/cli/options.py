@@ -53,6 +53,14 @@ Yes = Annotated[
     typer.Option("--yes", help="Ask no questions: the blades are clear, or material is loaded."),
 ]
 
+TrustedKey = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Public keys (OpenSSH, one a line): one of them must have signed the review.",
+    ),
+]
+
 Images = Annotated[
     list[Path] | None,
     typer.Option("--image", "-i", help="A photograph; repeat the option for each."),

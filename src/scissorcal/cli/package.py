@@ -7,7 +7,7 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, Seed
+from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
 
 if TYPE_CHECKING:
@@ -83,9 +83,13 @@ def check(
     path: Annotated[
         Path | None, typer.Argument(help="The package; the workspace's if not given.")
     ] = None,
+    trusted_key: TrustedKey = None,
     folder: Folder = None,
 ) -> Answer:
-    """Check a package: bytes, error bound, extremes, fits.
+    """Check a package: bytes, error bound, extremes, fits, review.
+
+    A review names who signed and every file that was reviewed. Without a key anyone can write one;
+    --trusted-key demands one that was signed by a key that you know.
 
     \b
     Example:
@@ -94,13 +98,17 @@ def check(
       ...
     """
     from scissorcal.package import check_package, open_package
+    from scissorcal.package.keys import read_public_keys
 
     if path is None:
         workspace = open_workspace(folder)
         path = workspace.package_path(workspace.recipe())
+    trusted = read_public_keys(trusted_key) if trusted_key else None
     package = open_package(path, warn=False)
     manifest = package.manifest
-    return Answer(_facts(manifest), f"{path}: {_contents(manifest)}", check_package(package))
+    return Answer(
+        _facts(manifest), f"{path}: {_contents(manifest)}", check_package(package, trusted)
+    )
 
 
 def _contents(manifest: "Manifest") -> str:

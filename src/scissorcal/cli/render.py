@@ -15,6 +15,7 @@ from scissorcal.cli.options import (
     PlateCamera,
     Realtime,
     Seed,
+    TrustedKey,
     Yes,
     positive,
 )
@@ -49,6 +50,7 @@ def render(
             "several places, so that contact tells its height.",
         ),
     ] = 0.0,
+    trusted_key: TrustedKey = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     realtime: Realtime = False,
     yes: Yes = False,
@@ -72,9 +74,15 @@ def render(
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.render import VirtualStrokes
-    from scissorcal.workday.runs.render import package_warnings, render_workspace
+    from scissorcal.workday.runs.render import (
+        package_warnings,
+        refuse_untrusted,
+        render_workspace,
+    )
 
     workspace = open_workspace(folder)
+    if trusted_key is not None:
+        refuse_untrusted(workspace, package_path, trusted_key)
     for sentence in package_warnings(workspace, package_path):
         note(sentence)
     with LiveView(ask=not yes) as view:

@@ -9,7 +9,8 @@ import typer
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, is_interactive
+from scissorcal.errors import InputError
 
 _COMMANDS = {
     "compare": ("scissorcal.cli.report:compare", "Put two runs side by side."),
@@ -117,18 +118,27 @@ def sign(
     note: Annotated[
         str, typer.Option(help="Why, or under which condition.", show_default=False)
     ] = "",
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Private Ed25519 key of OpenSSH that signs too: others can check who did.",
+        ),
+    ] = None,
     folder: Folder = None,
 ) -> Answer:
     """Sign the report that lies in the workspace: report/signature.json.
 
-    The signature names the SHA-256 of report.json and the fits that it shows, and is void once
-    either changes; report.html is not hashed. The next package carries it, and rendering warns
-    without it.
+    The signature covers the page, report.json and all that they rest on: recipe, fits, trust
+    checks, recordings, photographs. It is void once one of them changes, and 'plan' says which. The
+    next package carries it, and rendering warns without it. Who wrote a name is shown by a key
+    alone; 'ssh-keygen -t ed25519 -f lab-key' makes one.
 
     \b
     Example:
       $ scissorcal report sign --name "A. Lovelace" --decision accept --note "edge was reground"
       report/signature.json: accepted by A. Lovelace on 2025-01-31: edge was reground
+      ...
       next: scissorcal package build
     """
     from scissorcal.workday.engine import Engine
@@ -136,9 +146,13 @@ def sign(
 
     workspace = open_workspace(folder)
     engine = Engine.of(workspace)
-    review = sign_report(engine, name, decision, note)
+    review = sign_report(engine, name, decision, note, key=key, passphrase=_passphrase)
     path = workspace.signature_path
-    text = f"{workspace.relative(path)}: {review.words}"
+    text = (
+        f"{workspace.relative(path)}: {review.words}\n"
+        f"it covers {len(review.content)} files, digest {review.digest[:16]}; "
+        f"{review.identity_words}"
+    )
     unverified = [state.name for state in engine.states() if state.state == "unverified"]
     if unverified:
         text += (
@@ -146,3 +160,12 @@ def sign(
             "unverified: a trust check that is made later voids this signature"
         )
     return Answer(review.model_dump(), text, files=[path])
+
+
+def _passphrase() -> str:
+    if not is_interactive():
+        raise InputError(
+            "The key has a passphrase, and nobody is there to be asked for it: sign in a terminal, "
+            "or use a key without one."
+        )
+    return str(typer.prompt("Passphrase of the key", hide_input=True, err=True))

@@ -1,5 +1,6 @@
 """Check a package by itself: open it, and test what it states."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,13 @@ IN_BAND = 0.9
 EXTREME_STEPS = 4_000
 
 
-def check_package(package: ModelPackage | Path | str) -> tuple[Verdict, ...]:
+def check_package(
+    package: ModelPackage | Path | str, trusted: Sequence[str] | None = None
+) -> tuple[Verdict, ...]:
     """Judge a package, open or in a file: error bound, extremes, centre, fits, review.
 
-    Raises MissingError or InputError where the file cannot even be opened as a package.
+    ``trusted`` are public keys (OpenSSH) of which one must have signed the review; None asks for
+    none. Raises MissingError or InputError where the file cannot even be opened as a package.
     """
     if not isinstance(package, ModelPackage):
         package = open_package(package, warn=False)
@@ -32,7 +36,7 @@ def check_package(package: ModelPackage | Path | str) -> tuple[Verdict, ...]:
         _extremes(package),
         _centre(package),
         _fits(package),
-        _review(package),
+        _review(package, trusted),
     )
 
 
@@ -103,11 +107,14 @@ def _fits(package: ModelPackage) -> Verdict:
     return judge(SCOPE, FITS_CHECK, len(package.manifest.failed_checks), 0.0, passed, failed)
 
 
-def _review(package: ModelPackage) -> Verdict:
+def _review(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
     review = package.manifest.review
-    against = " ".join(package.review_warnings)
-    if review is None:
+    against = " ".join(package.against_review(trusted))
+    if review is None and trusted is None:
         return not_evaluated(SCOPE, REVIEW_CHECK, against)
     accepted = 0.0 if against else 1.0
-    why = f"The report of its fits was {review.words}."
+    why = ""
+    if review is not None:
+        whose = ", which you trust" if trusted is not None else ""
+        why = f"The report of its fits was {review.words}; {review.identity_words}{whose}."
     return judge(SCOPE, REVIEW_CHECK, accepted, 1.0, why, against)

@@ -1,7 +1,7 @@
 """A package in memory: torque, its band, and the kernel that the loop steps."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -194,8 +194,12 @@ class ModelPackage:
 
     @property
     def review_warnings(self) -> tuple[str, ...]:
-        """Why its review is not valid: missing, of other fits, or a rejection."""
-        why = against(self.manifest.review, self.manifest.fit_hashes)
+        """Why its review is not valid: missing, of other fits, forged, or a rejection."""
+        return self.against_review()
+
+    def against_review(self, trusted: Sequence[str] | None = None) -> tuple[str, ...]:
+        """The same where one of the ``trusted`` public keys (OpenSSH) must have signed it, too."""
+        why = against(self.manifest.review, self.manifest.fit_hashes, trusted)
         return (f"The package {self.manifest.name} {why}.",) if why else ()
 
     @property

@@ -1,23 +1,50 @@
-"""The review: who signed a report, the decision, and the fits that it covers."""
+"""The review: who signed a report, the decision, and every file that it covers."""
 
-from collections.abc import Mapping
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-ReviewFormat = Literal["scissorcal-signature/1"]
+from scissorcal.identity import digest
 
-REVIEW_FORMAT: ReviewFormat = "scissorcal-signature/1"
+ReviewFormat = Literal["scissorcal-signature/2"]
+
+REVIEW_FORMAT: ReviewFormat = "scissorcal-signature/2"
+
+REPORT_PAGE, REPORT_TWIN = "report/report.html", "report/report.json"
+"""What a review's ``content`` calls the page and its JSON twin."""
 
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+_FILE_NAME = Field(min_length=1, max_length=500)
+
+
+class KeySignature(BaseModel):
+    """An Ed25519 signature of a review's digest, with the public key as OpenSSH writes it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
+
+    public_key: Annotated[str, Field(pattern=r"^ssh-ed25519 [A-Za-z0-9+/]{68}$")]
+    signature: Annotated[str, Field(pattern=r"^[A-Za-z0-9+/]{86}==$")]
+
+    @property
+    def fingerprint(self) -> str:
+        """The public key's fingerprint, as 'ssh-keygen -l' prints it."""
+        blob = base64.b64decode(self.public_key.split()[1])
+        return "SHA256:" + base64.b64encode(hashlib.sha256(blob).digest()).decode().rstrip("=")
 
 
 class Review(BaseModel):
     """A signature under a report, as in report/signature.json and in a package's manifest.
 
-    ``report_sha256`` is of report.json as it was reviewed, ``fit_hashes`` the inputs hash of each
-    fit that it shows. It states what was reviewed; it does not prove who signed.
+    ``content`` has the SHA-256 of every file that the reviewer read and of all that it rests on:
+    page, JSON twin, recipe, fits, trust checks, recordings, photographs. The page counts without
+    its signature. ``fit_hashes`` are the inputs hashes of the fits. ``digest`` covers all of this
+    with name, decision, note and time: a review in which one of them was changed is refused.
+    Anyone can write a review with a right digest. Who wrote it is shown only by ``key``, to those
+    who know whose key that is.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
@@ -27,21 +54,50 @@ class Review(BaseModel):
     decision: Literal["accept", "reject"]
     note: Annotated[str, Field(max_length=10_000)]
     time_utc: Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")]
-    report_sha256: Digest
+    content: Annotated[
+        dict[Annotated[str, _FILE_NAME], Digest], Field(min_length=1, max_length=20_000)
+    ]
     fit_hashes: Annotated[dict[str, str], Field(min_length=1, max_length=8)]
+    digest: Digest
+    key: KeySignature | None = None
+
+    @classmethod
+    def of(cls, **stated: Any) -> Self:
+        """A review of what is stated, with its digest. ValidationError where a value is wrong."""
+        facts = {"format": REVIEW_FORMAT, **stated}
+        return cls(**facts, digest=stated_digest(facts))
+
+    @model_validator(mode="after")
+    def _digest_is_of_this(self) -> Self:
+        stated = self.model_dump(mode="json", exclude={"digest", "key"})
+        if stated_digest(stated) != self.digest:
+            raise ValueError("the review was changed: it does not have the digest that it states")
+        return self
 
     @property
     def words(self) -> str:
         """Who decided what, and when, with the note.
 
-        >>> stamp = {"time_utc": "2025-01-31T15:02:00Z", "report_sha256": "0" * 64}
-        >>> facts = {"name": "A. Lovelace", "decision": "accept", "note": "", **stamp}
-        >>> Review(format=REVIEW_FORMAT, fit_hashes={"cut": "1f"}, **facts).words
+        >>> stated = {"time_utc": "2025-01-31T15:02:00Z", "content": {"report.json": "0" * 64}}
+        >>> facts = {"name": "A. Lovelace", "decision": "accept", "note": "", **stated}
+        >>> Review.of(fit_hashes={"cut": "1f"}, **facts).words
         'accepted by A. Lovelace on 2025-01-31'
         """
         done = "accepted" if self.decision == "accept" else "rejected"
         note = f": {self.note}" if self.note else ""
         return f"{done} by {self.name} on {self.time_utc[:10]}{note}"
+
+    @property
+    def identity_words(self) -> str:
+        """What shows who signed: the key's fingerprint, or that nothing does."""
+        if self.key is None:
+            return "no key signed it, so that nothing shows who wrote the name"
+        return f"signed with the key {self.key.fingerprint}"
+
+
+def stated_digest(stated: Mapping[str, Any]) -> str:
+    """Digest over a review's values, without its digest and key."""
+    return digest(dict(stated))
 
 
 def stamp(now: datetime) -> str:
@@ -51,9 +107,12 @@ def stamp(now: datetime) -> str:
     return now.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def against(review: Review | None, fits: Mapping[str, str]) -> str:
+def against(
+    review: Review | None, fits: Mapping[str, str], trusted: Sequence[str] | None = None
+) -> str:
     """Why a package of these fits (inputs hash by fit) should not be rendered.
 
+    ``trusted`` are public keys (OpenSSH) of which one must have signed; None asks for no key.
     Empty if its review is valid, else the rest of a sentence that begins with the package.
     """
     if review is None:
@@ -62,6 +121,19 @@ def against(review: Review | None, fits: Mapping[str, str]) -> str:
         return (
             f"has a review of other fits ({review.words}): run 'scissorcal report', review and "
             "sign it, then 'scissorcal package build'"
+        )
+    if review.key is not None:
+        from scissorcal.package.keys import holds
+
+        if not holds(review.key, review.digest):
+            return (
+                f"has a forged review ({review.words}): the signature by the key "
+                f"{review.key.fingerprint} is not of this review. Fetch an unchanged copy"
+            )
+    if trusted is not None and (review.key is None or review.key.public_key not in trusted):
+        return (
+            f"has a review that none of the trusted keys signed ({review.words}; "
+            f"{review.identity_words})"
         )
     if review.decision == "reject":
         return f"should not be rendered: its report was {review.words}"

@@ -15,7 +15,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
 from scissorcal.identity import bytes_digest
-from scissorcal.package.review import Review
+from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.report.comparison import Comparison
@@ -70,13 +70,14 @@ def build_report(
     carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
     used, cell by cell; ``choice`` says what of the fitted laws the scene needs. The page shows
     ``review`` (by default the one in ``signature.json`` there) where it was given to this very
-    twin.
+    page and twin.
     ``created`` must carry its time zone. The same input gives the same bytes; a report that says
     the same as the one in ``output_dir`` keeps the time of that one.
 
     Raises MissingError where there is no fit, InputError where ``output_dir`` cannot be written.
     """
     from scissorcal.report.html import report_page
+    from scissorcal.report.signature_block import with_signature
 
     if created.tzinfo is None:
         raise ValueError("created needs a time zone, for example datetime.now(timezone.utc)")
@@ -108,7 +109,10 @@ def build_report(
         Path(output_dir) / "report.html", Path(output_dir) / "report.json", document
     )
     document, twin = _with_earlier_time(document, files.json)
-    page = report_page(document, geometry, _signed(review, twin, files.json.parent))
+    page = report_page(document, geometry)
+    standing = _standing(review, page, twin, files)
+    if standing:
+        page = with_signature(page, standing)
     _write_both(files, page, twin)
     return replace(files, document=document)
 
@@ -139,7 +143,7 @@ def sign_page(html: Path, review: Review) -> None:
 
     Raises InputError where the page is damaged or cannot be written.
     """
-    from scissorcal.report.html import with_signature
+    from scissorcal.report.signature_block import with_signature
 
     try:
         page = with_signature(html.read_text(encoding="utf-8"), review)
@@ -151,14 +155,15 @@ def sign_page(html: Path, review: Review) -> None:
         ) from error
 
 
-def _signed(review: Review | None, twin: str, folder: Path) -> Review | None:
-    """The review, or the one in the folder, if it is of this twin."""
+def _standing(review: Review | None, page: str, twin: str, files: ReportFiles) -> Review | None:
+    """The review, or the one in the folder, if it is of this very page and twin."""
     if review is None:
         try:
-            review = Review.model_validate_json((folder / "signature.json").read_bytes())
+            review = Review.model_validate_json((files.json.parent / "signature.json").read_bytes())
         except (OSError, ValueError):
             return None  # not signed, or damaged, which `plan` says
-    return review if review.report_sha256 == bytes_digest(twin.encode()) else None
+    now = {REPORT_PAGE: bytes_digest(page.encode()), REPORT_TWIN: bytes_digest(twin.encode())}
+    return review if now.items() <= review.content.items() else None
 
 
 def _with_earlier_time(document: ReportDocument, path: Path) -> tuple[ReportDocument, str]:

@@ -18,19 +18,18 @@ from scissorcal.report.pictures import (
     PictureFile,
     place_pictures,
 )
+from scissorcal.report.signature_block import SIGNATURE, signature_block
 from scissorcal.report.svg import svg
 from scissorcal.report.text import limit_text
 from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
-    from scissorcal.package.review import Review
     from scissorcal.report.comparison import Comparison
     from scissorcal.report.document import ReportDocument
     from scissorcal.report.inputs import Geometry
 
 OUTCOMES = {"pass": "✓ pass", "fail": "✗ fail", "not_evaluated": "– not evaluated"}
 LONG_TABLE = 8
-SIGNATURE = ("<!--signature-->", "<!--/signature-->")
 DECISIONS = {
     "✓ trust": "pass",
     "? not verified": "not_evaluated",
@@ -41,9 +40,9 @@ DECISIONS = {
 """Texts that are set as badges, and how those look."""
 
 
-def report_page(document: ReportDocument, geometry: Geometry, review: Review | None) -> str:
+def report_page(document: ReportDocument, geometry: Geometry) -> str:
     """Write the page with as many pictures as it can carry and stay below `PAGE_BYTES`."""
-    page = _report(document, review)
+    page = _report(document)
     shown = [(panel.part, picture) for panel in document.panels for picture in panel.pictures]
     files: dict[str, list[PictureFile]] = {}
     for part, picture in shown:
@@ -73,14 +72,6 @@ def comparison_page(found: Comparison) -> str:
     return whole_page("Comparison of two calibration reports", body + "</main>")
 
 
-def with_signature(page: str, review: Review) -> str:
-    """The page with this signature in place of the one it has. ValueError where it has no place."""
-    start, end = (page.find(mark) for mark in SIGNATURE)
-    if not 0 <= start < end:
-        raise ValueError("the page has no place for a signature")
-    return page[: start + len(SIGNATURE[0])] + _signature(review) + page[end:]
-
-
 def prose(sentence: str) -> str:
     """Escape a sentence; what stands between backticks becomes code."""
     parts = sentence.split("`")
@@ -92,8 +83,8 @@ def prose(sentence: str) -> str:
     )
 
 
-def _report(document: ReportDocument, review: Review | None) -> str:
-    body = ['<main id="report">', _decision(document, review)]
+def _report(document: ReportDocument) -> str:
+    body = ['<main id="report">', _decision(document)]
     body.append(parts_nav([(part.id, part.title.partition(":")[0]) for part in document.parts]))
     for part in document.parts:
         panels = document.panels_of(part.id)
@@ -145,7 +136,7 @@ def made_line(when: str, version: str) -> str:
     return f'<p class="meta">Made {escape(when)} by scissorcal {escape(version)}</p>'
 
 
-def _decision(document: ReportDocument, review: Review | None) -> str:
+def _decision(document: ReportDocument) -> str:
     """The decision page: one screen, one printed page."""
     origin, *others = document.panels_of("decision")
     lead = ". ".join(part for part in (document.material, document.recipe_description) if part)
@@ -158,7 +149,7 @@ def _decision(document: ReportDocument, review: Review | None) -> str:
         f'<div id="{origin.id}" class="origin {document.origin}"><p class="large">'
         f"{escape(origin.title)}</p><p>{prose(origin.sentence)}</p></div></header>"
         f'<div class="cards">{cards}<article class="card" id="decision-signature">'
-        f"{SIGNATURE[0]}{_signature(review)}{SIGNATURE[1]}</article></div></section>"
+        f"{SIGNATURE[0]}{signature_block(None)}{SIGNATURE[1]}</article></div></section>"
     )
 
 
@@ -179,20 +170,6 @@ def _card(panel: Panel) -> str:
     return (
         f'<article class="card" id="{panel.id}"><h2>{escape(panel.title)}</h2>{sentence}'
         f"{table if rows else ''}{_notes(panel.notes)}</article>"
-    )
-
-
-def _signature(review: Review | None) -> str:
-    if review is None:
-        return (
-            "<h2>Not signed</h2><p>Sign with <code>scissorcal report sign --name NAME --decision "
-            "accept</code> or <code>reject</code>.</p>"
-        )
-    done = "✓ Accepted" if review.decision == "accept" else "✗ Rejected"
-    note = f"<p>{escape(review.note)}</p>" if review.note else ""
-    return (
-        f"<h2>{done}</h2><p>Signed by <strong>{escape(review.name)}</strong> on "
-        f'<span class="whole">{escape(review.time_utc[:10])}</span>.</p>{note}'
     )
 
 

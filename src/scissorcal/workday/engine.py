@@ -110,7 +110,9 @@ class Engine:
         if step.kind == "verify":
             return self.index.digest(self.file(step.inputs[0]))
         if step.kind == "sign":
-            return self.index.digest(self.file("report"))
+            from scissorcal.workday.reviewed import reviewed_content
+
+            return digest(reviewed_content(self))
         made_from = {
             "step": name,
             "version": step.version,
@@ -354,6 +356,8 @@ class Engine:
             state = self.state(item)
             if state.state in WAITING and self._counts(step, item):
                 return f"{item} is {state.state}"
+        if step.kind == "sign":
+            return self._unlike_signed(facts)
         efforts = EFFORTS if step.by_effort else ("",)
         inputs = str(facts["inputs"]).removeprefix(UNFINISHED)
         if inputs not in {self.identity(step.name, effort) for effort in efforts}:
@@ -361,6 +365,17 @@ class Engine:
         if step.kind == "package" and facts["review"] != self.review():
             return "it carries another review than there is now"
         return ""
+
+    def _unlike_signed(self, facts: dict[str, Any]) -> str:
+        """Which of the files that a signature covers are not as they were signed."""
+        from scissorcal.package.review import Review
+        from scissorcal.workday.reviewed import changed_since
+
+        changed = changed_since(self, Review.model_validate(facts["review"]))
+        if not changed:
+            return ""
+        more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+        return f"{', '.join(changed[:3])}{more} since it was signed"
 
     def _of_render(self, step: Step, why: str) -> StepState:
         """A rendering is done where the newest one is of the package that is there."""

@@ -67,7 +67,7 @@ def report(path: Path) -> Facts:
 
 
 def signature(path: Path) -> Facts:
-    """Facts of a signature; its inputs are the report that was signed."""
+    """Facts of a signature; its inputs are what was signed."""
     from pydantic import ValidationError
 
     from scissorcal.package import Review
@@ -76,10 +76,11 @@ def signature(path: Path) -> Facts:
         review = Review.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         raise InputError(
-            f"{path} cannot be read: sign the report again with 'scissorcal report sign'."
+            f"{path} is damaged, was changed, or is of an earlier version: read the report and "
+            "sign it again with 'scissorcal report sign'."
         ) from None
     return {
-        "inputs": review.report_sha256,
+        "inputs": review.digest,
         "label": review.words,
         "failed": ["rejected"] if review.decision == "reject" else [],
         "review": review.model_dump(mode="json"),

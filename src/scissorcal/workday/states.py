@@ -18,7 +18,6 @@ WAITING: frozenset[State] = frozenset({"missing", "stale"})
 
 CHANGED = {
     "verify": "of an earlier fit",
-    "sign": "the report changed since it was signed",
     "report": "it shows other fits, trust checks or settings than there are now",
     "package": "built from other fits or settings than there are now",
 }

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
@@ -194,6 +194,18 @@ def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None
     }
     with replacing(package_path.with_suffix(".admission.json")) as part:
         part.write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def refuse_untrusted(workspace: Workspace, package_path: Path | None, keys: Path) -> None:
+    """Raise VerdictError where none of the public keys in a file signed the package's review."""
+    from scissorcal.package import open_package
+    from scissorcal.package.keys import read_public_keys
+
+    trusted = read_public_keys(keys)
+    path = package_path or workspace.package_path(workspace.recipe())
+    said = open_package(path, warn=False).against_review(trusted)
+    if said:
+        raise VerdictError(f"{' '.join(said)} Nothing was rendered.")
 
 
 def package_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:

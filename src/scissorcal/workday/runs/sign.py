@@ -1,5 +1,6 @@
 """Sign a workspace's report, and give the signature that stands."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -21,17 +22,21 @@ def sign_report(
     decision: Decision,
     note: str = "",
     *,
+    key: Path | None = None,
+    passphrase: Callable[[], str] = str,
     now: datetime | None = None,
 ) -> "Review":
-    """Write report/signature.json: who decided what on the report as it lies there.
+    """Write report/signature.json: who decided what on the report, and all that it rests on.
 
-    The page takes the signature first: where that fails, nothing is signed. Raises MissingError
-    where there is no report or it is stale, InputError where the name is empty, the page cannot
-    take the signature, or a file cannot be written.
+    ``key`` is a private Ed25519 key that signs it, too; ``passphrase`` is asked for where that is
+    encrypted. The page takes the signature first: where that fails, nothing is signed. Raises
+    MissingError where there is no report or it is stale, InputError where the name is empty, the
+    page was changed or cannot take the signature, the key is none, or a file cannot be written.
     """
     from pydantic import ValidationError
 
-    from scissorcal.package import REVIEW_FORMAT, Review, stamp
+    from scissorcal.package import Review, stamp
+    from scissorcal.workday.reviewed import reviewed_content
 
     state = engine.state("report")
     if state.state == "missing":
@@ -42,19 +47,23 @@ def sign_report(
             "'scissorcal report', read it again, then sign."
         )
     try:
-        review = Review(
-            format=REVIEW_FORMAT,
+        review = Review.of(
             name=" ".join(name.split()),
             decision=decision,
             note=note.strip(),
             time_utc=stamp(now or datetime.now(UTC)),
-            report_sha256=engine.index.digest(engine.file("report")),
+            content=reviewed_content(engine),
             fit_hashes={what: engine.facts(f"fit {what}")["inputs"] for what in available(engine)},
         )
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"The {place} cannot be signed with: {first['msg']}.") from None
+    if key is not None:
+        from scissorcal.package.keys import sign_digest
+
+        signed = sign_digest(key, review.digest, passphrase)
+        review = review.model_copy(update={"key": signed})
     _write(engine.file("report sign"), engine.workspace.report_html, review)
     engine.refresh()
     return review

@@ -1,0 +1,116 @@
+"""Ed25519 keys, as OpenSSH keeps them: sign a review's digest, and check such a signature.
+
+'ssh-keygen -t ed25519 -f lab-key' makes a pair. Signing and checking are those of the package
+cryptography (RFC 8032).
+"""
+
+import base64
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scissorcal.errors import InputError, MissingError
+from scissorcal.package.review import KeySignature
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+MAKE_KEY = "ssh-keygen -t ed25519 -f lab-key"
+LARGEST_KEY_FILE = 100_000
+"""Bytes; a key has 400, and a file of trusted keys a line of 100 for each."""
+
+_SIGNED = b"scissorcal-signature/2\n"
+"""Stands before the digest, so that a signature of anything else is none of a review."""
+
+
+def sign_digest(path: Path, digest: str, passphrase: Callable[[], str]) -> KeySignature:
+    """Sign a review's digest by the private key in a file.
+
+    ``passphrase`` is asked for where the key is encrypted. Raises MissingError where there is no
+    such file, InputError where it is no such key or where others may read it.
+    """
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
+    private = _private_key(path, passphrase)
+    public = private.public_key().public_bytes(Encoding.OpenSSH, PublicFormat.OpenSSH).decode()
+    signed = private.sign(_SIGNED + digest.encode())
+    return KeySignature(public_key=public, signature=base64.b64encode(signed).decode())
+
+
+def holds(key: KeySignature, digest: str) -> bool:
+    """Whether the key signed this digest."""
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    blob = base64.b64decode(key.public_key.split()[1])
+    # an OpenSSH blob ends with the key's 32 bytes
+    public = Ed25519PublicKey.from_public_bytes(blob[-32:])
+    try:
+        public.verify(base64.b64decode(key.signature), _SIGNED + digest.encode())
+    except InvalidSignature:
+        return False
+    return True
+
+
+def read_public_keys(path: Path) -> tuple[str, ...]:
+    """Public keys of a file, one a line as in ``lab-key.pub``; comments are left out.
+
+    Raises MissingError where there is no such file, InputError where a line is no Ed25519 key.
+    """
+    found = []
+    for number, line in enumerate(_text(path).decode("utf-8", "replace").splitlines(), start=1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            key = " ".join(words[:2])
+            KeySignature(public_key=key, signature="A" * 86 + "==")
+        except ValueError:
+            raise InputError(
+                f"{path}, line {number} is not an Ed25519 public key (ssh-ed25519 AAAA...): give "
+                f"the file that ends in .pub; '{MAKE_KEY}' makes a pair."
+            ) from None
+        found.append(key)
+    if not found:
+        raise InputError(f"{path} holds no public key: give the file that ends in .pub.")
+    return tuple(found)
+
+
+def _private_key(path: Path, passphrase: Callable[[], str]) -> "Ed25519PrivateKey":
+    from cryptography.exceptions import UnsupportedAlgorithm
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.serialization import load_ssh_private_key
+
+    data = _text(path)
+    if os.name == "posix" and path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise InputError(
+            f"Others may read the private key {path}: run 'chmod 600 {path}', and make a new key "
+            "if others were able to."
+        )
+    wrong = f"{path} is not an Ed25519 private key of OpenSSH: '{MAKE_KEY}' makes a pair."
+    try:
+        try:
+            key = load_ssh_private_key(data, None)
+        except (TypeError, ValueError) as error:
+            if "password" not in str(error).lower():
+                raise
+            key = load_ssh_private_key(data, passphrase().encode())
+    except UnsupportedAlgorithm as error:
+        raise InputError(f"{path} cannot be used ({error}). {wrong}") from None
+    except (TypeError, ValueError) as error:
+        if "BEGIN OPENSSH PRIVATE KEY" in data.decode("utf-8", "replace"):
+            wrong = f"{path} cannot be opened: the passphrase is wrong, or the file is damaged."
+        raise InputError(wrong) from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise InputError(wrong)
+    return key
+
+
+def _text(path: Path) -> bytes:
+    if not path.exists():
+        raise MissingError(f"{path} does not exist: '{MAKE_KEY}' makes a pair of keys.")
+    if not path.is_file() or path.stat().st_size > LARGEST_KEY_FILE:
+        raise InputError(f"{path} is no key: '{MAKE_KEY}' makes a pair.")
+    return path.read_bytes()

@@ -1,0 +1,82 @@
+"""What a signature covers: every file that a reviewer reads, and all that it rests on."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
+from scissorcal.report.signature_block import unsigned_digest, with_signature
+from scissorcal.workday.steps import STEPS
+
+if TYPE_CHECKING:
+    from scissorcal.package.review import Review
+    from scissorcal.workday.engine import Engine
+
+COVERED = ("recordings", "photographs", "fit", "verify")
+"""Kinds of steps whose files a report rests on, beside the recipe."""
+
+
+def reviewed_content(engine: "Engine") -> dict[str, str]:
+    """SHA-256 of every file that a signature made now would cover, by its name in the workspace."""
+    workspace, index = engine.workspace, engine.index
+    page, twin = workspace.report_html, workspace.report_json
+    found = {REPORT_PAGE: _page_digest(engine, page)} if page.is_file() else {}
+    if twin.is_file():
+        found[REPORT_TWIN] = index.digest(twin)
+    for path in (workspace.recipe_path, *_rests_on(engine)):
+        found[workspace.relative(path)] = index.digest(path)
+    return found
+
+
+def changed_since(engine: "Engine", review: "Review") -> tuple[str, ...]:
+    """Files that are not as they were signed, each with what happened to it."""
+    now, page = reviewed_content(engine), engine.workspace.report_html
+    found = []
+    for name, signed in review.content.items():
+        if name not in now:
+            there = (engine.workspace.root / name).is_file()
+            found.append(f"{name} {'is no longer used' if there else 'is gone'}")
+        elif now[name] != signed:
+            found.append(f"{name} was changed")
+    found += [f"{name} was added" for name in now.keys() - review.content.keys()]
+    if not any(one.startswith(REPORT_PAGE) for one in found) and not _shows(page, review):
+        found.append(f"{REPORT_PAGE} shows another signature")
+    return tuple(found)
+
+
+def _rests_on(engine: "Engine") -> "list[Path]":
+    root, files = engine.workspace.root, []
+    for step in STEPS:
+        if step.kind not in COVERED or not engine.shown(step.name):
+            continue
+        for name in engine.state(step.name).files:
+            path = root / name
+            files += _photographs(engine, step.name) if path.is_dir() else [path]
+    return [path for path in dict.fromkeys(files) if path.is_file()]
+
+
+def _photographs(engine: "Engine", name: str) -> "list[Path]":
+    """The index files and photographs of a step's folders."""
+    from scissorcal.workday.facts import photographs
+
+    found = []
+    for folder in engine.state(name).files:
+        index = engine.workspace.root / folder / "capture.json"
+        facts: dict[str, Any] = engine.index.facts(index, "photographs", photographs)
+        found += [index, *(index.parent / file for file in facts["sha256"])]
+    return found
+
+
+def _page_digest(engine: "Engine", page: Path) -> str:
+    def read(path: Path) -> dict[str, Any]:
+        return {"sha256": unsigned_digest(path.read_text("utf-8", errors="surrogateescape"))}
+
+    return str(engine.index.facts(page, "sha256 without signature", read)["sha256"])
+
+
+def _shows(page: Path, review: "Review") -> bool:
+    """Whether the page shows this signature and no other."""
+    text = page.read_text("utf-8", errors="replace")
+    try:
+        return with_signature(text, review) == text
+    except ValueError:
+        return False
