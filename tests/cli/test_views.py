@@ -10,6 +10,7 @@ from scissorcal.cli import progress as progress_module
 from scissorcal.cli.live_view import LiveView, effort_plot
 from scissorcal.cli.output import table
 from scissorcal.cli.progress import progress
+from scissorcal.cli.terminal import drawn
 from scissorcal.device.coverage import OPENING, CoverageGrid
 from scissorcal.device.recorder import Recorder
 from scissorcal.errors import InputError, VerdictError
@@ -106,7 +107,7 @@ def test_the_newest_point_of_the_plot_is_marked() -> None:
 def test_a_table_on_a_terminal_is_set_by_rich(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "24")
-    lines = table([["name", "why"], ["kappa", "a sentence that does not fit"]]).splitlines()
+    lines = drawn(table([["name", "why"], ["kappa", "a sentence that does not fit"]])).splitlines()
     assert len(lines) > 2
     assert "\x1b[1m" in lines[0]
 

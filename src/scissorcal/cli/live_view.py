@@ -10,6 +10,7 @@ import typer
 
 from scissorcal.cli.output import is_interactive
 from scissorcal.cli.progress import pace
+from scissorcal.cli.terminal import echo, printable
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class LiveView:
             head += f"{axis.effort_name} {effort:.1f} {axis.effort_unit}"
         if self._live is None:
             coverage = f"; {recorder.coverage.sentence()}" if recorder and self._listed else ""
-            typer.echo(head + coverage, err=True)
+            echo(head + coverage, err=True)
         else:
             self._live.update(self._drawing(share, head, recorder), refresh=True)
 
@@ -83,7 +84,7 @@ class LiveView:
         """Show how far a capture is from the scene's tolerance, after each update of the fit."""
         self._approach.append(mark)
         if self._live is None:
-            typer.echo(band_line(self._approach), err=True)
+            echo(band_line(self._approach), err=True)
 
     def confirm(self, request: str) -> None:
         """Ask a person for what must be done, and wait until it is.
@@ -91,7 +92,7 @@ class LiveView:
         Raises InputError where stdin or stderr is no terminal, typer.Abort where they give up.
         """
         if not self._ask:
-            typer.echo(f"{request} (--yes: taken as done)", err=True)
+            echo(f"{request} (--yes: taken as done)", err=True)
             return
         if not is_interactive():
             raise InputError(
@@ -99,7 +100,7 @@ class LiveView:
                 "terminal, or give --yes once it is done."
             )
         self._stop()
-        typer.prompt(f"{request} Press Enter", default="", show_default=False, err=True)
+        typer.prompt(f"{printable(request)} Press Enter", default="", show_default=False, err=True)
         self._start()
 
     def _tell_unloaded(self, recorder: "Recorder") -> None:
@@ -109,9 +110,9 @@ class LiveView:
         for stroke in recorder.empty[self._unloaded :]:
             sentence = unloaded_sentence(stroke)
             if self._live is None:
-                typer.echo(sentence, err=True)
+                echo(sentence, err=True)
             else:
-                self._live.console.print(sentence)
+                self._live.console.print(printable(sentence), markup=False)
         self._unloaded = len(recorder.empty)
 
     def _start(self) -> None:

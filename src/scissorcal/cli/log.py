@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
+from scissorcal.cli.terminal import printable
+
 LOG_FILE = "scissorcal.log"
 
 
@@ -27,4 +29,4 @@ def log_command(
         contextlib.suppress(OSError),  # a full disk or a folder of somebody else
         (workspace / LOG_FILE).open("a", encoding="utf-8") as file,
     ):
-        file.write("\n".join(lines) + "\n")
+        file.write(printable("\n".join(lines)) + "\n")

@@ -20,6 +20,7 @@ import typer
 
 from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
 from scissorcal.cli.log import log_command
+from scissorcal.cli.terminal import drawn, echo, kept, printable_json, style
 from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
@@ -65,7 +66,7 @@ class _Running:
         """Run a command's function; return its exit code and answer, errors turned into both."""
         try:
             answer = function(**options)
-        except (typer.Abort, typer.Exit, typer.TyperException, BrokenPipeError):
+        except (typer.Abort, typer.Exit, typer.TyperException):
             raise
         except KeyboardInterrupt:
             return INTERRUPTED, self._refuse("Interrupted.", INTERRUPTED)
@@ -80,7 +81,7 @@ class _Running:
         return VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0, answer
 
     def _refuse(self, sentence: str, code: int, kept: Sequence[Path] = ()) -> Answer:
-        typer.echo(f"{typer.style('Error:', fg='red')} {sentence}", err=True)
+        echo(f"{style('Error:', fg='red')} {sentence}", err=True)
         return Answer({"error": sentence, "exit_code": code}, files=kept)
 
 
@@ -149,12 +150,12 @@ def print_envelope(name: str, answer: Answer, code: int, seconds: float) -> None
         files=[str(path) for path in answer.files],
         seconds=round(seconds, 3),
     )
-    typer.echo(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False))
+    echo(printable_json(json.dumps(plain(envelope), allow_nan=False, ensure_ascii=False)))
 
 
 def note(sentence: str) -> None:
     """Tell people something on the side, on stderr."""
-    typer.echo(sentence, err=True)
+    echo(sentence, err=True)
 
 
 def stdout_is_for_json() -> bool:
@@ -210,11 +211,11 @@ def _rich_table(
             head[column] if head else "", justify="right" if column in right else "left"
         )
     for row in rows:
-        laid.add_row(*map(Text.from_ansi, row))
+        laid.add_row(*(Text.from_ansi(drawn(cell)) for cell in row))
     console = Console(force_terminal=True)
     with console.capture() as captured:
         console.print(laid)
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+    return kept("\n".join(line.rstrip() for line in captured.get().splitlines()))
 
 
 def verdict_lines(verdicts: Sequence[Verdict]) -> str:
@@ -223,7 +224,7 @@ def verdict_lines(verdicts: Sequence[Verdict]) -> str:
         return ""
     rows = [
         [
-            typer.style(_MARKS[verdict.status][0], fg=_MARKS[verdict.status][1]),
+            style(_MARKS[verdict.status][0], fg=_MARKS[verdict.status][1]),
             verdict.scope,
             verdict.check,
             verdict.limited,
@@ -243,7 +244,7 @@ def _say(answer: Answer, running: _Running) -> None:
     parts = [answer.text.rstrip(), checks.strip(), _next_line(answer, running)]
     text = "\n\n".join(part for part in parts if part)
     if text:
-        typer.echo(text, err=running.as_json)
+        echo(text, err=running.as_json)
 
 
 def _next_line(answer: Answer, running: _Running) -> str:

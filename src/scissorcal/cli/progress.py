@@ -5,8 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import typer
-
+from scissorcal.cli.terminal import echo, printable
 from scissorcal.errors import VerdictError
 
 Progress = Callable[[float, str], None]
@@ -83,7 +82,9 @@ def _bar() -> Iterator[Progress]:
     )
     with RichProgress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
-        yield lambda done, sentence: bar.update(task, completed=done, description=sentence)
+        yield lambda done, sentence: bar.update(
+            task, completed=done, description=printable(sentence)
+        )
 
 
 class _Lines:
@@ -100,4 +101,4 @@ class _Lines:
         if now - self._printed_s < wait:
             return
         self._last, self._printed_s = stage, now
-        typer.echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)
+        echo(f"{100 * min(max(done, 0.0), 1.0):3.0f} %  {sentence}", err=True)

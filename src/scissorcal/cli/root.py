@@ -1,6 +1,7 @@
 """The ``scissorcal`` command itself: its commands in the order of the day, and how it ends."""
 
 import gc
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ import typer
 
 import scissorcal
 from scissorcal.cli.lazy import group
+from scissorcal.cli.terminal import echo, patient_output
 from scissorcal.errors import ScissorcalError
 
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -85,20 +87,23 @@ def run(arguments: Sequence[str] | None = None) -> None:
     # imports make many objects that stay, through which the collector would go again and again
     gc.set_threshold(100_000)
     given = list(sys.argv[1:] if arguments is None else arguments)
+    with patient_output():
+        code = _run(given)
+    sys.exit(code)
+
+
+def _run(given: list[str]) -> int:
     try:
         main = typer.main.get_command(scissorcal_command).main
         code = main(given, prog_name="scissorcal", standalone_mode=False, obj=given)
     except (typer.TyperException, ScissorcalError) as error:
         code = _refuse_usage(error, "--json" in given)
     except typer.Abort:
-        typer.echo("Interrupted.", err=True)
+        echo("Interrupted.", err=True)
         code = 130
-    except BrokenPipeError:
-        sys.stderr.close()
-        code = 1
     except OSError as error:
         code = _refuse_write(error)
-    sys.exit(code if isinstance(code, int) else 0)
+    return code if isinstance(code, int) else 0
 
 
 def _refuse_write(error: OSError) -> int:
@@ -107,7 +112,7 @@ def _refuse_write(error: OSError) -> int:
 
     known = user_error(error, None) if error.filename else None
     sentence = known or f"The answer could not be written: {error.strerror}."
-    typer.echo(f"Error: {sentence}", err=True)
+    echo(f"Error: {sentence}", err=True)
     return known.exit_code if known else 1
 
 
@@ -120,11 +125,13 @@ def _refuse_usage(error: typer.TyperException | ScissorcalError, as_json: bool) 
         error.message = _whole_sentence(error.message)
         error.message = error.message or getattr(error.param, "help", None) or ""
     if isinstance(error, typer.TyperException):
-        error.show()  # type: ignore[attr-defined]  # every error of the parser has it
+        shown = io.StringIO()
+        error.show(file=shown)  # type: ignore[attr-defined]  # every error of the parser has it
+        echo(shown.getvalue().rstrip("\n"), err=True)
         sentence = error.format_message()
     else:
         sentence = str(error)
-        typer.echo(f"Error: {sentence}", err=True)
+        echo(f"Error: {sentence}", err=True)
     if as_json:
         from scissorcal.cli.output import Answer, print_envelope
 

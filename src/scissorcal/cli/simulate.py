@@ -6,6 +6,7 @@ import typer
 
 from scissorcal.cli.options import Seed
 from scissorcal.cli.output import Answer, command, note, stdout_is_for_json
+from scissorcal.cli.terminal import echo
 
 
 @command
@@ -42,7 +43,7 @@ def simulate(
 
     def announce(path: str) -> None:
         announced.append(path)
-        typer.echo(path, err=stdout_is_for_json())
+        echo(path, err=stdout_is_for_json())
         note("Serving a virtual rig; interrupt (Ctrl-C) to end it.")
 
     loaded = load_specimen(specimen)

@@ -5,9 +5,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Self
 
-import typer
-
 from scissorcal.cli.progress import time_words
+from scissorcal.cli.terminal import echo, printable
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -47,11 +46,11 @@ class TrackView:
         self._drawn_s = now
         line = track_line(mark, self._seconds)
         if self._live is None:
-            typer.echo(line, err=True)
+            echo(line, err=True)
         else:
             from rich.text import Text
 
-            self._live.update(Text(line), refresh=True)
+            self._live.update(Text(printable(line)), refresh=True)
 
 
 def track_line(mark: "TrackMark", seconds: float | None) -> str:
