@@ -49,6 +49,7 @@ class BladeMeasurement:
     hole_radius: float
     parts: BladeParts
     edge: BorderPoints
+    back: BorderPoints
     metric: bool
     uncertainty: str
     pivot_px: Array
@@ -100,6 +101,7 @@ def measure_blade(
         frame.radius,
         replace(parts, pivot=pivot, axis=axis, up=up, length=length),
         edge,
+        back,
         view.metric,
         view.uncertainty,
         view.to_pixels(pivot[None])[0],

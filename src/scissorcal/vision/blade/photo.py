@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.vision.blade.borders import find_border
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
-from scissorcal.vision.blade.parts import EdgeSide, lone_blade
+from scissorcal.vision.blade.parts import BACK_FIRST, FIRST, BladeParts, EdgeSide, lone_blade
+from scissorcal.vision.blade.profile import Light
 from scissorcal.vision.blade.scissors import Scissors, find_scissors
 from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
+from scissorcal.vision.blade.tip import BEFORE_TIP, metal_end
 from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
@@ -160,11 +163,23 @@ def photograph_scissors(
         view = PlainView(whole, read, 0.01 * priors.scale_sd_percent if read else 0.0)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
     scissors = find_scissors(outline, photo.source)
+    blades = tuple(_of_metal(light, view, parts, photo.source) for parts in scissors.blades)
+    scissors = replace(scissors, blades=blades)
     measured = tuple(
-        measure_blade(light, view, parts, photo.source, priors, search=_SEARCH)
-        for parts in scissors.blades
+        measure_blade(light, view, parts, photo.source, priors, search=_SEARCH) for parts in blades
     )
     if len(measured) == 2:
         along = float(measured[0].parts.axis @ measured[1].parts.axis)
         scissors = replace(scissors, opening=float(np.arccos(np.clip(along, -1.0, 1.0))))
     return BladePhoto(photo, view, outline, measured, scissors)
+
+
+def _of_metal(light: Light, view: View, parts: BladeParts, source: str) -> BladeParts:
+    """The parts with the tip of the metal in place of the outline's, which may be a shadow's."""
+    sides = [
+        find_border(light, view, parts, side, first, BEFORE_TIP, source, what, _SEARCH)
+        for side, first, what in ((parts.edge, FIRST, "edge"), (parts.back, BACK_FIRST, "back"))
+    ]
+    edge, back = (view.to_sheet(side.pixels) for side in sides)
+    tip = metal_end(light, view, parts, edge, back, max(side.blur_px for side in sides))
+    return replace(parts, length=tip.station, tip_sd=tip.sd, end=tip.border)
