@@ -165,13 +165,18 @@ def random_blade(rng: np.random.Generator, length: float) -> BladeShape:
             return shape
 
 
-def true_edge(shape: BladeShape, stations: np.ndarray) -> np.ndarray:
-    """Offsets of the edge in the frame whose x axis is the centreline."""
-    turn = shape.centreline_turn()
+def true_edge(shape: BladeShape, stations: np.ndarray, halved: tuple[float, float]) -> np.ndarray:
+    """Offsets of the edge in the frame whose x axis halves the blade over a range of its length."""
     s = np.linspace(0.0, shape.length_m, 40_001)
-    e = shape.edge_at(s)
-    along, off = np.cos(turn) * s + np.sin(turn) * e, np.cos(turn) * e - np.sin(turn) * s
-    return np.interp(stations, along, off)
+    lower, upper = shape.edge_at(s), shape.back_at(s)
+    along = np.linspace(*halved, 501) * shape.length_m
+    turn = 0.0
+    for _ in range(8):
+        c, n = np.cos(turn), np.sin(turn)
+        middle = sum(0.5 * np.interp(along, c * s + n * y, c * y - n * s) for y in (lower, upper))
+        turn += float(np.arctan(np.sum(middle * along) / np.sum(along**2)))
+    c, n = np.cos(turn), np.sin(turn)
+    return np.interp(stations, c * s + n * lower, c * lower - n * s)
 
 
 def judged(pair: Pair, rng: np.random.Generator) -> dict[str, Any]:
@@ -192,12 +197,11 @@ def judged(pair: Pair, rng: np.random.Generator) -> dict[str, Any]:
         return {"refused": str(error), "tilt_deg": pair.tilt_deg}
     blades = []
     for name, fit in fits.items():
-        shape = pair.blades[name]
+        shape, measured = pair.blades[name], groups[name][0]
         stations = CHECKED * length
         draws = fit.belief.with_values(fit.draws).offset_at(stations)
-        miss = draws.mean(axis=0) - true_edge(shape, stations)
+        miss = draws.mean(axis=0) - true_edge(shape, stations, measured.parts.halved)
         low, high = np.quantile(draws, [0.5 - NOMINAL / 2, 0.5 + NOMINAL / 2], axis=0)
-        measured = groups[name][0]
         tip = measured.parts.points(np.array([measured.length]), np.zeros(1))
         beyond = np.linalg.norm(photo.view.to_pixels(tip)[0] - measured.pivot_px)
         true = np.linalg.norm(pair.tips_px[name] - pair.pivot_px)

@@ -120,15 +120,14 @@ def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
     ]
     axis, up = parts.axis, parts.up
     for _ in range(3):
-        axis, up = _halved(sides, pivot, axis, up, parts.length)
+        axis, up = _halved(sides, pivot, axis, up, halving_stations(parts))
     return BladeFrame(pivot, axis, up, radius)
 
 
 def _halved(
-    sides: list[Array], pivot: Array, axis: Array, up: Array, length: float
+    sides: list[Array], pivot: Array, axis: Array, up: Array, along: Array
 ) -> tuple[Array, Array]:
     """The axis turned so that it halves the way between both sides of the blade."""
-    along = halving_stations(length)
     middle = np.zeros_like(along)
     for side in sides:
         away = side - pivot

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, BladeParts
+from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.view import View
 
 Array = NDArray[np.float64]
@@ -43,9 +43,9 @@ class BladeFrame:
         return away @ self.axis, away @ self.up
 
 
-def halving_stations(length: float) -> Array:
+def halving_stations(parts: BladeParts) -> Array:
     """Stations (201,) over which the centreline halves the blade."""
-    return np.linspace(BACK_FIRST, BACK_LAST, 201) * length
+    return np.linspace(*parts.halved, 201) * parts.length
 
 
 def edge_modes(
@@ -60,7 +60,7 @@ def edge_modes(
     That slope is a smooth one, so that no column carries the noise of the points.
     """
     edge, back = view.to_sheet(seen.edge.pixels), view.to_sheet(seen.back.pixels)
-    response = _Response.of(frame, parts.length, (edge, seen.edge), (back, seen.back))
+    response = _Response.of(frame, parts, (edge, seen.edge), (back, seen.back))
     outward = _Outward.of(view, seen)
     rows: list[Array] = []
     names: list[str] = []
@@ -99,12 +99,14 @@ class _Side:
     weight: Array
 
     @classmethod
-    def of(cls, frame: BladeFrame, length: float, points: Array, border: BorderPoints) -> "_Side":
+    def of(
+        cls, frame: BladeFrame, parts: BladeParts, points: Array, border: BorderPoints
+    ) -> "_Side":
         station, offset = frame.of(points)
         slope = smooth_slope(station, offset)
         sharp = np.flatnonzero(border.softness < SHARP)
         weight = np.zeros(len(points))
-        weight[sharp] = _pull(station[sharp], halving_stations(length))
+        weight[sharp] = _pull(station[sharp], halving_stations(parts))
         return cls(slope, station + slope * offset, weight)
 
     def shifted(self, moves: Array, frame: BladeFrame) -> Array:
@@ -124,11 +126,11 @@ class _Response:
     def of(
         cls,
         frame: BladeFrame,
-        length: float,
+        parts: BladeParts,
         edge: tuple[Array, BorderPoints],
         back: tuple[Array, BorderPoints],
     ) -> "_Response":
-        return cls(frame, _Side.of(frame, length, *edge), _Side.of(frame, length, *back))
+        return cls(frame, _Side.of(frame, parts, *edge), _Side.of(frame, parts, *back))
 
     @property
     def swing(self) -> Array:

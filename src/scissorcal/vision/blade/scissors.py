@@ -7,10 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.parts import BACK_LAST, BladeParts
 from scissorcal.vision.blade.silhouette import Silhouette
 
 Array = NDArray[np.float64]
+
+OPEN_FIRST = 0.55
+"""Where halving begins on open blades, in shares of the length: a range that is seen at most
+openings, so that photographs at different openings have one centreline."""
 
 LEAST_OPENING = 0.12
 """Below this opening (rad) the blades hide each other's edges."""
@@ -20,8 +24,13 @@ _NOTCH_SHARE = 0.08
 _CLEAR_OF_CROTCH = 0.06
 _TIP_SHARE = 0.03
 _SCREW_SHARE = (0.014, 0.055)
-_FAINT, _LEAST_CIRCLE = 2.0, 0.3
+_FAINT, _LEAST_CIRCLE = 2.0, 0.5
+"""Steepness of light (levels of 170) that is just seen; least score of a circle, over that of a
+whole one: a corner of metal or shadow follows half of a circle at most."""
+
 _SCREW_NEAR = 0.10
+_PLAIN = 0.8
+"""Score of an even disc, such as a rivet, over that of a circle with a slot or a glint inside."""
 _GUESS_SD_SHARE = 0.03
 
 
@@ -165,7 +174,8 @@ def _open(
         clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
         last = stop * (1.0 - _TIP_SHARE)
         edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
-        blades.append(replace(own, edge=edge, back=back, length=stop))
+        halved = (max(OPEN_FIRST, clear / stop), BACK_LAST)
+        blades.append(replace(own, edge=edge, back=back, length=stop, halved=halved))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
@@ -246,7 +256,7 @@ def _best_screw(
         clear = np.maximum(np.abs(across) - 0.6, 0.0) / 0.4
         within_it = cv2.blur(steep, (2 * int(0.35 * radius) + 1,) * 2)
         inner = within_it[tried[:, 1] - top, tried[:, 0] - left]
-        shaped = 0.3 + 0.7 * np.minimum(inner / (2.0 * _FAINT), 1.0)
+        shaped = _PLAIN + (1.0 - _PLAIN) * np.minimum(inner / (2.0 * _FAINT), 1.0)
         score = clear.mean(axis=1) * shaped * np.sqrt(radius)
         index = int(np.argmax(score))
         if best is None or score[index] > best[0]:
