@@ -44,7 +44,10 @@ MOST_TILT_DEG = 8.0
 
 @dataclass(frozen=True)
 class Pair:
-    """A rendered pair of scissors and its true values; ``blades`` are "left" and "right"."""
+    """A rendered pair of scissors and its true values; ``blades`` are "left" and "right".
+
+    ``contrast`` is the logarithm of the metal's light over that of the sheet in full shadow.
+    """
 
     photo: Photo
     blades: dict[str, BladeShape]
@@ -52,6 +55,7 @@ class Pair:
     tips_px: dict[str, np.ndarray]
     tilt_deg: float
     lamp_deg: float
+    contrast: float
 
 
 def main() -> None:
@@ -114,11 +118,12 @@ def photographed(
     def above(points: np.ndarray) -> np.ndarray:
         return np.maximum(at_pivot + (at_tip - at_pivot) * (points @ along) / length, 2e-4)
 
+    white = rng.uniform(0.7, 0.9)
     far = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     sheet = Layer(
         [far],
         pose,
-        rng.uniform(0.7, 0.9),
+        white,
         texture=rng.uniform(0.0, 0.03),
         texture_m=rng.uniform(0.3e-3, 2e-3),
     )
@@ -140,6 +145,7 @@ def photographed(
         tips,
         tilt,
         float(np.degrees(aim)),
+        float(np.log(look["reflectance"] / (white * (1.0 - lamp.share)))),
     )
 
 

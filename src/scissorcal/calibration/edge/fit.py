@@ -21,6 +21,7 @@ from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
+from scissorcal.vision.blade.modes import smooth_slope
 
 Array = NDArray[np.float64]
 
@@ -126,16 +127,23 @@ def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
 
 
 def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
-    """The measurement in metres, or in blade lengths where nobody knows its size."""
+    """The measurement in metres, or in blade lengths where nobody knows its size.
+
+    The error of the length that gives the size stretches the edge along and across: a mode.
+    """
     if one.metric:
         return one
-    factor = (length_m or 1.0) / one.length
+    factor = (length_m or 1.0) / (one.unit_length or one.length)
+    station, offset = one.station * factor, one.offset * factor
+    slope = smooth_slope(station, offset) if len(station) > 4 else 0.0
+    size = one.unit_length_sd * (offset - station * slope)
     return replace(
         one,
-        station=one.station * factor,
-        offset=one.offset * factor,
+        station=station,
+        offset=offset,
         sd=one.sd * factor,
-        modes=one.modes * factor,
+        modes=np.column_stack([one.modes * factor, size]),
+        mode_names=(*one.mode_names, "size"),
         length=one.length * factor,
         hole_radius=one.hole_radius * factor,
         metric=length_m is not None,

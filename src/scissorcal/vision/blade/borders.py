@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 
 _MOST_POINTS = 3000
 _SHADOW_SEARCH = 0.05
-_LEAST_MERIT = 0.35
+_LEAST_MERIT, _INNER_MERIT = 0.35, 0.6
+"""Merit below which a back is taken as followed; merit of the inner of two lines, over that of the
+outer one, from which it is the metal's: under a small lamp a shadow's border is sharp too."""
+
 _SHARP_SHARE = 1.0 / 300.0
 """Blur of a border in focus as a share of the blade's length; a pixel where that is less."""
 _LEAST_GOOD = {"edge": 0.75, "back": 0.3}
@@ -75,7 +78,8 @@ def find_border(
     side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
     if shadowed:
         lines = [side.followed(light, search, kind) for kind in ("innermost", "outermost sharp")]
-        best = max((_crossed(light, *line) for line in lines), key=_merit)
+        inner, outer = (_crossed(light, *line) for line in lines)
+        best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
         if what == "back" and _merit(best) < _LEAST_MERIT:
             return _as_followed(*lines[-1], in_focus(parts, per_unit))
         points, normals, found, blur = best

@@ -7,22 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
-from scissorcal.vision.blade.borders import find_border
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
-from scissorcal.vision.blade.parts import BACK_FIRST, FIRST, BladeParts, EdgeSide, lone_blade
-from scissorcal.vision.blade.profile import Light
+from scissorcal.vision.blade.pair import PairLengths, measure_pair
+from scissorcal.vision.blade.parts import EdgeSide, lone_blade
+from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.scissors import Scissors, find_scissors
 from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
-from scissorcal.vision.blade.tip import BEFORE_TIP, metal_end
-from scissorcal.vision.blade.view import PlainView, View, see_mat
+from scissorcal.vision.blade.view import View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.marker_corners import linear_light
 
 Array = NDArray[np.float64]
-
-_SEARCH = 0.1
-"""Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +34,7 @@ class BladePhoto:
     outline: Silhouette
     measured: tuple[BladeMeasurement, ...]
     scissors: Scissors | None = None
+    lengths: PairLengths | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -158,28 +155,14 @@ def photograph_scissors(
     else:
         height, width = photo.image.shape[:2]
         read = scale * photo.reduction if scale else None
-        unit = read or 1.0
-        whole = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
-        view = PlainView(whole, read, 0.01 * priors.scale_sd_percent if read else 0.0)
+        view = PlainView.by_hand(width, height, priors, read)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
     scissors = find_scissors(outline, photo.source)
-    blades = tuple(_of_metal(light, view, parts, photo.source) for parts in scissors.blades)
-    scissors = replace(scissors, blades=blades)
-    measured = tuple(
-        measure_blade(light, view, parts, photo.source, priors, search=_SEARCH) for parts in blades
-    )
-    if len(measured) == 2:
-        along = float(measured[0].parts.axis @ measured[1].parts.axis)
-        scissors = replace(scissors, opening=float(np.arccos(np.clip(along, -1.0, 1.0))))
-    return BladePhoto(photo, view, outline, measured, scissors)
-
-
-def _of_metal(light: Light, view: View, parts: BladeParts, source: str) -> BladeParts:
-    """The parts with the tip of the metal in place of the outline's, which may be a shadow's."""
-    sides = [
-        find_border(light, view, parts, side, first, BEFORE_TIP, source, what, _SEARCH)
-        for side, first, what in ((parts.edge, FIRST, "edge"), (parts.back, BACK_FIRST, "back"))
-    ]
-    edge, back = (view.to_sheet(side.pixels) for side in sides)
-    tip = metal_end(light, view, parts, edge, back, max(side.blur_px for side in sides))
-    return replace(parts, length=tip.station, tip_sd=tip.sd, end=tip.border)
+    if not scissors.blades:
+        return BladePhoto(photo, view, outline, (), scissors)
+    view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
+    blades = tuple(one.parts for one in measured)
+    along = float(blades[0].axis @ blades[1].axis)
+    opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
+    scissors = replace(scissors, blades=blades, opening=opening)
+    return BladePhoto(photo, view, outline, measured, scissors, lengths)
