@@ -6,38 +6,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.edge.candidates import (
-    MOST_EVALUATIONS,
-    EdgeComparison,
-    Progress,
-    compare_edges,
-)
+from scissorcal.calibration.edge.candidates import EdgeComparison, Progress, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.edge.checks import blade_verdicts
 from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort, SamplingStatus
+from scissorcal.inference import Effort
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.modes import smooth_slope
 
 Array = NDArray[np.float64]
 
-SCOPE = "fit.blade"
 PLACES = 41
-MOST_SPOILT = 0.15
-MOST_DISAGREEMENT = 3.5
-MOST_APART = 0.005
-"""Shares of the blade's length by which photographs of one blade may differ."""
-
-UNTRUSTED = (
-    SamplingStatus.HEAVY_WEIGHTS,
-    SamplingStatus.DISAGREEING,
-    SamplingStatus.BUDGET_USED_UP,
-    SamplingStatus.STUCK,
-)
 HEIGHT_DRAWS = 400
 
 
@@ -99,7 +82,8 @@ def fit_blade(
         (),
         _notes(sized, best, metric),
     )
-    return replace(fit, verdicts=_verdicts(fit, best, effort))
+    verdicts = blade_verdicts(fit, best.best, best.status, best.sentence, effort)
+    return replace(fit, verdicts=verdicts)
 
 
 def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
@@ -207,66 +191,6 @@ def _rows(
             )
         )
     return tuple(rows)
-
-
-def _verdicts(fit: BladeFit, best: EdgeComparison, effort: Effort) -> tuple[Verdict, ...]:
-    scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
-    spoilt = max(row.spoilt_share for row in fit.photographs)
-    worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
-    checks = [
-        judge(
-            scope,
-            "clear edge",
-            spoilt,
-            MOST_SPOILT,
-            f"In {worst} {100 * spoilt:.1f} % of the edge's points belong neither to a smooth edge "
-            f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
-        )
-    ]
-    checks.append(_agreement(fit, best, scope))
-    if best.status in UNTRUSTED:
-        checks.append(
-            Verdict(
-                scope,
-                "sizes of the errors",
-                "fail",
-                None,
-                None,
-                f"{best.sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
-                f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
-            )
-        )
-    return tuple(checks)
-
-
-def _agreement(fit: BladeFit, best: EdgeComparison, scope: str) -> Verdict:
-    """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
-    check = "photographs agree"
-    if len(fit.photographs) < 2:
-        why = "One photograph does not show how far others of the same blade would agree."
-        return not_evaluated(scope, check, why)
-    apart = best.best.between_m / fit.belief.edge.length_m
-    if apart > MOST_APART:
-        return judge(
-            scope,
-            check,
-            apart,
-            MOST_APART,
-            f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
-            f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
-            "above where there is no mat.",
-        )
-    spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
-    scale = [max(row.away_sd, spread) for row in fit.photographs]
-    value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-    return judge(
-        scope,
-        check,
-        float(value),
-        MOST_DISAGREEMENT,
-        f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
-        f"away; {MOST_DISAGREEMENT:g} are allowed.",
-    )
 
 
 def _notes(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.vision.blade.lamp import lamp_direction
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
 from scissorcal.vision.blade.parts import EdgeSide, lone_blade
@@ -27,6 +28,7 @@ class BladePhoto:
 
     ``scissors`` is None where a blade lies alone. ``measured`` has one row for a blade alone, two
     for open scissors (the one whose tip is farther from the handles first), none for closed ones.
+    ``lengths`` are those of a pair against each other, ``lamp_deg`` where its shadow falls.
     """
 
     photo: Photo
@@ -35,6 +37,7 @@ class BladePhoto:
     measured: tuple[BladeMeasurement, ...]
     scissors: Scissors | None = None
     lengths: PairLengths | None = None
+    lamp_deg: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -165,4 +168,5 @@ def photograph_scissors(
     along = float(blades[0].axis @ blades[1].axis)
     opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
     scissors = replace(scissors, blades=blades, opening=opening)
-    return BladePhoto(photo, view, outline, measured, scissors, lengths)
+    lamp = lamp_direction(outline, scissors)
+    return BladePhoto(photo, view, outline, measured, scissors, lengths, lamp)
