@@ -66,6 +66,8 @@ class BladePhoto:
         text = f"{name}: " + "; ".join(parts)
         if self.scissors is not None:
             text += f"; open by {np.degrees(self.scissors.opening):.1f} deg"
+        if self.lamp_deg is not None:
+            text += f"; shadow towards {self.lamp_deg:.0f} deg from between the tips"
         return text
 
 
@@ -160,7 +162,7 @@ def photograph_scissors(
         read = scale * photo.reduction if scale else None
         view = PlainView.by_hand(width, height, priors, read)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
-    scissors = find_scissors(outline, photo.source)
+    scissors = find_scissors(outline, photo.source, whole=not mat)
     if not scissors.blades:
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)

@@ -28,6 +28,9 @@ _FAINT, _LEAST_CIRCLE = 2.0, 0.5
 """Steepness of light (levels of 170) that is just seen; least score of a circle, over that of a
 whole one: a corner of metal or shadow follows half of a circle at most."""
 
+_MOST_PLACES = 30_000
+"""Places that one call of OpenCV's remap takes: less than 32768."""
+
 _SCREW_NEAR = 0.10
 _PLAIN = 0.8
 """Score of an even disc, such as a rivet, over that of a circle with a slot or a glint inside."""
@@ -54,14 +57,22 @@ class Scissors:
     length: float
 
 
-def find_scissors(shape: Silhouette, source: str) -> Scissors:
+def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Scissors:
     """Find the parts of an outline that should be a pair of scissors.
 
-    Handles have rings, or extend beyond the mat's field; the tips are the ends
-    away from them. Raises InputError where there are no handles (forks have none) or no blades.
+    Handles have rings, or extend beyond the mat's field, unless ``whole`` scissors must be seen;
+    the tips are the ends away from them. Raises InputError where there are several objects, no
+    handles (forks have none) or no blades.
     """
     outline = shape.outer
     rings = _rings(shape)
+    if shape.others:
+        raise InputError(
+            f"{source}: {1 + len(shape.others)} objects of like size are on the sheet; one pair of "
+            "scissors is expected. Leave one pair."
+        )
+    if whole and len(shape.cut_off):
+        raise InputError(f"{source}: the border cuts off the object: show whole scissors.")
     if not rings and not len(shape.cut_off):
         raise InputError(
             f"{source}: the object has no handle with a ring and so is not a pair of scissors"
@@ -199,8 +210,12 @@ def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, .
     middles = []
     for place in places:
         here = np.abs(along - place) < 0.02 * reach
+        if not here.any():
+            continue
         off = (outline[here] - handles) @ across
         middles.append(handles + place * axis + 0.5 * (off.min() + off.max()) * across)
+    if not middles:
+        middles = [0.5 * (tip + handles)]
     best = _best_screw(shape, np.array(middles), 0.5 * reach, 0.045)
     if best is None:
         pivot = np.array(middles)[len(middles) // 4]
@@ -246,6 +261,9 @@ def _best_screw(
     place = np.stack([x.ravel() + left, y.ravel() + top], axis=1)
     gap = np.linalg.norm(place[:, None, :] - centre[None, :, :], axis=2).min(axis=1)
     tried = place[gap < within * size]
+    if not len(tried):
+        return None
+    tried = tried[:: len(tried) // _MOST_PLACES + 1]
     turn = np.linspace(0.0, 2.0 * np.pi, 49)[:-1].astype(np.float32)
     best: tuple[float, Array, float] | None = None
     for radius in np.arange(low, high + 0.5, 0.5):

@@ -45,7 +45,13 @@ def capture_blade(
     _refuse_other_setup(photo_captures(workspace, "blade"), setup)
 
     def look(path: Path, photo: "Photo") -> Seen:
-        return Seen(_measured(engine, photo, setup).sentence())
+        found = _measured(engine, photo, setup)
+        if not found.measured:
+            raise InputError(
+                f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, and "
+                "each blade hides the other's edge. Open it by 30 to 80 deg."
+            )
+        return Seen(found.sentence())
 
     board = BLADE_MAT if setup.mat else None
     return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
