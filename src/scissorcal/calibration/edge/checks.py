@@ -134,8 +134,8 @@ def _residuals(fit: BladeFit, best: RungRow, scope: str) -> Verdict:
         limit,
         f"In {row.source} the measured edge is at most {value:.1f} standard deviations from the "
         f"fitted one over an eighth of its length: {size * off:.3f} {unit} at station "
-        f"{size * place:.3g}, where {size * sd:.3f} are claimed. At most {100 * FALSE_ALARMS:g} % of "
-        f"sound fits exceed {limit:.2f}.",
+        f"{size * place:.3g}, where {size * sd:.3f} are claimed. At most {100 * FALSE_ALARMS:g} % "
+        f"of sound fits exceed {limit:.2f}.",
         f"In {row.source} the measured edge is {value:.1f} standard deviations from the fitted one "
         f"over an eighth of its length: {size * off:.3f} {unit} at station {size * place:.3g}, "
         f"where {size * sd:.3f} are claimed; {limit:.2f} are allowed. Photograph the blade again "
@@ -171,8 +171,8 @@ def _lengths(pairs: Sequence[SeenPair]) -> Verdict:
     limit = float(-ndtri(0.5 * FALSE_ALARMS / len(pairs)))
     shorter = 100.0 * float(np.exp(-abs(worst.length_log_ratio)))
     seen = (
-        f"In {worst.source} one blade is {shorter:.1f} % as long as the other, {value:.1f} standard "
-        "deviations from a pair of one length"
+        f"In {worst.source} one blade is {shorter:.1f} % as long as the other, {value:.1f} "
+        "standard deviations from a pair of one length"
     )
     leaning = (
         f" A camera that leans by {worst.tilt_deg:.0f} deg or more would show that; hold it "

@@ -132,9 +132,7 @@ class _Rough:
         return _with_normals(self.view, self.parts, self.stations, offsets, self.outward)
 
 
-def _crossed(
-    light: Light, points: Array, normals: Array
-) -> tuple[Array, Array, Crossings, float]:
+def _crossed(light: Light, points: Array, normals: Array) -> tuple[Array, Array, Crossings, float]:
     """A line of points and normals with its crossings, wide enough for their blur, and that."""
     found = crossings(light, points, normals, 6.0)
     blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
@@ -160,7 +158,7 @@ def _as_followed(points: Array, normals: Array, soft: float) -> BorderPoints:
 
 
 def in_focus(parts: BladeParts, per_unit: float) -> float:
-    """Blur in pixels that a border in focus may have, of a blade with ``per_unit`` pixels a unit."""
+    """Blur in pixels of a border in focus, of a blade that has ``per_unit`` pixels a unit."""
     return max(_SHARP_SHARE * parts.length * per_unit, 1.0)
 
 

@@ -35,9 +35,9 @@ class BladeMeasurement:
     their common errors, one standard deviation per column: the mapping, the print's scale, the
     pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
     say which. ``softness`` (n,) is the blur of each point against the usual one. ``pivot_px`` and
-    ``axis_px`` are for pictures. ``unit_length`` is the length that a stated one replaces, and 1 where
-    none is stated: that of the pair for open scissors (None: the blade's), with the relative error
-    ``unit_length_sd``.
+    ``axis_px`` are for pictures. ``unit_length`` is the length that a stated one
+    replaces, and 1 where none is stated: that of the pair for open scissors (None: the blade's),
+    with the relative error ``unit_length_sd``.
     """
 
     source: str

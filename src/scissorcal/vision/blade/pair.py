@@ -79,7 +79,9 @@ def measure_pair(
         0.5 * hypot(*sds), 0.5 * real, tips[0].pivot_sd * float(np.linalg.norm(middle)) / pair
     )
     sized = tuple(replace(one, unit_length=pair, unit_length_sd=share) for one in measured)
-    seen = (float(tips[0].length), float(tips[1].length)) if leant is view else _lengths(view, pixels)
+    seen = (
+        (float(tips[0].length), float(tips[1].length)) if leant is view else _lengths(view, pixels)
+    )
     return leant, sized, PairLengths(seen, ratio, sd, tilt)
 
 

@@ -98,7 +98,9 @@ def _sampled_sharpness(light: Light, pixels: Array, soft: float) -> Array:
     high = np.ceil(pixels.max(axis=0)).astype(int) + 13
     rows, columns = light.shape
     left, top = max(low[0], 0), max(low[1], 0)
-    part = np.log(np.maximum(light[top : min(high[1], rows), left : min(high[0], columns)], DARKEST))
+    part = np.log(
+        np.maximum(light[top : min(high[1], rows), left : min(high[0], columns)], DARKEST)
+    )
     if not part.size:
         return np.zeros(len(pixels))
     slopes = []

@@ -27,10 +27,11 @@ class View(Protocol):
     """One photograph's mapping from pixels to a sheet, x to the right and y down.
 
     ``values`` (p,) with ``covariance`` (p, p) are its parameters; `to_sheet` takes other values, to
-    show what each of them moves. The last ``shared`` of them are the same in every photograph of one
-    mat and camera; ``own_error`` names the error of the others. ``bounds`` (left, top, right, bottom) is the
-    part of the sheet in which a blade may lie, in sheet units: metres, or pixels where no scale is
-    known (``metric`` False). ``uncertainty`` is a sentence on its accuracy.
+    show what each of them moves. The last ``shared`` of them are the same in every photograph of
+    one mat and camera; ``own_error`` names the error of the others. ``bounds`` (left, top,
+    right, bottom) is the part of the sheet in which a blade may lie, in sheet units: metres, or
+    pixels where no scale is known (``metric`` False). ``uncertainty`` is a sentence on its
+    accuracy.
     """
 
     @property

@@ -38,8 +38,8 @@ class Layer:
     way round being holes. ``reflectance`` 1 is perfect white. ``shading`` is the relative gain of
     light over 100 mm along x and y; ``brushed`` is how strongly it is streaked along
     ``grain`` (rad). ``shadow_m`` shifts a shadow of the shapes, soft over ``shadow_soft_m``, and
-    takes ``shadow`` of the light. ``texture`` is the relative sd of the material's light, alike over
-    ``texture_m``.
+    takes ``shadow`` of the light. ``texture`` is the relative sd of the material's light, alike
+    over ``texture_m``.
     """
 
     outlines_m: Sequence[Array]
@@ -148,9 +148,7 @@ def _shade(
     )
 
 
-def _texture(
-    layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator
-) -> Picture:
+def _texture(layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     """Relative light of a rough material over a box of pixels, about 1."""
     import cv2
 

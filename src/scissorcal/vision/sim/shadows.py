@@ -37,7 +37,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class CastShadow:
-    """The shadow of outlines (n, 2) on the plane of ``pose``, with the height of each point (n,)."""
+    """The shadow of outlines (n, 2) on the plane of ``pose``, each point at its height (n,)."""
 
     outlines_m: Sequence[Array]
     heights_m: Sequence[Array]
@@ -67,7 +67,9 @@ def cast(radiance: Picture, shadow: CastShadow, lens: Lens) -> None:
     )
     seen = [
         [
-            lens.sees(outline + height[:, None] * (shadow.lamp.lean + shadow.lamp.size * d), shadow.pose)
+            lens.sees(
+                outline + height[:, None] * (shadow.lamp.lean + shadow.lamp.size * d), shadow.pose
+            )
             for outline, height in zip(shadow.outlines_m, shadow.heights_m, strict=True)
         ]
         for d in disc

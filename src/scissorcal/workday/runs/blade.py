@@ -48,8 +48,8 @@ def capture_blade(
         found = _measured(engine, photo, setup)
         if not found.measured:
             raise InputError(
-                f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, and "
-                "each blade hides the other's edge. Open it by 30 to 80 deg."
+                f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, "
+                "and each blade hides the other's edge. Open it by 30 to 80 deg."
             )
         return Seen(found.sentence())
 
