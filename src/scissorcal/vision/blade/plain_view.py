@@ -53,7 +53,7 @@ class PlainView:
         tilt = np.degrees(np.hypot(*self.lean[:2]))
         seen = f"the blades' lengths suggest a tilt of {tilt:.1f} deg, which is allowed for"
         if self.scale is None:
-            return f"No mat: the shape has no scale of its own, and {seen}."
+            return f"No mat: the shape has no scale, and {seen}."
         return f"No mat: the scale is as stated, and {seen}."
 
     @property

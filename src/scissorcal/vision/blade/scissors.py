@@ -19,6 +19,7 @@ openings, so that photographs at different openings have one centreline."""
 LEAST_OPENING = 0.12
 """Below this opening (rad) the blades hide each other's edges."""
 
+_APART_SHARE = 0.08
 _RING_SHARE = 0.04
 _NOTCH_SHARE = 0.08
 _CLEAR_OF_CROTCH = 0.06
@@ -66,11 +67,7 @@ def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Sci
     """
     outline = shape.outer
     rings = _rings(shape)
-    if shape.others:
-        raise InputError(
-            f"{source}: {1 + len(shape.others)} objects of like size are on the sheet; one pair of "
-            "scissors is expected. Leave one pair."
-        )
+    _refuse_others(shape, source)
     if whole and len(shape.cut_off):
         raise InputError(f"{source}: the border cuts off the object: show whole scissors.")
     if not rings and not len(shape.cut_off):
@@ -93,6 +90,19 @@ def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Sci
         return _closed(shape, outline[first], handles, rings)
     second, notch = crotch
     return _open(shape, source, (first, second), notch, rings)
+
+
+def _refuse_others(shape: Silhouette, source: str) -> None:
+    """Refuse further objects; a handle that bright metal separates from the rest is near it."""
+    from scipy.spatial import cKDTree
+
+    size = float(np.ptp(shape.outer, axis=0).max())
+    tree = cKDTree(shape.outer)
+    if any(float(tree.query(other)[0].min()) > _APART_SHARE * size for other in shape.others):
+        raise InputError(
+            f"{source}: several objects of like size are on the sheet; one pair of scissors is "
+            "expected. Leave one pair."
+        )
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
