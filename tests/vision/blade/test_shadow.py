@@ -81,11 +81,11 @@ def test_metal_is_told_from_its_shadow_by_the_sharper_border(size):
 
 
 def test_tips_are_those_of_the_metal_where_the_outline_ends_with_the_shadow():
-    """Pictures with metal unlike its shadow: tips to 3 px, where the dark outline is beyond."""
+    """Four pictures, two of them with the shadow of a tip far beyond it."""
     beyond, off = [], []
-    for pair, found in distinct(156, 40, tilt_deg=2.0):
-        if not found.scissors.screw:
-            continue
+    for index in (2, 21, 29, 35):
+        pair = photographed(np.random.default_rng([164, index]), tilt_deg=2.0)
+        found = photograph_scissors(pair.photo, mat=False)
         for name, one in zip(found.names, found.measured, strict=True):
             axis = one.axis_px - one.pivot_px
             axis = axis / np.linalg.norm(axis)
@@ -95,11 +95,8 @@ def test_tips_are_those_of_the_metal_where_the_outline_ends_with_the_shadow():
             tip = found.view.to_pixels(one.parts.points(np.array([one.length]), np.zeros(1)))[0]
             off.append(float((tip - pair.pivot_px) @ axis) - true)
             beyond.append(float((dark[near] @ axis).max()) - true)
-        if len(off) >= 8:
-            break
-    assert len(off) >= 8
     assert np.median(np.abs(off)) < 1.5
-    assert np.quantile(np.abs(off), 0.9) < 4.0
+    assert np.max(np.abs(off)) < 3.0
     assert max(beyond) > 6.0
 
 

@@ -202,9 +202,10 @@ def _notes(
             "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
             "length (--length-mm) or the scale (--scale) to make it an edge that can be used."
         )
+    first, last = (100.0 * share for share in measured[0].parts.halved)
     notes.append(
-        "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
-        "of its length; the rig's opening must count from where the blades' centrelines meet."
+        f"The centreline is the line through the pivot that halves the blade between {first:.0f} "
+        f"and {last:.0f} % of its length; the rig's opening must count from where the blades' centrelines meet."
     )
     notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)

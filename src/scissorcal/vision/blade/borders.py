@@ -75,16 +75,21 @@ def find_border(
     per_unit = count / max(s[-1] - s[0], 1e-12)
     offsets = np.interp(stations, s, e)
     shadowed = search > _SHADOW_SEARCH
-    side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
+    rough_side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
     if shadowed:
-        lines = [side.followed(light, search, kind) for kind in ("innermost", "outermost sharp")]
+        lines = [
+            rough_side.followed(light, search, "innermost"),
+            rough_side.followed(light, search, "outermost sharp"),
+        ]
         inner, outer = (_crossed(light, *line) for line in lines)
         best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
         if what == "back" and _merit(best) < _LEAST_MERIT:
-            return _as_followed(*lines[-1], in_focus(parts, per_unit))
+            return _as_followed(lines[-1], in_focus(parts, per_unit))
         points, normals, found, blur = best
     else:
-        points, normals, found, blur = _crossed(light, *side.followed(light, search, "steepest"))
+        points, normals, found, blur = _crossed(
+            light, *rough_side.followed(light, search, "steepest")
+        )
     good = found.good & _alike(found)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
@@ -148,11 +153,12 @@ def _merit(line: tuple[Array, Array, Crossings, float]) -> float:
     return float(np.mean(found.good & _alike(found))) / max(blur, 1.0)
 
 
-def _as_followed(points: Array, normals: Array, soft: float) -> BorderPoints:
+def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
     """A line as it was followed, where metal, shadow and sheet make no single step to be fitted.
 
     It is good to about the blur ``soft`` of a border in focus.
     """
+    points, normals = line
     one = np.ones(len(points))
     return BorderPoints(points, normals, soft * one, one, soft, 1.0)
 

@@ -262,10 +262,10 @@ def smooth_slope(station: Array, offset: Array) -> Array:
     middle, reach = float(station.mean()), max(0.5 * float(np.ptp(station)), 1e-30)
     design = np.vander((station - middle) / reach, 4)
     weight = np.ones_like(offset)
-    curve = np.zeros(4)
+    curve: Array = np.zeros(4)
     for _ in range(_ROUNDS):
         root = np.sqrt(weight)
-        curve = np.linalg.lstsq(design * root[:, None], offset * root, rcond=None)[0]
+        curve = np.asarray(np.linalg.lstsq(design * root[:, None], offset * root, rcond=None)[0])
         rest = offset - design @ curve
         spread = 1.4826 * float(np.median(np.abs(rest))) + 1e-30
         weight = np.maximum(1.0 - np.minimum(np.abs(rest) / (4.7 * spread), 1.0) ** 2, 0.0) ** 2

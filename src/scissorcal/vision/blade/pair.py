@@ -74,10 +74,8 @@ def measure_pair(
     measured = [measure_blade(light, leant, parts, source, priors, search=SEARCH) for parts in tips]
     lengths = [one.length for one in measured]
     pair = float(np.exp(np.mean(np.log(lengths))))
-    middle = np.mean([one.parts.axis for one in measured], axis=0)
-    share = hypot(
-        0.5 * hypot(*sds), 0.5 * real, tips[0].pivot_sd * float(np.linalg.norm(middle)) / pair
-    )
+    middle = float(np.linalg.norm(measured[0].parts.axis + measured[1].parts.axis)) / 2.0
+    share = hypot(0.5 * hypot(*sds), 0.5 * real, tips[0].pivot_sd * middle / pair)
     sized = tuple(replace(one, unit_length=pair, unit_length_sd=share) for one in measured)
     seen = (
         (float(tips[0].length), float(tips[1].length)) if leant is view else _lengths(view, pixels)

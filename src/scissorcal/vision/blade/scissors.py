@@ -98,7 +98,8 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
 
     size = float(np.ptp(shape.outer, axis=0).max())
     tree = cKDTree(shape.outer)
-    if any(float(tree.query(other)[0].min()) > _APART_SHARE * size for other in shape.others):
+    away = [float(np.min(tree.query(other)[0])) for other in shape.others]
+    if any(distance > _APART_SHARE * size for distance in away):
         raise InputError(
             f"{source}: several objects of like size are on the sheet; one pair of scissors is "
             "expected. Leave one pair."
