@@ -205,7 +205,8 @@ def _notes(
     first, last = (100.0 * share for share in measured[0].parts.halved)
     notes.append(
         f"The centreline is the line through the pivot that halves the blade between {first:.0f} "
-        f"and {last:.0f} % of its length; the rig's opening must count from where the blades' centrelines meet."
+        f"and {last:.0f} % of its length; the rig's opening must count from where the blades' "
+        "centrelines meet."
     )
     notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)

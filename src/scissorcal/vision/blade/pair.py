@@ -67,7 +67,7 @@ def measure_pair(
         slope = _slope(view, pixels)
         carried = view.lean_covariance @ slope
         sd = float(np.sqrt(own**2 + slope @ carried))
-        tilt = float(np.degrees(abs(ratio) / max(np.linalg.norm(slope[:2]), 1e-12)))
+        tilt = float(np.degrees(abs(ratio) / max(float(np.linalg.norm(slope[:2])), 1e-12)))
         gain = carried / sd**2
         leant = view.leaning(-gain * ratio, view.lean_covariance - np.outer(gain, carried))
         tips = [_in_view(parts, view, leant) for parts in tips]
