@@ -13,7 +13,7 @@ which metal is about as bright as its shadow.
 import argparse
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -21,7 +21,7 @@ import numpy as np
 
 from scissorcal.calibration.edge.fit import fit_blade
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.photo import by_blade, photograph_scissors
+from scissorcal.vision.blade.photo import BladePhoto, by_blade, photograph_scissors
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
@@ -71,12 +71,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--lamps", type=int, default=1, help="photographs of each pair, lamp moved")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     rows = []
     for index in range(arguments.count):
-        rng = np.random.default_rng([arguments.seed, 156, index])
-        rows.append(judged(photographed(rng), rng))
+        rows.append(judged(under_lamps([arguments.seed, 156, index], arguments.lamps), index))
         if not arguments.json:
             said = rows[-1].get("refused") or f"tilt {rows[-1]['tilt_deg']:.1f} deg"
             print(f"  {index} {said}", file=sys.stderr)
@@ -157,6 +157,15 @@ def photographed(
     )
 
 
+def under_lamps(seed: list[int], lamps: int) -> list[Pair]:
+    """One pair under several lamps, evenly around it; under one lamp at random for 1."""
+    if lamps == 1:
+        return [photographed(np.random.default_rng(seed))]
+    first = float(np.random.default_rng([*seed, 1]).uniform(0.0, 360.0))
+    aims = first + 360.0 * np.arange(lamps) / lamps
+    return [photographed(np.random.default_rng(seed), lamp_deg=aim) for aim in aims]
+
+
 def random_blade(rng: np.random.Generator, length: float) -> BladeShape:
     """A blade of a length whose edge is a line, an arc or wavy; one that is too thin is redrawn."""
     while True:
@@ -193,12 +202,13 @@ def true_edge(shape: BladeShape, stations: np.ndarray, halved: tuple[float, floa
     return np.interp(stations, c * s + n * lower, c * lower - n * s)
 
 
-def judged(pair: Pair, rng: np.random.Generator) -> dict[str, Any]:
-    """Measure and fit both blades of one photograph, and compare them with the truth."""
+def judged(pairs: list[Pair], seed: int) -> dict[str, Any]:
+    """Measure and fit both blades in photographs of one pair, and compare them with the truth."""
+    pair, rng = pairs[0], np.random.default_rng(seed)
     row: dict[str, Any] = {"tilt_deg": pair.tilt_deg, "contrast": pair.contrast}
     try:
-        photo = photograph_scissors(pair.photo, mat=False)
-        groups = by_blade([photo])
+        photos = _measured(pairs)
+        photo, groups = photos[0], by_blade(photos)
         if set(groups) != set(pair.blades):
             return {**row, "refused": "closed"}
         length = float(np.mean([blade.length_m for blade in pair.blades.values()]))
@@ -227,7 +237,9 @@ def judged(pair: Pair, rng: np.random.Generator) -> dict[str, Any]:
                 "miss_mm": (1e3 * miss).tolist(),
                 "sd_mm": (1e3 * draws.std(axis=0)).tolist(),
                 "residual_mm": 1e3
-                * float(np.sqrt(np.mean(np.square(fit.photographs[0].residual)))),
+                * float(
+                    np.sqrt(np.mean([np.mean(np.square(p.residual)) for p in fit.photographs]))
+                ),
                 "tip_px": beyond - true,
                 "failed": [v.check for v in fit.verdicts if v.status == "fail"],
                 "checks": {v.check: v.value for v in fit.verdicts},
@@ -241,6 +253,19 @@ def judged(pair: Pair, rng: np.random.Generator) -> dict[str, Any]:
         "lengths_sds": alike,
         "pivot_px": float(np.linalg.norm(photo.scissors.pivot - pair.pivot_px)),
     }
+
+
+def _measured(pairs: list[Pair]) -> list[BladePhoto]:
+    """The photographs that can be used. Raises InputError of the last one where none can."""
+    found = []
+    for number, pair in enumerate(pairs, start=1):
+        try:
+            named = replace(pair.photo, source=f"{number}.jpg")
+            found.append(photograph_scissors(named, mat=False))
+        except InputError:
+            if not found and number == len(pairs):
+                raise
+    return found
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

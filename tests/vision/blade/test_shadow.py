@@ -210,8 +210,7 @@ def test_intervals_of_open_scissors_hold_what_they_state():
     Six places of an edge are nearly one error, so that 60 blades and more are as many trials: 95 %
     would leave 52 of 60 with probability 0.997.
     """
-    rng = np.random.default_rng(162)
-    rows = [judged(photographed(np.random.default_rng([162, k])), rng) for k in range(40)]
+    rows = [judged([photographed(np.random.default_rng([162, k]))], k) for k in range(40)]
     found = [row for row in rows if "refused" not in row and abs(row["contrast"]) > ALIKE]
     blades = [blade for row in found for blade in row["blades"]]
     assert len(blades) > 36
