@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.errors import InputError
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
 from scissorcal.vision.blade.modes import (
@@ -22,6 +23,7 @@ from scissorcal.vision.blade.view import View
 Array = NDArray[np.float64]
 
 _ANCHORS, _STRETCHES = 14, 30
+_LEAST_HALVED = 0.4
 _WAVY = 0.008
 """Largest distance of a side's points from a parabola, as a share of the blade's length."""
 
@@ -80,6 +82,8 @@ def measure_blade(
     back = find_border(
         light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
     )
+    for border, what in ((edge, "edge"), (back, "back")):
+        _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
     seen = SeenBorders(edge, back, find_hole(light, view, parts))
     frame = _framed(view, parts, seen)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
@@ -111,6 +115,19 @@ def measure_blade(
         view.to_pixels(pivot[None])[0],
         view.to_pixels((pivot + 0.5 * length * axis)[None])[0],
     )
+
+
+def _refuse_unhalved(view: View, parts: BladeParts, border: BorderPoints, what: str) -> None:
+    """Refuse a side that is hardly seen where the centreline halves the blade."""
+    station = parts.frame(view.to_sheet(border.pixels[border.softness < SHARP]))[:, 0]
+    along = halving_stations(parts)
+    here = station[(station > along[0]) & (station < along[-1])]
+    if len(here) < _ANCHORS or np.ptp(here) < _LEAST_HALVED * (along[-1] - along[0]):
+        first, last = (100.0 * share for share in parts.halved)
+        raise InputError(
+            f"{what} has a clear border between {first:.0f} and {last:.0f} % of its length, where "
+            "the centreline halves the blade. Open scissors wider, and light all of it evenly."
+        )
 
 
 def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
