@@ -110,6 +110,19 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit friction by load": ("at most", TORQUE + "error of its mean over the scene, share of it"),
     "fit clear edge": ("at most", f"{_EDGE}: share of points that are neither edge nor nick"),
     "fit photographs agree": ("at most", f"{_EDGE}: sds between photographs, or share of length"),
+    "fit residual against claimed sd": (
+        "at most",
+        f"{_INTERVALS} of the edge: mean residual of an eighth of the edge in sds that are claimed "
+        "there",
+    ),
+    "fit blade lengths": (
+        "at most",
+        f"{_EDGE}: difference of a pair's blades in length, in sds of equally long ones",
+    ),
+    "fit lamps apart": (
+        "at least",
+        f"{_EDGE}: whether a shadow taken for metal would show: angle between lamps, deg",
+    ),
     "fit sizes of the errors": ("", f"{_INTERVALS} of the edge"),
     "fit.camera uncertainty": ("", f"{_CAMERA}: whether their error is known"),
     "fit.camera focal length": ("at most", f"{_CAMERA}: sd of the focal length, share of it"),

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from scissorcal.calibration.edge.result import SeenOpening
+from scissorcal.calibration.edge.result import SeenPair
 from scissorcal.calibration.result import (
     Predictive,
     Proposal,
@@ -54,7 +54,7 @@ def results() -> dict[str, Result]:
             selection="The cheapest.",
         ),
         "cut": replace(cut, predictive=predictive),
-        "blade": replace(blade_result(), openings=(SeenOpening("a.jpg", 0.7),)),
+        "blade": replace(blade_result(), openings=(SeenPair("a.jpg", 0.7),)),
         "camera": camera_fit(),
         "imported camera": imported_camera(),
         "plate": replace(plate_fit(), ambiguity=float("inf")),

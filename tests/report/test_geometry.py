@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.edge.result import SeenOpening
+from scissorcal.calibration.edge.result import SeenPair
 from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.recipe.requirements import GeometryKind
@@ -200,7 +200,7 @@ def test_an_imported_camera_and_an_edge_without_scale(tmp_path: Path) -> None:
 def test_both_blades_of_open_scissors_have_parts_of_their_own(tmp_path: Path) -> None:
     (one,) = blade_result().blades
     pair = tuple(replace(one, name=name) for name in ("left", "right"))
-    openings = (SeenOpening("blade-1.jpg", np.radians(40.0)), SeenOpening("blade-2.jpg", 0.0))
+    openings = (SeenPair("blade-1.jpg", np.radians(40.0)), SeenPair("blade-2.jpg", 0.0))
     found = Geometry(blade=replace(blade_result(), blades=pair, openings=openings))
     page = report_of(tmp_path, found).page
     assert len(set(page.ids)) == len(page.ids)

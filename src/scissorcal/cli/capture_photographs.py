@@ -88,6 +88,10 @@ BladeSource = Annotated[
     Literal["sim"] | None,
     typer.Option("--camera", help="sim: three rendered photographs of the recipe's virtual blade."),
 ]
+OTHER_LAMP = (
+    "Photographs under one lamp share its shadow, and their agreement is no evidence: take others "
+    "with the scissors turned by 90 deg, or the lamp elsewhere."
+)
 Both = Annotated[
     bool, typer.Option("--both", help="Open scissors: both blades in each photograph.")
 ]
@@ -124,7 +128,7 @@ def blade(
 
     Lay the blade flat inside the markers, its pivot hole on the small cross, its tip to the right
     and its edge towards the lower side. Three photographs from slightly different places are
-    enough.
+    enough. Of open scissors (--both) take four, turning them by 90 deg under the lamp after each.
 
     \b
     Example:
@@ -160,6 +164,7 @@ def blade(
         else None,
         lambda workspace, photographs: capture_blade(workspace, list(photographs), setup, note),
         of=lambda done: "open scissors" if both else "the blade",
+        last_line=lambda done: f"\n{OTHER_LAMP}" if both else "",
     )
 
 

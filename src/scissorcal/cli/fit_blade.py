@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from scissorcal.cli.output import table
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.edge.result import BladeFit, BladeResult
+    from scissorcal.calibration.edge.result import BladeFit, BladeResult, SeenPair
     from scissorcal.workday.runs.fit import FitOutcome
 
 
@@ -29,11 +29,19 @@ def text(outcome: "FitOutcome") -> str:
     lines = ["blade: nothing changed since the last fit"] if outcome.cached else []
     for fit in outcome.result.blades:
         lines += [_head(fit), _places(fit), *_nicks(fit), *fit.notes[:-1]]
-    lines += [
-        f"{seen.source}: open by {57.29578 * seen.opening_rad:.2f} deg"
-        for seen in outcome.result.openings
-    ]
+    lines += [_pair(seen) for seen in outcome.result.openings]
     return "\n".join(lines)
+
+
+def _pair(seen: "SeenPair") -> str:
+    from math import exp
+
+    text = f"{seen.source}: open by {57.29578 * seen.opening_rad:.2f} deg"
+    if seen.length_ratio_sd > 0.0:
+        text += f", one blade {100.0 * exp(-abs(seen.length_log_ratio)):.1f} % as long as the other"
+    if seen.lamp_deg is not None:
+        text += f", shadow towards {seen.lamp_deg:.0f} deg"
+    return text
 
 
 def _head(fit: "BladeFit") -> str:

@@ -67,6 +67,16 @@ class BladePriors(PrintPriors):
     scale_sd_percent: _SizeOrNone = Field(
         default=0.5, description="error of a scale that is stated where no mat is seen (--scale)"
     )
+    tilt_sd_deg: _SizeOrNone = Field(
+        default=4.0,
+        description="tilt of the camera about each axis where no mat shows it: held by hand above "
+        "the sheet",
+    )
+    pair_length_sd_percent: _SizeOrNone = Field(
+        default=1.0,
+        description="difference of the two blades of a pair in length: ground to one length, worn "
+        "and sharpened apart",
+    )
     pivot_sd_px: _SizeOrNone = Field(
         default=1.0, description="error of a pivot that is stated where no hole shows it (--pivot)"
     )

@@ -73,6 +73,7 @@ def measurement(rng, nicks=(), *, metric=True, source="a.jpg"):
         0.003 * unit,
         parts,
         border,
+        border,
         metric,
         "As made.",
         np.zeros(2),
@@ -247,6 +248,7 @@ def test_a_fit_says_where_the_edge_is_over_the_scene(fit):
     assert {v.check: v.status for v in fit.verdicts} == {
         "clear edge": "pass",
         "photographs agree": "pass",
+        "residual against claimed sd": "pass",
     }
 
 

@@ -114,6 +114,14 @@ def test_edge_side_up_selects_the_other_side():
     assert abs(np.median(one.offset - true_edge(SHAPE, one.station))) < 2e-5
 
 
+def test_a_blade_that_is_not_seen_where_it_is_halved_is_refused(measured):
+    photo = measured[True]
+    parts = replace(lone_blade(photo.outline, "blade.jpg"), halved=(0.795, 0.7999))
+    light = linear_light(photo.photo.grey)
+    with pytest.raises(InputError, match=r"blade\.jpg: too little of the blade's edge .* halves"):
+        measure_blade(light, photo.view, parts, "blade.jpg")
+
+
 def test_a_given_pivot_replaces_the_hole():
     photo = blade_photo(replace(SHAPE, hole_m=0.0))
     with pytest.raises(InputError, match=r"no round pivot hole .* --pivot"):

@@ -1,6 +1,9 @@
 """A blade in a workspace: photographs in, a fit out, nothing half-written."""
 
+import cv2
+import numpy as np
 import pytest
+from benchmarks.scissors import photographed
 
 from scissorcal.calibration.edge.result import BladeResult
 from scissorcal.calibration.store import load
@@ -12,6 +15,7 @@ from scissorcal.workday.photographs import BladeSetup, photo_captures
 from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import create_workspace
+from tests.vision.blade.scenes import scissors_photo
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +83,31 @@ def test_both_blades_of_virtual_scissors(tmp_path):
     result = outcome.result
     assert [blade.name for blade in result.blades] == ["left", "right"]
     assert 0.45 < result.openings[0].opening_rad < 0.95
+
+
+def test_closed_scissors_are_refused_at_the_capture_and_nothing_is_kept(tmp_path):
+    lab = create_workspace(tmp_path / "closed", "paper-80gsm")
+    path = tmp_path / "closed.png"
+    cv2.imwrite(str(path), scissors_photo(0.0, mat=False).image)
+    told = []
+    with pytest.raises(InputError, match=r"it is closed.*Nothing was kept"):
+        capture_blade(lab, [path], BladeSetup(both=True, mat=False), told.append)
+    assert "Open it by 30 to 80 deg" in told[0]
+    assert not list(lab.captures_dir.glob("blade-*"))
+
+
+def test_a_pair_has_verdicts_on_its_lengths_and_its_lamps(tmp_path):
+    lab = create_workspace(tmp_path / "pair", "paper-80gsm")
+    paths = []
+    for index, lamp in ((0, 40.0), (3, 60.0)):
+        pair = photographed(np.random.default_rng([163, index]), tilt_deg=2.0, lamp_deg=lamp)
+        paths.append(tmp_path / f"{index}.png")
+        cv2.imwrite(str(paths[-1]), pair.photo.image)
+    setup = BladeSetup(both=True, mat=False, length_mm=78.0)
+    capture_blade(lab, paths, setup, lambda _: None)
+    (outcome,) = fit_workspace(lab, ["blade"], effort="draft")
+    checks = {verdict.check for verdict in outcome.result.verdicts}
+    assert {"residual against claimed sd", "blade lengths", "lamps apart"} <= checks
+    again = load(Engine.of(lab).file("fit blade"), BladeResult)
+    assert again.openings == outcome.result.openings
+    assert again.pair_verdicts == outcome.result.pair_verdicts

@@ -6,37 +6,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.edge.candidates import (
-    MOST_EVALUATIONS,
-    EdgeComparison,
-    Progress,
-    compare_edges,
-)
+from scissorcal.calibration.edge.candidates import EdgeComparison, Progress, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.edge.checks import blade_verdicts
 from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort, SamplingStatus
+from scissorcal.inference import Effort
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.blade.measure import BladeMeasurement
+from scissorcal.vision.blade.modes import smooth_slope
 
 Array = NDArray[np.float64]
 
-SCOPE = "fit.blade"
 PLACES = 41
-MOST_SPOILT = 0.15
-MOST_DISAGREEMENT = 3.5
-MOST_APART = 0.005
-"""Shares of the blade's length by which photographs of one blade may differ."""
-
-UNTRUSTED = (
-    SamplingStatus.HEAVY_WEIGHTS,
-    SamplingStatus.DISAGREEING,
-    SamplingStatus.BUDGET_USED_UP,
-    SamplingStatus.STUCK,
-)
 HEIGHT_DRAWS = 400
 
 
@@ -98,7 +82,8 @@ def fit_blade(
         (),
         _notes(sized, best, metric),
     )
-    return replace(fit, verdicts=_verdicts(fit, best, effort))
+    verdicts = blade_verdicts(fit, best.best, best.status, best.sentence, effort)
+    return replace(fit, verdicts=verdicts)
 
 
 def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
@@ -126,16 +111,23 @@ def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
 
 
 def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
-    """The measurement in metres, or in blade lengths where nobody knows its size."""
+    """The measurement in metres, or in blade lengths where nobody knows its size.
+
+    The error of the length that gives the size stretches the edge along and across: a mode.
+    """
     if one.metric:
         return one
-    factor = (length_m or 1.0) / one.length
+    factor = (length_m or 1.0) / (one.unit_length or one.length)
+    station, offset = one.station * factor, one.offset * factor
+    slope = smooth_slope(station, offset) if len(station) > 4 else 0.0
+    size = one.unit_length_sd * (offset - station * slope)
     return replace(
         one,
-        station=one.station * factor,
-        offset=one.offset * factor,
+        station=station,
+        offset=offset,
         sd=one.sd * factor,
-        modes=one.modes * factor,
+        modes=np.column_stack([one.modes * factor, size]),
+        mode_names=(*one.mode_names, "size"),
         length=one.length * factor,
         hole_radius=one.hole_radius * factor,
         metric=length_m is not None,
@@ -201,66 +193,6 @@ def _rows(
     return tuple(rows)
 
 
-def _verdicts(fit: BladeFit, best: EdgeComparison, effort: Effort) -> tuple[Verdict, ...]:
-    scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
-    spoilt = max(row.spoilt_share for row in fit.photographs)
-    worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
-    checks = [
-        judge(
-            scope,
-            "clear edge",
-            spoilt,
-            MOST_SPOILT,
-            f"In {worst} {100 * spoilt:.1f} % of the edge's points belong neither to a smooth edge "
-            f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
-        )
-    ]
-    checks.append(_agreement(fit, best, scope))
-    if best.status in UNTRUSTED:
-        checks.append(
-            Verdict(
-                scope,
-                "sizes of the errors",
-                "fail",
-                None,
-                None,
-                f"{best.sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
-                f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
-            )
-        )
-    return tuple(checks)
-
-
-def _agreement(fit: BladeFit, best: EdgeComparison, scope: str) -> Verdict:
-    """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
-    check = "photographs agree"
-    if len(fit.photographs) < 2:
-        why = "One photograph does not show how far others of the same blade would agree."
-        return not_evaluated(scope, check, why)
-    apart = best.best.between_m / fit.belief.edge.length_m
-    if apart > MOST_APART:
-        return judge(
-            scope,
-            check,
-            apart,
-            MOST_APART,
-            f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
-            f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
-            "above where there is no mat.",
-        )
-    spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
-    scale = [max(row.away_sd, spread) for row in fit.photographs]
-    value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-    return judge(
-        scope,
-        check,
-        float(value),
-        MOST_DISAGREEMENT,
-        f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
-        f"away; {MOST_DISAGREEMENT:g} are allowed.",
-    )
-
-
 def _notes(
     measured: Sequence[BladeMeasurement], best: EdgeComparison, metric: bool
 ) -> tuple[str, ...]:
@@ -270,9 +202,11 @@ def _notes(
             "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
             "length (--length-mm) or the scale (--scale) to make it an edge that can be used."
         )
+    first, last = (100.0 * share for share in measured[0].parts.halved)
     notes.append(
-        "The centreline is the line through the pivot that halves the blade between 30 and 80 % "
-        "of its length; the rig's opening must count from where the blades' centrelines meet."
+        f"The centreline is the line through the pivot that halves the blade between {first:.0f} "
+        f"and {last:.0f} % of its length; the rig's opening must count from where the blades' "
+        "centrelines meet."
     )
     notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)

@@ -19,6 +19,9 @@ FAMILIES: tuple[Family, ...] = ("line", "arc", "cubic", "spline")
 KNOT_SHARE = 0.1
 """Distance of the spline's knots, in shares of the measured length."""
 
+MOVING = ("tilt", "pivot", "centreline", "size")
+"""Common errors that move, turn or stretch an edge as a whole."""
+
 SEARCH_EVALUATIONS = 150
 """Evaluations of the likelihood with its gradient that each start of a search may take."""
 
@@ -43,15 +46,31 @@ class CellData:
         self.start = float(self.station.min())
         self.apart = np.abs(self.station[:, None] - self.station[None, :])
         same = self.photo[:, None] == self.photo[None, :]
-        self.known = self._moved_together(photographs)
+        self._fixed, self._moving = self._moved_together(photographs)
         tilt = self.station / length_m
         self.between = same * (1.0 + np.outer(tilt, tilt))
         spacing = float(np.median(np.diff(photographs[0].station)))
         self.streaks = same * np.exp(-self.apart / (3.0 * spacing))
 
-    def _moved_together(self, photographs: tuple[EdgeCells, ...]) -> Array:
+    def known(self, columns: Array) -> Array:
+        """Covariance (n, n) of the common errors, for edges of the family ``columns`` (n, k).
+
+        What moves, turns or stretches an edge as a whole makes it another edge of its family: of
+        such a column the projection on the family counts, in each photograph. What lies outside is
+        noise of the slope by which it was computed, or of second order; kept, least squares would
+        take the points' own noise for a measurement of the pivot or of the tilt.
+        """
+        moving = np.zeros_like(self._moving)
+        for number in range(int(self.photo[-1]) + 1):
+            here = self.photo == number
+            weights = np.linalg.lstsq(columns[here], self._moving[here], rcond=None)[0]
+            moving[here] = columns[here] @ weights
+        return np.asarray(self._fixed @ self._fixed.T + moving @ moving.T)
+
+    def _moved_together(self, photographs: tuple[EdgeCells, ...]) -> tuple[Array, Array]:
+        """Columns (n, k) of common errors: those that stay as they are, and those of `MOVING`."""
         shared: dict[tuple[str, int], Array] = {}
-        own: list[Array] = []
+        own: list[tuple[str, Array]] = []
         for number, cells in enumerate(photographs):
             here = self.photo == number
             seen: dict[str, int] = {}
@@ -63,9 +82,11 @@ class CellData:
                     seen[name] += 1
                     shared[key] = shared.get(key, np.zeros_like(full)) + full
                 else:
-                    own.append(full)
-        columns = np.stack([*shared.values(), *own], axis=1)
-        return np.asarray(columns @ columns.T)
+                    own.append((name, full))
+        fixed = [*shared.values(), *(column for name, column in own if name not in MOVING)]
+        moving = [column for name, column in own if name in MOVING]
+        nothing = np.zeros((len(self.station), 0))
+        return tuple(np.stack(c, axis=1) if c else nothing for c in (fixed, moving))  # type: ignore[return-value]
 
     def disagreement(self) -> tuple[float, float]:
         """Rms of what photographs leave of one cubic: of their shifts and tilts, and within each.
@@ -146,7 +167,8 @@ class EdgeEvidence:
         self.middle = np.array([prior.normal()[0] + np.log(unit) for _, unit, prior in rows])
         self.sd = np.array([prior.log_sd for _, _, prior in rows])
         columns = basis.columns
-        self._fixed: Array = data.known + columns @ basis.loose @ columns.T
+        self._known = data.known(columns)
+        self._fixed: Array = self._known + columns @ basis.loose @ columns.T
         self._bent = None if basis.bent is None else columns @ basis.bent @ columns.T
 
     def problem(self) -> Problem:
@@ -213,7 +235,7 @@ class EdgeEvidence:
     def covariances(self, u: Array) -> tuple[Array, Array]:
         """Covariance (n, n) of the cells about the edge, and the edge's prior (k, k)."""
         prior = self.basis.prior(float(np.exp(u[-1])) if self._bent is not None else 0.0)
-        return self._about_edge(u, self.data.known)[0], prior
+        return self._about_edge(u, self._known)[0], prior
 
     def _total(self, u: Array) -> tuple[Array, Array]:
         """Covariance of the cells, the edge integrated out, and the roughness's part of it."""

@@ -106,11 +106,22 @@ class BladeFit:
 
 
 @dataclass(frozen=True)
-class SeenOpening:
-    """The angle between both blades' centrelines in one photograph, 0 where they are closed."""
+class SeenPair:
+    """What one photograph shows of a pair as a whole.
+
+    ``opening_rad`` is the angle between both blades' centrelines, 0 where they are closed.
+    ``length_log_ratio`` is the logarithm of the ratio of their lengths as seen, with the standard
+    deviation that a pair of one length has (0 where it was not measured), ``tilt_deg`` the least
+    tilt of the camera that would explain it. ``lamp_deg`` is where the shadow falls, counted from
+    between the tips, None where none is seen.
+    """
 
     source: str
     opening_rad: float
+    length_log_ratio: float = 0.0
+    length_ratio_sd: float = 0.0
+    tilt_deg: float = 0.0
+    lamp_deg: float | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,10 +134,11 @@ class BladeResult(Result):
     what = "blade"
 
     blades: tuple[BladeFit, ...]
-    openings: tuple[SeenOpening, ...]
+    openings: tuple[SeenPair, ...]
     inputs_hash: str
     sources: tuple[str, ...]
     pictures: tuple[str, ...] = ()
+    pair_verdicts: tuple[Verdict, ...] = ()
 
     @property
     def belief(self) -> EdgeBelief:
@@ -149,8 +161,9 @@ class BladeResult(Result):
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """The verdicts on all blades."""
-        return tuple(verdict for blade in self.blades for verdict in blade.verdicts)
+        """The verdicts on all blades, and on both together."""
+        own = (verdict for blade in self.blades for verdict in blade.verdicts)
+        return (*own, *self.pair_verdicts)
 
 
 def blade_facts(fit: BladeFit) -> dict[str, Any]:

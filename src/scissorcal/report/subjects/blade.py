@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.calibration.edge.result import Band, BladeFit, BladeResult
+from scissorcal.calibration.edge.result import Band, BladeFit, BladeResult, SeenPair
 from scissorcal.report.numbers import finite, short, significant
 from scissorcal.report.panel import (
     Axis,
@@ -16,6 +16,7 @@ from scissorcal.report.panel import (
     Panel,
     Picture,
     Row,
+    Value,
     absent,
     band,
     count,
@@ -65,17 +66,35 @@ def blade_panels(result: BladeResult, files: Sequence[Path]) -> tuple[Panel, ...
                     words("opening", "closed")
                     if not finite(seen.opening_rad)
                     else number("opening", np.degrees(seen.opening_rad), "°"),
+                    *_lengths(seen),
                 ),
             )
             for seen in result.openings
         )
-        caption = "Angle between the centrelines of both blades."
+        caption = (
+            "Angle between the centrelines of both blades; the shorter one's share of the longer "
+            "one's length as seen, with the least tilt of the camera that would explain it; where "
+            "the shadow falls, counted from between the tips."
+        )
         panels.append(Panel(f"{PART}-openings", PART, "Openings", rows=rows, caption=caption))
     if files:
         pictures = tuple(_picture(result, path) for path in files)
         title = "The edge over the photographs"
         panels.append(Panel(f"{PART}-pictures", PART, title, pictures=pictures))
     return tuple(panels)
+
+
+def _lengths(seen: SeenPair) -> tuple[Value, ...]:
+    """Both blades' lengths against each other, and the lamp, where they were measured."""
+    if not seen.length_ratio_sd > 0.0:
+        return ()
+    ratio = 100.0 * float(np.exp(-abs(seen.length_log_ratio)))
+    lamp = seen.lamp_deg
+    return (
+        number("shorter blade", ratio, "%", sd=ratio * seen.length_ratio_sd),
+        number("tilt", seen.tilt_deg, "°", digits=2),
+        words("shadow", "not seen") if lamp is None else number("shadow", lamp, "°", digits=3),
+    )
 
 
 def _shape(fit: BladeFit, where: str, which: str) -> Panel:
@@ -279,8 +298,9 @@ def _picture(result: BladeResult, path: Path) -> Picture:
     return Picture(
         path.name,
         f"The edge over {name}",
-        "Orange: outline of the blade; green: fitted edge, with residuals enlarged as written on "
-        "it; cross and line: pivot and centreline; rings: nicks.",
+        "Orange: outline of what is dark, with shadows; violet: back and end of the metal; green: "
+        "fitted edge, with residuals enlarged as written on it; cross and line: pivot and "
+        "centreline; rings: nicks.",
         f"Photograph {name} with the outline of the blade, the fitted edge, the pivot and the "
         f"centreline drawn on it; {nicks or 'no'} nick{'' if nicks == 1 else 's'} marked.",
         WIDEST_PX,

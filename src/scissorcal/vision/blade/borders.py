@@ -1,21 +1,34 @@
 """The borders of a blade in the picture: its edge, its back, the pivot's hole."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.parts import BladeParts
-from scissorcal.vision.blade.profile import Crossings, Light, crossings, steepest
+from scissorcal.vision.blade.profile import (
+    Crossings,
+    Light,
+    crossings,
+    outermost_sharp,
+    steepest,
+)
 from scissorcal.vision.blade.view import View
 
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 3000
 _SHADOW_SEARCH = 0.05
+_LEAST_MERIT, _INNER_MERIT = 0.35, 0.6
+"""Merit below which a back is taken as followed; merit of the inner of two lines, over that of the
+outer one, from which it is the metal's: under a small lamp a shadow's border is sharp too."""
+
+_SHARP_SHARE = 1.0 / 300.0
+"""Blur of a border in focus as a share of the blade's length; a pixel where that is less."""
 _LEAST_GOOD = {"edge": 0.75, "back": 0.3}
-_LEAST_IN_SHADOW = 0.4
+_LEAST_IN_SHADOW = {"edge": 0.4, "back": 0.2}
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
 
 
@@ -61,23 +74,26 @@ def find_border(
     stations = np.linspace(s[0], s[-1], count)
     per_unit = count / max(s[-1] - s[0], 1e-12)
     offsets = np.interp(stations, s, e)
-    outward = np.sign(np.median(e))
-    shadowed = what == "edge" and search > _SHADOW_SEARCH
-    for soft, far in ((1.2 if shadowed else 2.0, search), (1.5, 0.012)):
-        points, normals = _with_normals(view, parts, stations, offsets, outward)
-        reach = float(np.clip(far * parts.length * per_unit, 6.0, 80.0))
-        shift = steepest(light, points, normals, reach, soft, innermost=shadowed and far == search)
-        offsets = offsets + outward * shift / per_unit
-    points, normals = _with_normals(view, parts, stations, offsets, outward)
-    found = crossings(light, points, normals, 6.0)
-    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
-    if blur > 1.6:
-        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
-        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    shadowed = search > _SHADOW_SEARCH
+    rough_side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
+    if shadowed:
+        lines = [
+            rough_side.followed(light, search, "innermost"),
+            rough_side.followed(light, search, "outermost sharp"),
+        ]
+        inner, outer = (_crossed(light, *line) for line in lines)
+        best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
+        if what == "back" and _merit(best) < _LEAST_MERIT:
+            return _as_followed(lines[-1], in_focus(parts, per_unit))
+        points, normals, found, blur = best
+    else:
+        points, normals, found, blur = _crossed(
+            light, *rough_side.followed(light, search, "steepest")
+        )
     good = found.good & _alike(found)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
-    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD[what]):
+    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[what]:
         raise InputError(
             f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
             "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
@@ -87,6 +103,69 @@ def find_border(
     return BorderPoints(
         seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
     )
+
+
+@dataclass(frozen=True)
+class _Rough:
+    """A side of the blade, roughly: stations and offsets of points about a pixel apart."""
+
+    view: View
+    parts: BladeParts
+    stations: Array
+    offsets: Array
+    outward: float
+    per_unit: float
+
+    def followed(
+        self, light: Light, search: float, kind: Literal["steepest", "innermost", "outermost sharp"]
+    ) -> tuple[Array, Array]:
+        """Points (n, 2) on a border near this side and normals there, both in the picture."""
+        length, offsets = self.parts.length, self.offsets
+        sharp = in_focus(self.parts, self.per_unit)
+        for first, far in ((True, search), (False, 0.012)):
+            points, normals = _with_normals(
+                self.view, self.parts, self.stations, offsets, self.outward
+            )
+            reach = float(np.clip(far * length * self.per_unit, 6.0, 80.0))
+            if kind == "outermost sharp":
+                shift = outermost_sharp(light, points, normals, reach, sharp)
+            else:
+                inner = kind == "innermost" and first
+                soft = 1.5 if not first else 1.2 if inner else 2.0
+                shift = steepest(light, points, normals, reach, soft, innermost=inner)
+            offsets = offsets + self.outward * shift / self.per_unit
+        return _with_normals(self.view, self.parts, self.stations, offsets, self.outward)
+
+
+def _crossed(light: Light, points: Array, normals: Array) -> tuple[Array, Array, Crossings, float]:
+    """A line of points and normals with its crossings, wide enough for their blur, and that."""
+    found = crossings(light, points, normals, 6.0)
+    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    if blur > 1.6:
+        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
+        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    return points, normals, found, blur
+
+
+def _merit(line: tuple[Array, Array, Crossings, float]) -> float:
+    """How much of a line is one clear border, divided by its blur: a shadow's is soft."""
+    _, _, found, blur = line
+    return float(np.mean(found.good & _alike(found))) / max(blur, 1.0)
+
+
+def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
+    """A line as it was followed, where metal, shadow and sheet make no single step to be fitted.
+
+    It is good to about the blur ``soft`` of a border in focus.
+    """
+    points, normals = line
+    one = np.ones(len(points))
+    return BorderPoints(points, normals, soft * one, one, soft, 1.0)
+
+
+def in_focus(parts: BladeParts, per_unit: float) -> float:
+    """Blur in pixels of a border in focus, of a blade that has ``per_unit`` pixels a unit."""
+    return max(_SHARP_SHARE * parts.length * per_unit, 1.0)
 
 
 def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -> None:

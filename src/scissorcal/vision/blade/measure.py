@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.errors import InputError
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
 from scissorcal.vision.blade.modes import (
@@ -22,6 +23,7 @@ from scissorcal.vision.blade.view import View
 Array = NDArray[np.float64]
 
 _ANCHORS, _STRETCHES = 14, 30
+_LEAST_HALVED = 0.4
 _WAVY = 0.008
 """Largest distance of a side's points from a parabola, as a share of the blade's length."""
 
@@ -35,7 +37,9 @@ class BladeMeasurement:
     their common errors, one standard deviation per column: the mapping, the print's scale, the
     pivot, the centreline, the tone of blurred borders, the metal's grain; ``mode_names``
     say which. ``softness`` (n,) is the blur of each point against the usual one. ``pivot_px`` and
-    ``axis_px`` are for pictures.
+    ``axis_px`` are for pictures. ``unit_length`` is the length that a stated one
+    replaces, and 1 where none is stated: that of the pair for open scissors (None: the blade's),
+    with the relative error ``unit_length_sd``.
     """
 
     source: str
@@ -49,10 +53,13 @@ class BladeMeasurement:
     hole_radius: float
     parts: BladeParts
     edge: BorderPoints
+    back: BorderPoints
     metric: bool
     uncertainty: str
     pivot_px: Array
     axis_px: Array
+    unit_length: float | None = None
+    unit_length_sd: float = 0.0
 
 
 def measure_blade(
@@ -75,6 +82,8 @@ def measure_blade(
     back = find_border(
         light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
     )
+    for border, what in ((edge, "edge"), (back, "back")):
+        _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
     seen = SeenBorders(edge, back, find_hole(light, view, parts))
     frame = _framed(view, parts, seen)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
@@ -100,11 +109,25 @@ def measure_blade(
         frame.radius,
         replace(parts, pivot=pivot, axis=axis, up=up, length=length),
         edge,
+        back,
         view.metric,
         view.uncertainty,
         view.to_pixels(pivot[None])[0],
         view.to_pixels((pivot + 0.5 * length * axis)[None])[0],
     )
+
+
+def _refuse_unhalved(view: View, parts: BladeParts, border: BorderPoints, what: str) -> None:
+    """Refuse a side that is hardly seen where the centreline halves the blade."""
+    station = parts.frame(view.to_sheet(border.pixels[border.softness < SHARP]))[:, 0]
+    along = halving_stations(parts)
+    here = station[(station > along[0]) & (station < along[-1])]
+    if len(here) < _ANCHORS or np.ptp(here) < _LEAST_HALVED * (along[-1] - along[0]):
+        first, last = (100.0 * share for share in parts.halved)
+        raise InputError(
+            f"{what} has a clear border between {first:.0f} and {last:.0f} % of its length, where "
+            "the centreline halves the blade. Open scissors wider, and light all of it evenly."
+        )
 
 
 def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
@@ -118,15 +141,14 @@ def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
     ]
     axis, up = parts.axis, parts.up
     for _ in range(3):
-        axis, up = _halved(sides, pivot, axis, up, parts.length)
+        axis, up = _halved(sides, pivot, axis, up, halving_stations(parts))
     return BladeFrame(pivot, axis, up, radius)
 
 
 def _halved(
-    sides: list[Array], pivot: Array, axis: Array, up: Array, length: float
+    sides: list[Array], pivot: Array, axis: Array, up: Array, along: Array
 ) -> tuple[Array, Array]:
     """The axis turned so that it halves the way between both sides of the blade."""
-    along = halving_stations(length)
     middle = np.zeros_like(along)
     for side in sides:
         away = side - pivot

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, BladeParts
+from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.view import View
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 SHARP = 1.4
 """Largest blur, relative to the median, of points that determine the centreline."""
 
-_STRETCHES, _NEIGHBOURS = 40, 5
+_ROUNDS = 20
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class BladeFrame:
         return away @ self.axis, away @ self.up
 
 
-def halving_stations(length: float) -> Array:
+def halving_stations(parts: BladeParts) -> Array:
     """Stations (201,) over which the centreline halves the blade."""
-    return np.linspace(BACK_FIRST, BACK_LAST, 201) * length
+    return np.linspace(*parts.halved, 201) * parts.length
 
 
 def edge_modes(
@@ -57,10 +57,10 @@ def edge_modes(
     of ``seen.edge``; names say which source each belongs to. They come from one linear response:
     a source moves border points and pivot on the sheet; the centreline, which halves the blade,
     turns after them; and a point that moves along the edge changes the offset by the edge's slope.
-    That slope is a smooth one, so that no column carries the noise of the points.
+    That slope is a cubic's, so that no column carries the noise of the points.
     """
     edge, back = view.to_sheet(seen.edge.pixels), view.to_sheet(seen.back.pixels)
-    response = _Response.of(frame, parts.length, (edge, seen.edge), (back, seen.back))
+    response = _Response.of(frame, parts, (edge, seen.edge), (back, seen.back))
     outward = _Outward.of(view, seen)
     rows: list[Array] = []
     names: list[str] = []
@@ -99,12 +99,14 @@ class _Side:
     weight: Array
 
     @classmethod
-    def of(cls, frame: BladeFrame, length: float, points: Array, border: BorderPoints) -> "_Side":
+    def of(
+        cls, frame: BladeFrame, parts: BladeParts, points: Array, border: BorderPoints
+    ) -> "_Side":
         station, offset = frame.of(points)
         slope = smooth_slope(station, offset)
         sharp = np.flatnonzero(border.softness < SHARP)
         weight = np.zeros(len(points))
-        weight[sharp] = _pull(station[sharp], halving_stations(length))
+        weight[sharp] = _pull(station[sharp], halving_stations(parts))
         return cls(slope, station + slope * offset, weight)
 
     def shifted(self, moves: Array, frame: BladeFrame) -> Array:
@@ -124,11 +126,11 @@ class _Response:
     def of(
         cls,
         frame: BladeFrame,
-        length: float,
+        parts: BladeParts,
         edge: tuple[Array, BorderPoints],
         back: tuple[Array, BorderPoints],
     ) -> "_Response":
-        return cls(frame, _Side.of(frame, length, *edge), _Side.of(frame, length, *back))
+        return cls(frame, _Side.of(frame, parts, *edge), _Side.of(frame, parts, *back))
 
     @property
     def swing(self) -> Array:
@@ -212,7 +214,7 @@ def _mapping_errors(view: View) -> list[tuple[str, Array]]:
     for column, place in enumerate(used):
         values = view.values.copy()
         values[order[used]] += root[:, column]
-        moved.append(("shared mapping" if place < view.shared else "mapping", values))
+        moved.append(("shared mapping" if place < view.shared else view.own_error, values))
     return moved
 
 
@@ -251,22 +253,23 @@ def _turn_sd(s: Array, e: Array) -> float:
 
 
 def smooth_slope(station: Array, offset: Array) -> Array:
-    """Slope (n,) of a side of the blade, robust against noise, nicks and glare.
+    """Slope (n,) of a side of the blade: that of a cubic, robust against nicks and glare.
 
-    Medians over short stretches, median-filtered over five neighbours: features shorter than two
-    stretches are removed, those longer than ten are kept.
+    Any slope that follows single stretches of the points carries their noise into the modes, and
+    where a mode moves points along the edge by much, as a tilt does, least squares would then take
+    that noise for a measurement of the mode.
     """
-    from scipy.ndimage import gaussian_filter1d, median_filter
-
-    order = np.argsort(station)
-    parts = [part for part in np.array_split(order, _STRETCHES) if len(part)]
-    middles = np.array([np.median(station[part]) for part in parts])
-    levels = np.array([np.median(offset[part]) for part in parts])
-    trend = np.polyfit(middles, levels, 1) if len(parts) > 1 else np.zeros(2)
-    # about its trend, since filters bend a steep line at its ends
-    rest = median_filter(levels - np.polyval(trend, middles), size=_NEIGHBOURS, mode="nearest")
-    slope = trend[0] + np.gradient(gaussian_filter1d(rest, 1.0, mode="nearest"), middles)
-    return np.asarray(np.interp(station, middles, slope))
+    middle, reach = float(station.mean()), max(0.5 * float(np.ptp(station)), 1e-30)
+    design = np.vander((station - middle) / reach, 4)
+    weight = np.ones_like(offset)
+    curve: Array = np.zeros(4)
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        curve = np.asarray(np.linalg.lstsq(design * root[:, None], offset * root, rcond=None)[0])
+        rest = offset - design @ curve
+        spread = 1.4826 * float(np.median(np.abs(rest))) + 1e-30
+        weight = np.maximum(1.0 - np.minimum(np.abs(rest) / (4.7 * spread), 1.0) ** 2, 0.0) ** 2
+    return np.asarray(np.polyval(np.polyder(curve), (station - middle) / reach) / reach)
 
 
 def _pull(station: Array, along: Array) -> Array:

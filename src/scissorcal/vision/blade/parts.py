@@ -30,7 +30,9 @@ class BladeParts:
     ``pivot`` (2,) and ``axis`` (2,), a unit vector towards the tip; ``up`` is the unit vector from
     the edge to the back. ``edge`` and ``back`` (n, 2) are points along both in order of station,
     ``hole`` (k, 2) the pivot hole's outline, empty where the pivot was given or found otherwise.
-    ``length`` is the tip's station. ``pivot_sd`` is how well a pivot without a hole is known.
+    ``length`` is the tip's station, known to ``tip_sd``. ``pivot_sd`` is how well a pivot without a
+    hole is known. ``end`` (m, 2) is the metal's border about the tip where it was followed. The
+    centreline halves the blade between the shares ``halved`` of its length.
     """
 
     pivot: Array
@@ -41,6 +43,9 @@ class BladeParts:
     hole: Array
     length: float
     pivot_sd: float = 0.0
+    tip_sd: float = 0.0
+    end: Array | None = None
+    halved: tuple[float, float] = (BACK_FIRST, BACK_LAST)
 
     def frame(self, points: Array) -> Array:
         """Stations and offsets (n, 2) of sheet points."""

@@ -7,19 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.vision.blade.lamp import lamp_direction
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
+from scissorcal.vision.blade.pair import PairLengths, measure_pair
 from scissorcal.vision.blade.parts import EdgeSide, lone_blade
+from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.scissors import Scissors, find_scissors
 from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
-from scissorcal.vision.blade.view import PlainView, View, see_mat
+from scissorcal.vision.blade.view import View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.marker_corners import linear_light
 
 Array = NDArray[np.float64]
-
-_SEARCH = 0.1
-"""Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class BladePhoto:
 
     ``scissors`` is None where a blade lies alone. ``measured`` has one row for a blade alone, two
     for open scissors (the one whose tip is farther from the handles first), none for closed ones.
+    ``lengths`` are those of a pair against each other, ``lamp_deg`` where its shadow falls.
     """
 
     photo: Photo
@@ -35,6 +36,8 @@ class BladePhoto:
     outline: Silhouette
     measured: tuple[BladeMeasurement, ...]
     scissors: Scissors | None = None
+    lengths: PairLengths | None = None
+    lamp_deg: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,6 +66,8 @@ class BladePhoto:
         text = f"{name}: " + "; ".join(parts)
         if self.scissors is not None:
             text += f"; open by {np.degrees(self.scissors.opening):.1f} deg"
+        if self.lamp_deg is not None:
+            text += f"; shadow towards {self.lamp_deg:.0f} deg from between the tips"
         return text
 
 
@@ -155,16 +160,15 @@ def photograph_scissors(
     else:
         height, width = photo.image.shape[:2]
         read = scale * photo.reduction if scale else None
-        unit = read or 1.0
-        whole = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
-        view = PlainView(whole, read, 0.01 * priors.scale_sd_percent if read else 0.0)
+        view = PlainView.by_hand(width, height, priors, read)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
-    scissors = find_scissors(outline, photo.source)
-    measured = tuple(
-        measure_blade(light, view, parts, photo.source, priors, search=_SEARCH)
-        for parts in scissors.blades
-    )
-    if len(measured) == 2:
-        along = float(measured[0].parts.axis @ measured[1].parts.axis)
-        scissors = replace(scissors, opening=float(np.arccos(np.clip(along, -1.0, 1.0))))
-    return BladePhoto(photo, view, outline, measured, scissors)
+    scissors = find_scissors(outline, photo.source, whole=not mat)
+    if not scissors.blades:
+        return BladePhoto(photo, view, outline, (), scissors)
+    view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
+    blades = tuple(one.parts for one in measured)
+    along = float(blades[0].axis @ blades[1].axis)
+    opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
+    scissors = replace(scissors, blades=blades, opening=opening)
+    lamp = lamp_direction(outline, scissors)
+    return BladePhoto(photo, view, outline, measured, scissors, lengths, lamp)

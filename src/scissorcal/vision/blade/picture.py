@@ -18,8 +18,9 @@ Picture = NDArray[np.uint8]
 LARGEST = 1600
 """Pixels along the longer side of a picture."""
 
-OUTLINE, EDGE, ARROW, NICK, PIVOT, AXIS = (
+OUTLINE, END, EDGE, ARROW, NICK, PIVOT, AXIS = (
     (60, 140, 255),
+    (255, 120, 200),
     (80, 220, 60),
     (220, 60, 220),
     (40, 40, 240),
@@ -51,7 +52,8 @@ def blade_picture(
 ) -> Picture:
     """Draw a measurement over its photograph: bytes (rows, columns, 3), BGR.
 
-    The segmented outline (orange), each blade's points of the edge, the fitted edge (green) where
+    The segmented outline (orange), each blade's back and the end of its metal (violet), its points
+    of the edge, the fitted edge (green) where
     ``edges`` gives e(s), the enlarged residuals as arrows, the nicks (red), the
     pivot and the centreline. Cropped to what matters and enlarged or reduced to `LARGEST` pixels.
     """
@@ -85,6 +87,10 @@ def _blade(
         return view.to_pixels(one.parts.points(station, offset))
 
     canvas.line(np.array([one.pivot_px, one.axis_px]), AXIS)
+    if one.parts.end is not None:
+        canvas.line(view.to_pixels(one.parts.end), END)
+    back = one.back.pixels[np.argsort(one.parts.frame(view.to_sheet(one.back.pixels))[:, 0])]
+    canvas.line(back, END)
     canvas.cross(one.pivot_px, PIVOT)
     seen = on_picture(one.station, one.offset)
     factor = 0.0

@@ -11,7 +11,13 @@ Light = NDArray[np.float32]
 STEP_PX = 0.5
 _STEPS = 12
 _SHIFT_COST = 0.05
-_SHADOW_SHARE, _INWARD = 0.35, 0.25
+COARSE, LOSS = 2.5, 1.5
+"""A change is sharp where its slope falls by more than this factor when smoothed this much more."""
+
+ENOUGH, ASIDE = 0.35, 0.25
+"""Share of the steepest or sharpest that counts fully; gain of the place farthest in or out."""
+
+DARKEST = 1e-2
 _NARROWEST, _NOISE_FLOOR = 0.35, 1e-3
 
 
@@ -65,18 +71,52 @@ def steepest(
 
     profile = sampled(light, points, normals, reach, 1.0)
     if innermost:
-        profile = np.log(np.maximum(profile, 1e-2))
+        profile = np.log(np.maximum(profile, DARKEST))
     rise = gaussian_filter1d(profile, soft, axis=1, order=1, mode="nearest")
     top = max(float(np.quantile(rise.max(axis=1), 0.75)), 1e-6)
     u = np.arange(profile.shape[1]) - profile.shape[1] // 2
     if innermost:
-        gain = np.clip(rise / (_SHADOW_SHARE * top), -0.2, 1.0) - _INWARD * u / (reach + 1)
+        gain = np.clip(rise / (ENOUGH * top), -0.2, 1.0) - ASIDE * u / (reach + 1)
     else:
         gain = np.clip(rise / top, -0.2, 1.2) * (1.0 - 0.3 * np.abs(u) / (reach + 1))
-    return np.asarray(u[_best_path(gain)], dtype=np.float64)
+    return np.asarray(u[best_path(gain)], dtype=np.float64)
 
 
-def _best_path(gain: Array) -> NDArray[np.int64]:
+def outermost_sharp(
+    light: Light, points: Array, normals: Array, reach: float, soft: float
+) -> Array:
+    """Offsets (n,) in pixels to the outermost line at which light changes sharply, in either sense.
+
+    An object ends at the first sharp change that one meets from outside, while a cast shadow has a
+    penumbra: its border grows soft with the height of what casts it. Metal may be darker or
+    brighter than its shadow, and sheet, shadow and metal may have one hue, so neither decides.
+    The line is the best of all within ``reach`` by `sharpness` at the scale ``soft`` (pixels), up
+    to a share of the sharpest, and the farther out the better.
+    """
+    profile = np.log(np.maximum(sampled(light, points, normals, reach, 1.0), DARKEST))
+    sharp = _sharpness_across(profile, soft)
+    top = max(float(np.quantile(sharp.max(axis=1), 0.75)), 1e-6)
+    u = np.arange(profile.shape[1]) - profile.shape[1] // 2
+    gain = np.clip(sharp / (ENOUGH * top), 0.0, 1.0) + ASIDE * u / (reach + 1)
+    return np.asarray(u[best_path(gain)], dtype=np.float64)
+
+
+def _sharpness_across(profile: Array, soft: float) -> Array:
+    """How much a change along each row (n, m) loses when the row is smoothed more.
+
+    A step of blur b has the slope 1 / sqrt(b^2 + s^2) after smoothing by s; what remains of it
+    less `LOSS` times that at `COARSE` times the scale is positive for b below 1.8 ``soft`` only.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    fine, coarse = (
+        gaussian_filter1d(profile, s, axis=1, order=1, mode="nearest")
+        for s in (soft, COARSE * soft)
+    )
+    return np.asarray(np.maximum(np.abs(fine) - LOSS * np.abs(coarse), 0.0))
+
+
+def best_path(gain: Array) -> NDArray[np.int64]:
     """Columns (n,) of the path down ``gain`` (n, m) with the largest sum, steps of at most one."""
     rows, columns = gain.shape
     came = np.zeros((rows, columns), dtype=np.int64)

@@ -7,21 +7,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.parts import BACK_LAST, BladeParts
 from scissorcal.vision.blade.silhouette import Silhouette
 
 Array = NDArray[np.float64]
 
+OPEN_FIRST = 0.55
+"""Where halving begins on open blades, in shares of the length: a range that is seen at most
+openings, so that photographs at different openings have one centreline."""
+
 LEAST_OPENING = 0.12
 """Below this opening (rad) the blades hide each other's edges."""
 
+_APART_SHARE = 0.08
 _RING_SHARE = 0.04
 _NOTCH_SHARE = 0.08
 _CLEAR_OF_CROTCH = 0.06
 _TIP_SHARE = 0.03
 _SCREW_SHARE = (0.014, 0.055)
-_FAINT, _LEAST_CIRCLE = 2.0, 0.3
+_FAINT, _LEAST_CIRCLE = 2.0, 0.5
+"""Steepness of light (levels of 170) that is just seen; least score of a circle, over that of a
+whole one: a corner of metal or shadow follows half of a circle at most."""
+
+_MOST_PLACES = 30_000
+"""Places that one call of OpenCV's remap takes: less than 32768."""
+
 _SCREW_NEAR = 0.10
+_PLAIN = 0.8
+"""Score of an even disc, such as a rivet, over that of a circle with a slot or a glint inside."""
 _GUESS_SD_SHARE = 0.03
 
 
@@ -45,14 +58,18 @@ class Scissors:
     length: float
 
 
-def find_scissors(shape: Silhouette, source: str) -> Scissors:
+def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Scissors:
     """Find the parts of an outline that should be a pair of scissors.
 
-    Handles have rings, or extend beyond the mat's field; the tips are the ends
-    away from them. Raises InputError where there are no handles (forks have none) or no blades.
+    Handles have rings, or extend beyond the mat's field, unless ``whole`` scissors must be seen;
+    the tips are the ends away from them. Raises InputError where there are several objects, no
+    handles (forks have none) or no blades.
     """
     outline = shape.outer
     rings = _rings(shape)
+    _refuse_others(shape, source)
+    if whole and len(shape.cut_off):
+        raise InputError(f"{source}: the border cuts off the object: show whole scissors.")
     if not rings and not len(shape.cut_off):
         raise InputError(
             f"{source}: the object has no handle with a ring and so is not a pair of scissors"
@@ -73,6 +90,20 @@ def find_scissors(shape: Silhouette, source: str) -> Scissors:
         return _closed(shape, outline[first], handles, rings)
     second, notch = crotch
     return _open(shape, source, (first, second), notch, rings)
+
+
+def _refuse_others(shape: Silhouette, source: str) -> None:
+    """Refuse further objects; a handle that bright metal separates from the rest is near it."""
+    from scipy.spatial import cKDTree
+
+    size = float(np.ptp(shape.outer, axis=0).max())
+    tree = cKDTree(shape.outer)
+    away = [float(np.min(tree.query(other)[0])) for other in shape.others]
+    if any(distance > _APART_SHARE * size for distance in away):
+        raise InputError(
+            f"{source}: several objects of like size are on the sheet; one pair of scissors is "
+            "expected. Leave one pair."
+        )
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
@@ -165,7 +196,8 @@ def _open(
         clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
         last = stop * (1.0 - _TIP_SHARE)
         edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
-        blades.append(replace(own, edge=edge, back=back, length=stop))
+        halved = (max(OPEN_FIRST, clear / stop), BACK_LAST)
+        blades.append(replace(own, edge=edge, back=back, length=stop, halved=halved))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
@@ -189,8 +221,12 @@ def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, .
     middles = []
     for place in places:
         here = np.abs(along - place) < 0.02 * reach
+        if not here.any():
+            continue
         off = (outline[here] - handles) @ across
         middles.append(handles + place * axis + 0.5 * (off.min() + off.max()) * across)
+    if not middles:
+        middles = [0.5 * (tip + handles)]
     best = _best_screw(shape, np.array(middles), 0.5 * reach, 0.045)
     if best is None:
         pivot = np.array(middles)[len(middles) // 4]
@@ -236,6 +272,9 @@ def _best_screw(
     place = np.stack([x.ravel() + left, y.ravel() + top], axis=1)
     gap = np.linalg.norm(place[:, None, :] - centre[None, :, :], axis=2).min(axis=1)
     tried = place[gap < within * size]
+    if not len(tried):
+        return None
+    tried = tried[:: len(tried) // _MOST_PLACES + 1]
     turn = np.linspace(0.0, 2.0 * np.pi, 49)[:-1].astype(np.float32)
     best: tuple[float, Array, float] | None = None
     for radius in np.arange(low, high + 0.5, 0.5):
@@ -246,7 +285,7 @@ def _best_screw(
         clear = np.maximum(np.abs(across) - 0.6, 0.0) / 0.4
         within_it = cv2.blur(steep, (2 * int(0.35 * radius) + 1,) * 2)
         inner = within_it[tried[:, 1] - top, tried[:, 0] - left]
-        shaped = 0.3 + 0.7 * np.minimum(inner / (2.0 * _FAINT), 1.0)
+        shaped = _PLAIN + (1.0 - _PLAIN) * np.minimum(inner / (2.0 * _FAINT), 1.0)
         score = clear.mean(axis=1) * shaped * np.sqrt(radius)
         index = int(np.argmax(score))
         if best is None or score[index] > best[0]:

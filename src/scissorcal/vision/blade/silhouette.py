@@ -119,7 +119,7 @@ def _sheet_light(flat: Light) -> Light:
     u, v = 2.0 * x.ravel() / columns - 1.0, 2.0 * y.ravel() / rows - 1.0
     terms = [(i, j) for i in range(4) for j in range(4 - i)]
     design = np.stack([u**i * v**j for i, j in terms], axis=1)
-    kept = log > np.quantile(log, 0.3)
+    kept = log >= np.quantile(log, 0.3)
     weights = np.zeros(len(terms))
     for _ in range(_ROUNDS):
         weights = np.linalg.lstsq(design[kept], log[kept], rcond=None)[0]

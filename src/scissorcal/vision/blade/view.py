@@ -27,10 +27,11 @@ class View(Protocol):
     """One photograph's mapping from pixels to a sheet, x to the right and y down.
 
     ``values`` (p,) with ``covariance`` (p, p) are its parameters; `to_sheet` takes other values, to
-    show what each of them moves. The last ``shared`` of them are the same
-    in every photograph of one mat and camera. ``bounds`` (left, top, right, bottom) is the
-    part of the sheet in which a blade may lie, in sheet units: metres, or pixels where no scale is
-    known (``metric`` False). ``uncertainty`` is a sentence on its accuracy.
+    show what each of them moves. The last ``shared`` of them are the same in every photograph of
+    one mat and camera; ``own_error`` names the error of the others. ``bounds`` (left, top,
+    right, bottom) is the part of the sheet in which a blade may lie, in sheet units: metres, or
+    pixels where no scale is known (``metric`` False). ``uncertainty`` is a sentence on its
+    accuracy.
     """
 
     @property
@@ -50,6 +51,9 @@ class View(Protocol):
 
     @property
     def shared(self) -> int: ...
+
+    @property
+    def own_error(self) -> str: ...
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array: ...
 
@@ -87,47 +91,6 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
 
 
 @dataclass(frozen=True)
-class PlainView:
-    """A photograph without correction: shapes up to similarity, or to scale with ``scale``.
-
-    ``scale`` is metres per pixel, None where it is unknown.
-    """
-
-    bounds: tuple[float, float, float, float]
-    scale: float | None = None
-    scale_share_sd: float = 0.0
-
-    @property
-    def metric(self) -> bool:
-        return self.scale is not None
-
-    @property
-    def uncertainty(self) -> str:
-        if self.scale is None:
-            return "No mat: the shape has no scale, and the camera's tilt is not corrected."
-        return "No mat: the scale is as stated, and the camera's tilt is not corrected."
-
-    @property
-    def values(self) -> Array:
-        return np.ones(1)
-
-    @property
-    def covariance(self) -> Array:
-        return np.full((1, 1), self.scale_share_sd**2)
-
-    @property
-    def shared(self) -> int:
-        return 1
-
-    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
-        share = 1.0 if values is None else float(values[0])
-        return np.asarray(pixels * ((self.scale or 1.0) * share))
-
-    def to_pixels(self, points: Array) -> Array:
-        return np.asarray(points / (self.scale or 1.0))
-
-
-@dataclass(frozen=True)
 class _MatView:
     """What views of the mat have in common; the last two of their values are the print's scale."""
 
@@ -135,6 +98,7 @@ class _MatView:
     uncertainty: str
     bounds: ClassVar[tuple[float, float, float, float]] = MAT_FIELD_M
     metric: ClassVar[bool] = True
+    own_error: ClassVar[str] = "mapping"
 
 
 @dataclass(frozen=True)

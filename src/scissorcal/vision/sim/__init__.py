@@ -8,11 +8,14 @@ from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Looks, as_jpeg, random_looks
 from scissorcal.vision.sim.photograph import Glare, Layer, render
 from scissorcal.vision.sim.plate_scene import PlateScene, chained, plate_scene
+from scissorcal.vision.sim.shadows import CastShadow, Lamp
 from scissorcal.vision.sim.targets import target_layers
 
 __all__ = [
     "BladeShape",
+    "CastShadow",
     "Glare",
+    "Lamp",
     "Layer",
     "Lens",
     "Looks",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.vision.sim.coverage import coverage
 from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Bytes, Looks, Picture, develop
+from scissorcal.vision.sim.shadows import CastShadow, cast
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,8 @@ class Layer:
     way round being holes. ``reflectance`` 1 is perfect white. ``shading`` is the relative gain of
     light over 100 mm along x and y; ``brushed`` is how strongly it is streaked along
     ``grain`` (rad). ``shadow_m`` shifts a shadow of the shapes, soft over ``shadow_soft_m``, and
-    takes ``shadow`` of the light.
+    takes ``shadow`` of the light. ``texture`` is the relative sd of the material's light, alike
+    over ``texture_m``.
     """
 
     outlines_m: Sequence[Array]
@@ -50,10 +52,12 @@ class Layer:
     shadow: float = 0.0
     shadow_m: tuple[float, float] = (0.0, 0.0)
     shadow_soft_m: float = 0.002
+    texture: float = 0.0
+    texture_m: float = 0.001
 
 
 def render(
-    layers: Sequence[Layer],
+    layers: Sequence[Layer | CastShadow],
     lens: Lens,
     looks: Looks,
     rng: np.random.Generator,
@@ -67,7 +71,10 @@ def render(
     """
     radiance = np.full((lens.height, lens.width), background, dtype=np.float32)
     for layer in layers:
-        _lay(radiance, layer, lens, rng)
+        if isinstance(layer, CastShadow):
+            cast(radiance, layer, lens)
+        else:
+            _lay(radiance, layer, lens, rng)
     return develop(radiance, looks, rng)
 
 
@@ -82,6 +89,8 @@ def _lay(radiance: Picture, layer: Layer, lens: Lens, rng: np.random.Generator) 
     share = coverage([o - (left, top) for o in seen], right - left, bottom - top)
     part = radiance[top:bottom, left:right]
     shade = _shade(layer, lens, box, rng)
+    if layer.texture > 0.0:
+        shade = shade * _texture(layer, lens, (bottom - top, right - left), rng)
     part += share * (shade - part)
 
 
@@ -137,6 +146,16 @@ def _shade(
         cv2.resize(np.asarray(shade, dtype=np.float32), (right - left, bottom - top)),
         dtype=np.float32,
     )
+
+
+def _texture(layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+    """Relative light of a rough material over a box of pixels, about 1."""
+    import cv2
+
+    reach = max(layer.texture_m * lens.focal_px / float(layer.pose.shift_m[2]), 0.3)
+    grain = cv2.GaussianBlur(rng.standard_normal(shape, dtype=np.float32), (0, 0), reach)
+    rough = np.asarray(grain, dtype=np.float32)
+    return np.asarray(1.0 + layer.texture * rough / max(float(rough.std()), 1e-9), np.float32)
 
 
 def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:

@@ -35,6 +35,7 @@ ADVANCES_MM = (0.0, 15.0, 30.0)
 OPENINGS_DEG = (8.0, 22.0, 36.0)
 
 _JPEG_QUALITY = 92
+_SHADOW_M = np.array([-0.0006, 0.0009, 0.0])
 _CORNERS = ((0.4, 0.35), (-0.4, 0.35), (0.4, -0.35), (-0.4, -0.35))
 _LOOKS = Looks(exposure=0.85, defocus_px=0.7, softness_px=0.6, vignetting=0.2, noise=0.008)
 
@@ -44,15 +45,13 @@ def render_blade_photographs(
 ) -> tuple[Path, ...]:
     """Render photographs of a blade on the mat, or with ``both`` of open scissors.
 
-    Returns the files, in ``folder``.
+    The lamp of open scissors stands elsewhere in each. Returns the files, in ``folder``.
     """
-    look: dict[str, Any] = {
-        "shadow": 0.25,
-        "shadow_m": (-0.0006, 0.0009),
-        "shading": (0.15, 0.2),
-    }
+    look: dict[str, Any] = {"shadow": 0.25, "shading": (0.15, 0.2)}
     paths = []
     for number in range(count):
+        aside = about(2, 2.0 * math.pi * number / 3.0 if both else 0.0) @ _SHADOW_M
+        look["shadow_m"] = (float(aside[0]), float(aside[1]))
         rng = np.random.default_rng([seed, 7, number])
         pose = _view_of(BLADE_MAT, rng)
         turn = float(rng.normal(0.0, 0.05))

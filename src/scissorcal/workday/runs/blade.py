@@ -18,7 +18,7 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.edge.result import BladeFit
+    from scissorcal.calibration.edge.result import BladeFit, SeenPair
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.photo import Photo
@@ -45,7 +45,13 @@ def capture_blade(
     _refuse_other_setup(photo_captures(workspace, "blade"), setup)
 
     def look(path: Path, photo: "Photo") -> Seen:
-        return Seen(_measured(engine, photo, setup).sentence())
+        found = _measured(engine, photo, setup)
+        if not found.measured:
+            raise InputError(
+                f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, "
+                "and each blade hides the other's edge. Open it by 30 to 80 deg."
+            )
+        return Seen(found.sentence())
 
     board = BLADE_MAT if setup.mat else None
     return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
@@ -56,20 +62,31 @@ def fit(engine: "Engine", request: "Request") -> "Made":
 
     Uses the workspace's camera where there is one.
     """
-    from scissorcal.calibration.edge.result import BladeResult, SeenOpening
+    from scissorcal.calibration.edge.checks import pair_verdicts
+    from scissorcal.calibration.edge.result import BladeResult
     from scissorcal.workday.runs.fit import Made
 
     captures = photo_captures(engine.workspace, "blade")
     seen = _all_measured(engine, captures, request.progress)
     fits = _fits(seen, captures, engine, request)
-    openings = tuple(
-        SeenOpening(one.photo.source, one.scissors.opening)
-        for one in seen
-        if one.scissors is not None
-    )
+    openings = tuple(_pair(one) for one in seen if one.scissors is not None)
     sources = tuple(one.photo.source for one in seen)
-    result = BladeResult(fits, openings, request.inputs_hash, sources)
+    result = BladeResult(
+        fits, openings, request.inputs_hash, sources, pair_verdicts=pair_verdicts(openings)
+    )
     return Made(result, lambda folder: _draw(seen, fits, folder))
+
+
+def _pair(one: "BladePhoto") -> "SeenPair":
+    from scissorcal.calibration.edge.result import SeenPair
+
+    opening = one.scissors.opening if one.scissors else 0.0
+    if one.lengths is None:
+        return SeenPair(one.photo.source, opening)
+    lengths = one.lengths
+    return SeenPair(
+        one.photo.source, opening, lengths.log_ratio, lengths.sd, lengths.tilt_deg, one.lamp_deg
+    )
 
 
 def _measured(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "BladePhoto":
