@@ -14,7 +14,7 @@ import pytest
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "identity", "files", "<root>"}
+LEAVES = {"errors", "verdicts", "identity", "files", "foreign", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report", "tracking", "control"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -22,6 +22,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "verdicts": set(),
     "identity": set(),
     "files": set(),
+    "foreign": set(),
     "kernel": set(),
     "model": set(),
     "inference": set(),
