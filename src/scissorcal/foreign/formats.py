@@ -55,6 +55,7 @@ FIT = Format(
     500 * _MB,
     "Remove it and fit again.",
     memory_bytes=2 * _GB,
+    processor_s=20,
 )
 """A fit has at most some 20,000 draws of 50 parameters and as many predictions: 8 to 80 MB."""
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import open_foreign
+from scissorcal.foreign.formats import CHECKPOINT
 
 Array = NDArray[np.float64]
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
@@ -79,7 +81,7 @@ def load_walks(
 
 def _read(path: Path) -> list[Walk]:
     try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+        with open_foreign(path, CHECKPOINT) as raw, np.load(raw, allow_pickle=False) as file:
             steps, thin = (int(count) for count in file["counts"])
             positions = file["positions"]
             return [

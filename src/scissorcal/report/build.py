@@ -14,6 +14,8 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import SIGNATURE
 from scissorcal.identity import bytes_digest
 from scissorcal.package.review import Review
 from scissorcal.recipe.schema import Recipe
@@ -155,8 +157,9 @@ def _signed(review: Review | None, twin: str, folder: Path) -> Review | None:
     """The review, or the one in the folder, if it is of this twin."""
     if review is None:
         try:
-            review = Review.model_validate_json((folder / "signature.json").read_bytes())
-        except (OSError, ValueError):
+            path = folder / "signature.json"
+            review = Review.model_validate_json(read_foreign(path, SIGNATURE))
+        except (InputError, ValueError):
             return None  # not signed, or damaged, which `plan` says
     return review if review.report_sha256 == bytes_digest(twin.encode()) else None
 
