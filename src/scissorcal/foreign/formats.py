@@ -24,6 +24,11 @@ class Format:
     processor_s: int = 60
     wall_s: float = 300.0
 
+    @property
+    def memory(self) -> str:
+        """The limit of memory in words."""
+        return f"more than {self.memory_bytes / 1e9:g} GB of memory"
+
 
 RECIPE = Format("a recipe", _MB, "Correct it, or copy a built-in recipe with 'scissorcal init'.")
 """The longest built-in recipe has 6 kB."""
@@ -93,10 +98,10 @@ PHOTO_INDEX = Format("an index of photographs", 50 * _MB, "Capture its photograp
 STATE = Format("a file of this workspace", 100 * _MB, "Remove it; it is made again.")
 """Indexes, designs, probes and studies that scissorcal writes for itself; kilobytes to 10 MB."""
 
-SURFACE = Format("a table of probed points", 5 * _MB, "Probe fewer points.")
+SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm and z_mm, one point a line.")
 """200,000 points of 25 characters."""
 
-PATH = Format("a path", 5 * _MB, "Thin it out.")
+PATH = Format("a path", 5 * _MB, "Write x_mm and what else is stated, one point a line.")
 """200,000 points of 25 characters."""
 
 STANCES = Format("a table of stances", _MB, "Write a line for each photograph of the rig.")

@@ -10,7 +10,6 @@ from scissorcal.errors import InputError
 from scissorcal.foreign import parse_isolated, read_foreign
 from scissorcal.foreign.formats import PHOTOGRAPH
 from scissorcal.identity import bytes_digest
-from scissorcal.vision.photo_decoding import averaged
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -55,6 +54,8 @@ class Photo:
 
         Raises ValueError unless ``factor`` divides both sides, as the rest would be cut off.
         """
+        from scissorcal.vision.photo_decoding import averaged
+
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
