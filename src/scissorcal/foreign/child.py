@@ -56,6 +56,11 @@ class Child:
             self._end()
             raise
 
+    @property
+    def pid(self) -> int:
+        """The number of the process."""
+        return self._process.pid
+
     def ask(
         self, function: str, data: bytes, options: dict[str, Any], kind: Format
     ) -> dict[str, Any]:

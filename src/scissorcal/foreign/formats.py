@@ -98,7 +98,7 @@ PHOTO_INDEX = Format("an index of photographs", 50 * _MB, "Capture its photograp
 STATE = Format("a file of this workspace", 100 * _MB, "Remove it; it is made again.")
 """Indexes, designs, probes and studies that scissorcal writes for itself; kilobytes to 10 MB."""
 
-SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm and z_mm, one point a line.")
+SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm, z_mm, one point a line.")
 """200,000 points of 25 characters."""
 
 PATH = Format("a path", 5 * _MB, "Write x_mm and what else is stated, one point a line.")

@@ -51,6 +51,11 @@ def parse_isolated(
     raise _reported(answer, path, kind)
 
 
+def idle_children() -> "tuple[Child, ...]":
+    """The children that wait for a file."""
+    return tuple(_idle)
+
+
 def close_children() -> None:
     """End all children that wait for a file; the next file starts one anew."""
     while _idle:

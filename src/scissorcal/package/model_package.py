@@ -247,7 +247,7 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
             )
     try:
         _ = package.tables, package.exact, package.average
-    except (ValueError, KeyError) as error:
+    except Exception as error:
         raise InputError(
             f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
         ) from error
