@@ -353,7 +353,7 @@ def test_foreign_files_are_refused(data: bytes, tmp_path: Path) -> None:
 
 def test_deeply_nested_json_is_refused(copy_of_paper: Path) -> None:
     pack(copy_of_paper, members(copy_of_paper) | {"manifest.json": b"[" * 200_000})
-    with pytest.raises(InputError, match="not JSON|nested too deeply"):
+    with pytest.raises(InputError, match="nested too deeply for JSON"):
         open_package(copy_of_paper)
 
 
