@@ -19,6 +19,7 @@ from tests.foreign.samples import SAMPLES
 HANG_S = 60.0
 """A mutant that takes longer is a hang; whole samples take at most 0.3 s."""
 
+MOST_SHOWN = 40
 MOST_MEGABYTES = 2000.0
 """What reading a mutant may add; a parser's process is limited to 2 or 3 GB."""
 
@@ -126,7 +127,7 @@ def main() -> int:
         tally = run(name, given.count, given.first)
         print(" | ".join(tally.row), flush=True)
         faults += tally.faults
-    for fault in faults:
+    for fault in faults[:MOST_SHOWN]:
         print(f"\n{fault}")
     return 1 if faults else 0
 

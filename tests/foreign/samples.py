@@ -1,6 +1,7 @@
 """A valid file of every format that scissorcal reads, how a command reads it, what it must give.
 
-``seal`` makes a changed file consistent again (checksums, hashes), so that changes get past them.
+``seal`` changes what checksums and hashes protect and makes them right again, so that changes get
+past them.
 """
 
 import io
@@ -50,7 +51,8 @@ from tests.recording.made import made_samples, written_live
 from tests.recording.test_import_formats import MAT_COLUMNS, MAT_UNITS, mat_variables, written_mat73
 from tests.vision.test_camera_files import CAMERA, KALIBR, OPENCV_1, ROS_MESSAGE
 
-Seal = Callable[[bytes], bytes]
+Change = Callable[[bytes], bytes]
+Seal = Callable[[bytes, Change], bytes]
 
 
 @dataclass(frozen=True)
@@ -105,9 +107,8 @@ def _read_recording(path: Path) -> None:
     read_telemetry(path, PICTURE)
 
 
-def _sealed_fit(data: bytes) -> bytes:
-    size = len(b"\nscissorcal sha256 ") + 65
-    body = data[:-size]
+def _sealed_fit(data: bytes, change: Change) -> bytes:
+    body = change(data[: -len(b"\nscissorcal sha256 ") - 65])
     return body + b"\nscissorcal sha256 " + bytes_digest(body).encode() + b"\n"
 
 
@@ -166,8 +167,9 @@ def _read_photo(path: Path) -> None:
     assert photo.sha256 == bytes_digest(path.read_bytes())
 
 
-def _sealed_png(data: bytes) -> bytes:
-    """Right checksums for the chunks that can be found."""
+def _sealed_png(data: bytes, change: Change) -> bytes:
+    """A changed picture with right checksums for the chunks that can be found."""
+    data = change(data)
     parts, at = [data[:8]], 8
     while at + 12 <= len(data):
         (length,) = struct.unpack_from(">I", data, at)
@@ -199,24 +201,57 @@ def _read_package(path: Path) -> None:
     _ = package.warnings, package.kernel()
 
 
-def _sealed_package(data: bytes) -> bytes:
-    """Members that can still be read, with right hashes in the manifest."""
+def _changed_member(data: bytes, change: Change) -> bytes:
+    """A zip of which one member is changed, with right checksums."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    names = sorted(content)
+    name = names[zlib.crc32(change(bytes(range(256)))) % len(names)]
+    content[name] = change(content[name])
+    return _packed(content)
+
+
+def _packed(content: dict[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, body in content.items():
+            archive.writestr(name, body)
+    return stream.getvalue()
+
+
+def _sealed_package(data: bytes, change: Change) -> bytes:
+    """A package of which a member is changed, with right hashes in a manifest that can be read."""
+    changed = _changed_member(data, change)
+    with zipfile.ZipFile(io.BytesIO(changed)) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            content = {name: archive.open(name).read1(4_000_000) for name in archive.namelist()}
         facts = json.loads(content["manifest.json"])
         for member in facts["members"]:
             body = content[member["file"]]
             member["bytes"], member["sha256"] = len(body), bytes_digest(body)
         facts["content_hash"] = content_hash(facts)
         content["manifest.json"] = json.dumps(facts).encode()
-    except Exception:  # noqa: BLE001 - what cannot be sealed stays as it is
-        return data
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w") as archive:
-        for name, body in content.items():
-            archive.writestr(name, body)
-    return stream.getvalue()
+    except (ValueError, KeyError, TypeError, RecursionError):  # no manifest any more
+        return changed
+    return _packed(content)
+
+
+def _sealed_recording(data: bytes, change: Change) -> bytes:
+    """A recording of which the unpacked bytes of every chunk are changed, with right checksums."""
+    import zstandard
+
+    parts, at = [data[:8]], 8
+    while at + 9 <= len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        body = data[at + 9 : at + 9 + length]
+        if opcode == 6:
+            plain = change(zstandard.decompress(body[44:]))
+            packed = zstandard.compress(plain)
+            head = struct.pack("<QI", len(plain), zlib.crc32(plain))
+            body = body[:16] + head + body[28:36] + struct.pack("<Q", len(packed)) + packed
+        parts.append(struct.pack("<BQ", opcode, len(body)) + body)
+        at += 9 + length
+    return b"".join(parts) + data[at:]
 
 
 def _report(path: Path) -> None:
@@ -350,6 +385,10 @@ def _mat(path: Path) -> None:
     savemat(path, mat_variables(), do_compression=True)
 
 
+def _plain_mat(path: Path) -> None:
+    savemat(path, mat_variables())
+
+
 def _opencv(path: Path) -> None:
     write_camera_file(CAMERA, path, "opencv")
 
@@ -371,8 +410,9 @@ SAMPLES: dict[str, Sample] = {
     "log CSV": Sample("log.csv", _csv, _log(COLUMNS, UNITS)),
     "log Parquet": Sample("log.parquet", _parquet, _log(COLUMNS, UNITS)),
     "MATLAB 5": Sample("log5.mat", _mat, _log(MAT_COLUMNS, MAT_UNITS)),
+    "MATLAB 5, not packed": Sample("plain5.mat", _plain_mat, _log(MAT_COLUMNS, MAT_UNITS)),
     "MATLAB 7.3": Sample("log73.mat", written_mat73, _log(MAT_COLUMNS, MAT_UNITS)),
-    "recording MCAP": Sample("a.mcap", _recording, _read_recording),
+    "recording MCAP": Sample("a.mcap", _recording, _read_recording, _sealed_recording),
     "fit netCDF": Sample("plate.nc", _fit("plate"), _read_fit("plate"), _sealed_fit),
     "trust check": Sample("cut.verify.json", _trust_check, _read_trust_check),
     "OpenCV YAML": Sample("camera.yml", _opencv, _read_camera),
@@ -396,7 +436,7 @@ SAMPLES: dict[str, Sample] = {
     "surface CSV": Sample("heights.csv", _surface, _read_surface),
     "stances CSV": Sample("stances.csv", _stances, _read_stances),
     "track of lines": Sample("track.jsonl", _track_lines, _read_track_lines),
-    "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint),
+    "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint, _changed_member),
     "file index": Sample("index.json", _state_index, _read_state_index),
 }
 """By the names of the table."""

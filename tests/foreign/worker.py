@@ -12,6 +12,7 @@ import sys
 import time
 import traceback
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +41,8 @@ def serve(folder: Path, name: str) -> None:
 
 def mutant(sample: Sample, name: str, data: bytes, number: int) -> bytes:
     """The mutant of a number: of a sample that can be sealed, every other one is sealed."""
-    changed = mutate(data, f"{name} {number}")
-    return sample.seal(changed) if sample.seal and number % 2 else changed
+    change = partial(mutate, seed=f"{name} {number}")
+    return sample.seal(data, change) if sample.seal and number % 2 else change(data)
 
 
 def _outcome(sample: Sample, path: Path) -> dict[str, Any]:

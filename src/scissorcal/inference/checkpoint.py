@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +104,7 @@ def _read(path: Path) -> list[Walk]:
                     strict=True,
                 )
             ]
-    except (OSError, ValueError, KeyError, EOFError, IndexError, BadZipFile) as error:
+    except Exception as error:
         raise CheckpointError(
             f"{path}: not a readable checkpoint ({error}); move it away, or name another file, to "
             "start afresh."
