@@ -5,6 +5,7 @@ python -m tests.foreign.mutate --count 300 "recording MCAP" PNG
 """
 
 import argparse
+import contextlib
 import json
 import select
 import subprocess
@@ -12,7 +13,7 @@ import sys
 import tempfile
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import Any, Self
 
 from tests.foreign.samples import SAMPLES
 
@@ -32,13 +33,12 @@ class Tally:
     codes: Counter[int] = field(default_factory=Counter)
     worst_s: float = 0.0
     worst_megabytes: float = 0.0
-    crashes: int = 0
-    hangs: int = 0
+    deaths: int = 0
     faults: list[str] = field(default_factory=list)
 
     @property
     def count(self) -> int:
-        return sum(self.codes.values()) + self.crashes + self.hangs
+        return sum(self.codes.values()) + self.deaths
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -49,63 +49,74 @@ class Tally:
             str(len(self.faults)),
             f"{self.worst_s:.2f}",
             f"{self.worst_megabytes:.0f}",
-            str(self.crashes + self.hangs),
+            str(self.deaths),
         )
 
 
 HEAD = ("format", "mutants", "exit 0", "2", "5", "faults", "worst s", "worst MB", "crashes, hangs")
 
 
-def run(name: str, count: int, first: int = 0) -> Tally:
-    """Read ``count`` mutants of one format in a separate process, which is replaced if it dies."""
+class Reader:
+    """A process that reads mutants; one that died or hung is replaced by the next."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        self._process: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+        self._folder.cleanup()
+
+    def read(self, name: str, number: int) -> dict[str, Any] | str:
+        """How one mutant ended; in words where the process did not answer."""
+        process = self._started()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):  # then there is no line, which says it
+            process.stdin.write(f"{number} {name}\n")
+            process.stdin.flush()
+        ready, _, _ = select.select([process.stdout], [], [], HANG_S)
+        line = process.stdout.readline() if ready else ""
+        if line:
+            found: dict[str, Any] = json.loads(line)
+            return found
+        if not ready:
+            process.kill()
+        code = process.wait()
+        self._end()
+        return f"exit code {code}" if ready else f"no answer in {HANG_S:g} s"
+
+    def _started(self) -> "subprocess.Popen[str]":
+        if self._process is None:
+            command = [sys.executable, "-m", "tests.foreign.worker", self._folder.name]
+            self._process = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1)
+        return self._process
+
+    def _end(self) -> None:
+        if self._process is not None:
+            with self._process:
+                self._process = None
+
+
+def run(reader: Reader, name: str, count: int, first: int = 0) -> Tally:
+    """Read ``count`` mutants of one format."""
     tally = Tally(name)
-    sample = SAMPLES[name]
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
-        whole = folder / f"sample-{sample.file}"
-        sample.make(folder / sample.file)
-        (folder / sample.file).rename(whole)
-        number, last = first, first + count
-        while number < last:
-            number = _serve(tally, folder, number, last)
+    for number in range(first, first + count):
+        found = reader.read(name, number)
+        if isinstance(found, str):
+            tally.deaths += 1
+            tally.faults.append(f"{name} {number}: {found}")
+        else:
+            _note(tally, number, found)
     return tally
 
 
-def _serve(tally: Tally, folder: Path, number: int, last: int) -> int:
-    """Read mutants from ``number`` on; the number of the one after the last that was read."""
-    command = [sys.executable, "-m", "tests.foreign.worker", str(folder), tally.name]
-    with subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        while number < last:
-            try:
-                process.stdin.write(f"{number}\n")
-                process.stdin.flush()
-            except BrokenPipeError:
-                break
-            ready, _, _ = select.select([process.stdout], [], [], HANG_S)
-            line = process.stdout.readline() if ready else ""
-            if not line:
-                _note_death(tally, process, number, hung=not ready)
-                return number + 1
-            _note(tally, number, json.loads(line))
-            number += 1
-    return number
-
-
-def _note_death(tally: Tally, process: "subprocess.Popen[str]", number: int, hung: bool) -> None:
-    if hung:
-        process.kill()
-        tally.hangs += 1
-    else:
-        tally.crashes += 1
-    what = f"no answer in {HANG_S:g} s" if hung else f"exit code {process.wait()}"
-    tally.faults.append(f"{tally.name} {number}: {what}")
-
-
-def _note(tally: Tally, number: int, found: dict[str, object]) -> None:
-    tally.codes[int(str(found["code"]))] += 1
-    seconds, megabytes = float(str(found["seconds"])), float(str(found["megabytes"]))
+def _note(tally: Tally, number: int, found: dict[str, Any]) -> None:
+    tally.codes[found["code"]] += 1
+    seconds, megabytes = found["seconds"], found["megabytes"]
     tally.worst_s = max(tally.worst_s, seconds)
     tally.worst_megabytes = max(tally.worst_megabytes, megabytes)
     if found["fault"]:
@@ -123,10 +134,11 @@ def main() -> int:
     given = parser.parse_args()
     print(" | ".join(HEAD), flush=True)
     faults = []
-    for name in given.formats or SAMPLES:
-        tally = run(name, given.count, given.first)
-        print(" | ".join(tally.row), flush=True)
-        faults += tally.faults
+    with Reader() as reader:
+        for name in given.formats or SAMPLES:
+            tally = run(reader, name, given.count, given.first)
+            print(" | ".join(tally.row), flush=True)
+            faults += tally.faults
     for fault in faults[:MOST_SHOWN]:
         print(f"\n{fault}")
     return 1 if faults else 0

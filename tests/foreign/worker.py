@@ -1,8 +1,9 @@
 """A process that reads mutants, one after the other, and says of each how it ended.
 
-    python -m tests.foreign.worker FOLDER NAME
+    python -m tests.foreign.worker FOLDER
 
-A line on standard input is the number of a mutant; the answer is a line of JSON.
+A line on standard input is the number of a mutant and the name of its format; the answer is a line
+of JSON.
 """
 
 import json
@@ -24,18 +25,23 @@ from tests.foreign.samples import SAMPLES, Sample
 MOST_MEMORY = 3_000_000_000
 
 
-def serve(folder: Path, name: str) -> None:
+def serve(folder: Path) -> None:
     """Answer until the input ends."""
-    sample = SAMPLES[name]
-    data = (folder / f"sample-{sample.file}").read_bytes()
-    path = folder / sample.file
+    whole: dict[str, bytes] = {}
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     warnings.simplefilter("ignore")
     for line in sys.stdin:
-        path.write_bytes(mutant(sample, name, data, int(line)))
+        number, _, name = line.strip().partition(" ")
+        sample = SAMPLES[name]
+        path = folder / sample.file
+        if name not in whole:
+            sample.make(path)
+            whole[name] = path.read_bytes()
+            sample.read(path)
+        path.write_bytes(mutant(sample, name, whole[name], int(number)))
         print(json.dumps(_outcome(sample, path)), file=answers)
 
 
@@ -91,4 +97,4 @@ def _peak(pid: str) -> float:
 
 
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]), sys.argv[2])
+    serve(Path(sys.argv[1]))

@@ -53,6 +53,8 @@ def _send(answers: IO[bytes], answer: dict[str, Any]) -> None:
         write_frame(answers, answer)
     except MemoryError:
         write_frame(answers, {"error": "memory"})
+    except TypeError as error:  # before anything was written: the value is not plain
+        write_frame(answers, {"error": "other", "said": _words(error)})
 
 
 def _words(error: Exception) -> str:
