@@ -1,14 +1,11 @@
 """What is no file, too large, or hostile is refused at once, with a sentence, before it is read."""
 
-import json
 import os
-import resource
 import struct
 import subprocess
 import sys
 import zlib
 from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +97,9 @@ def test_a_pipe_that_takes_the_place_of_a_file_is_refused_too(
     "error", [AttributeError("x"), RecursionError(), MemoryError(), KeyError()]
 )
 def test_whatever_a_parser_raises_is_one_sentence(error: Exception) -> None:
-    with pytest.raises(InputError, match=r"^a\.bin .*Write it again\.$") as caught:
-        with reading("a.bin", KIND):
-            raise error
+    words = r"^a\.bin .*Write it again\.$"
+    with pytest.raises(InputError, match=words) as caught, reading("a.bin", KIND):
+        raise error
     assert caught.value.__cause__ is error
     assert "\n" not in str(caught.value)
 
@@ -238,6 +235,3 @@ def test_a_log_with_a_cell_of_a_megabyte(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text('t,angle,torque\n0,"' + "1" * 1_000_000 + '",2\n1,2,3\n')
     assert "a.csv" in refused(lambda file: import_table(file, columns=COLUMNS), path)
-
-
-_ = (BytesIO, json, resource)

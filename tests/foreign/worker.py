@@ -38,6 +38,7 @@ def serve(folder: Path) -> None:
         sample = SAMPLES[name]
         path = folder / sample.file
         if name not in whole:
+            path.unlink(missing_ok=True)
             sample.make(path)
             whole[name] = path.read_bytes()
             sample.read(path)

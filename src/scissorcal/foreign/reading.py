@@ -52,9 +52,7 @@ def open_foreign(path: Path, kind: Format) -> Iterator[IO[bytes]]:
 def read_foreign(path: Path, kind: Format) -> bytes:
     """All bytes of a regular file that is not empty; raises InputError as `open_foreign` does."""
     with reading(path, kind), open_foreign(path, kind) as file:
-        data = file.read(kind.most_bytes + 1)
-    if len(data) > kind.most_bytes:  # it grew meanwhile
-        raise InputError(too_large(path, kind))
+        data = file.read(os.fstat(file.fileno()).st_size)  # what is asked for is reserved at once
     if not data:
         raise InputError(f"{path} is empty (0 bytes). {kind.remedy}")
     return data
