@@ -71,7 +71,7 @@ class Child:
             with self._within(kind.wall_s) as watch:
                 assert self._process.stdin is not None
                 with contextlib.suppress(BrokenPipeError):  # why it ended is told by its exit code
-                    write_frame(self._process.stdin, request)  # type: ignore[arg-type]
+                    write_frame(self._process.stdin, request)
                 answer = self._receive(kind.memory_bytes)
         except (EOFError, FrameError, OSError):
             code = self._end()

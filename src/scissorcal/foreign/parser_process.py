@@ -24,7 +24,7 @@ def serve() -> None:
     _bound_forever()
     while True:
         try:
-            request = read_frame(requests.readinto, _LARGEST_REQUEST)  # type: ignore[attr-defined]
+            request = read_frame(requests.readinto, _LARGEST_REQUEST)
         except EOFError:
             return
         _send(answers, _answer(request))

@@ -84,7 +84,7 @@ def _loader() -> "type[yaml.Loader]":
         depth = 0
 
         def compose_node(self, parent: Any, index: Any) -> Any:
-            event: Any = self.peek_event()
+            event: Any = self.peek_event()  # type: ignore[no-untyped-call]
             if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
                 raise yaml.YAMLError("anchors and aliases (&, *) are not read: write values out")
             self.depth += 1

@@ -71,7 +71,8 @@ def load_variables(data: bytes) -> dict[str, Any]:
 def _load_version_5(data: bytes) -> Mapping[str, Any]:
     from scipy.io import loadmat
 
-    variables: Mapping[str, Any] = loadmat(BytesIO(data), simplify_cells=True)
+    stream: Any = BytesIO(data)
+    variables: Mapping[str, Any] = loadmat(stream, simplify_cells=True)
     return variables
 
 

@@ -28,7 +28,7 @@ from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any
-noise, have 12."""
+noise, have 9 at most."""
 LONGEST_SHEET_NUMBER = 9
 MOST_DAMAGE = 20
 """Places of damage that are listed; of further ones the number."""
@@ -232,8 +232,8 @@ class _Walk:
                     stated = number in self.others or self.channel is not None
                     runs.setdefault(number if stated else None, []).append(view[at:end])
             at = end
-        for number, parts in runs.items():
-            self._take_run(number, b"".join(parts))
+        for channel, parts in runs.items():
+            self._take_run(channel, b"".join(parts))
 
     def _is_known(self, number: int, size: int) -> bool:
         """Whether a message record of this size is of a channel that scissorcal reads."""

@@ -139,7 +139,7 @@ def _kalibr(path: Path, facts: Mapping[str, Any]) -> CameraFile:
 
 def _from_ros(path: Path, facts: Mapping[str, Any]) -> CameraFile:
     def data(*keys: str) -> Any:
-        found = next((facts[key] for key in keys if key in facts), [])
+        found: Any = next((facts[key] for key in keys if key in facts), [])
         return np.array(_numbers(found["data"] if isinstance(found, Mapping) else found))
 
     model = facts.get("distortion_model", "plumb_bob")
