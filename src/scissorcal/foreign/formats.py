@@ -60,7 +60,7 @@ FIT = Format(
     500 * _MB,
     "Remove it and fit again.",
     memory_bytes=2 * _GB,
-    processor_s=20,
+    processor_s=10,
 )
 """A fit has at most some 20,000 draws of 50 parameters and as many predictions: 8 to 80 MB."""
 
@@ -72,6 +72,7 @@ PHOTOGRAPH = Format(
     300 * _MB,
     "Copy it from the camera again.",
     memory_bytes=2 * _GB,
+    processor_s=20,
 )
 """The most pixels that are read (89 million) of three bytes, not compressed, have 268 MB. The
 memory is the picture with transparency (360 MB), a copy of it, and what is handed back."""

@@ -6,6 +6,7 @@ One function a kind of file; each gives plain values, which the index keeps. Eve
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,8 @@ def refuse_changed(folder: Path, sha256: Mapping[str, str], digest: Callable[[Pa
 def photographs(path: Path) -> Facts:
     """Facts of a folder of photographs by its index file."""
     remedy = f"Remove {path.parent.name} and capture its photographs again."
-    with reading(path, PHOTO_INDEX, remedy):
-        index = read_json(path, PHOTO_INDEX)
+    kind = replace(PHOTO_INDEX, remedy=remedy)
+    with reading(path, kind):
+        index = read_json(path, kind)
         sha256 = {str(one["file"]): str(one["sha256"]) for one in index["photographs"]}
     return {"content": file_digest(path), "photographs": len(sha256), "sha256": sha256}

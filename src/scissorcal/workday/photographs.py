@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -281,5 +281,6 @@ def _new_folder(workspace: Workspace, kind: PhotoKind) -> Path:
 
 def _index(path: Path) -> PhotoIndex:
     remedy = f"Remove {path.parent.name} and capture its photographs again."
-    with reading(path, PHOTO_INDEX, remedy):
-        return PhotoIndex.model_validate_json(read_foreign(path, PHOTO_INDEX))
+    kind = replace(PHOTO_INDEX, remedy=remedy)
+    with reading(path, kind):
+        return PhotoIndex.model_validate_json(read_foreign(path, kind))
