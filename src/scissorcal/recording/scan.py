@@ -29,6 +29,10 @@ from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any
 noise, have 9 at most."""
+MOST_RECORDS = LARGEST_CHUNK // 50
+"""Records of a chunk, or runs of them: the smallest message that tools write has 50 bytes."""
+MOST_CHANNELS = 1000
+"""Different channels of a file; scissorcal writes four."""
 LONGEST_SHEET_NUMBER = 9
 MOST_DAMAGE = 20
 """Places of damage that are listed; of further ones the number."""
@@ -158,6 +162,7 @@ class _Walk:
     events: list[Event] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     topics: set[str] = field(default_factory=set)
+    channels: set[bytes] = field(default_factory=set)
     channel: int | None = None
     others: dict[int, TelemetryChannel] = field(default_factory=dict)
     stated_count: int | None = None
@@ -206,6 +211,9 @@ class _Walk:
     def _take_channel(self, body: bytes) -> None:
         from mcap.records import Channel
 
+        if body in self.channels:
+            return
+        self.channels.add(body)
         channel = parse_record(Channel, body)
         self.topics.add(channel.topic)
         if channel.topic == layout.TOPIC:
@@ -219,8 +227,11 @@ class _Walk:
 
         self.room -= len(data)
         runs: dict[int | None, list[memoryview]] = {}
-        view, at = memoryview(data), 0
+        view, at, count = memoryview(data), 0, 0
         while at + HEAD.size <= len(data):
+            count += 1
+            if count > MOST_RECORDS or len(self.channels) > MOST_CHANNELS:
+                raise DamageError("a chunk of records that are smaller than any message")
             opcode, length = HEAD.unpack_from(data, at)
             end = at + HEAD.size + length
             if opcode == Opcode.CHANNEL:
