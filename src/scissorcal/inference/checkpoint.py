@@ -68,7 +68,8 @@ def load_walks(
     """
     walks = _read(path)
     first = walks[0]
-    own = first.coords.shape == shape
+    own = first.coords.shape == first.chain.shape[1:] == shape
+    own = own and first.heights.shape == shape[:1]
     heights = [log_posterior(point) for point in first.coords] if own else []
     if not own or not np.allclose(heights, first.heights, rtol=1e-6, atol=1e-3):
         raise CheckpointError(

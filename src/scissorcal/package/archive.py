@@ -245,10 +245,11 @@ def _read_member(
         if member.rows is not None:
             table = Table16(array, _rows16(member.rows)).decoded()
             array = np.stack([table.x, table.y, table.slope])
-    except (ValueError, SyntaxError, TypeError, KeyError) as error:
+    except Exception as error:
+        why = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"{where} is not an array as the manifest states: {error}. {REMEDY}"
-        ) from None
+            f"{where} is not an array as the manifest states: {why.rstrip('.')}. {REMEDY}"
+        ) from error
     if not np.isfinite(array).all():
         raise InputError(f"{where} holds a number that is not finite. {REMEDY}")
     return array

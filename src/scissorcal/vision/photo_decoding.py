@@ -2,6 +2,7 @@
 
 import struct
 import warnings
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -51,6 +52,8 @@ def _opened(data: bytes, path: str) -> "Iterator[Image.Image]":
             with Image.open(BytesIO(data), formats=_FORMATS) as opened:
                 if max(opened.size) > MOST_SIDE_PX:
                     raise InputError(_too_long(path, opened.size))  # noqa: TRY301
+                if opened.format == "PNG":
+                    _check_png(data)
                 yield opened
         except (InputError, MemoryError):
             raise
@@ -65,6 +68,20 @@ def _opened(data: bytes, path: str) -> "Iterator[Image.Image]":
             raise InputError(
                 f"{path} is damaged or truncated ({error}). {PHOTOGRAPH.remedy}"
             ) from None
+
+
+def _check_png(data: bytes) -> None:
+    """ValueError where a checksum of a picture's own chunks is wrong; Pillow shows such pixels."""
+    at = 8
+    while at + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, at)
+        name, end = data[at + 4 : at + 8], at + 8 + length
+        own = name[:1].isupper()  # what only adds to a picture begins with a small letter
+        if own and zlib.crc32(data[at + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
+            raise ValueError(f"the checksum of the part at byte {at} does not match")
+        if name == b"IEND":
+            return
+        at = end + 4
 
 
 def _too_long(path: str, size: tuple[int, int]) -> str:
