@@ -351,6 +351,16 @@ def test_foreign_files_are_refused(data: bytes, tmp_path: Path) -> None:
         open_package(path)
 
 
+@pytest.mark.parametrize("kappa", [1e-300, 1e-45])
+def test_numbers_that_the_kernel_cannot_hold_are_refused(copy_of_paper: Path, kappa: float) -> None:
+    def change(facts: Any, _: Members) -> None:
+        facts["mechanics"]["fracture"]["kappa"] = kappa
+
+    forge(copy_of_paper, change)
+    with pytest.raises(InputError, match=r"copy\.zip: its tables .* do not form a model"):
+        open_package(copy_of_paper)
+
+
 def test_deeply_nested_json_is_refused(copy_of_paper: Path) -> None:
     pack(copy_of_paper, members(copy_of_paper) | {"manifest.json": b"[" * 200_000})
     with pytest.raises(InputError, match="nested too deeply for JSON"):
