@@ -1,4 +1,4 @@
-"""Commands on files of others that are no files, damaged or hostile: a sentence, exit 2, one JSON."""
+"""Files of others that are no files, damaged or hostile: a sentence, exit 2 and one object."""
 
 import json
 import os
