@@ -4,11 +4,7 @@
 past them.
 """
 
-import io
 import json
-import struct
-import zipfile
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +20,6 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.identity import bytes_digest
 from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
-from scissorcal.package.manifest import content_hash
 from scissorcal.package.review import REVIEW_FORMAT, Review
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
@@ -46,13 +41,18 @@ from scissorcal.vision.photo import read_photo
 from scissorcal.vision.stances import read_stances
 from tests.calibration.results import results
 from tests.calibration.test_store import checked
+from tests.foreign.seals import (
+    Seal,
+    changed_member,
+    sealed_fit,
+    sealed_package,
+    sealed_png,
+    sealed_recording,
+)
 from tests.recording.logs import COLUMNS, UNITS, rows, written
 from tests.recording.made import made_samples, written_live
 from tests.recording.test_import_formats import MAT_COLUMNS, MAT_UNITS, mat_variables, written_mat73
 from tests.vision.test_camera_files import CAMERA, KALIBR, OPENCV_1, ROS_MESSAGE
-
-Change = Callable[[bytes], bytes]
-Seal = Callable[[bytes, Change], bytes]
 
 
 @dataclass(frozen=True)
@@ -105,11 +105,6 @@ def _read_recording(path: Path) -> None:
     summary(recording)
     read_attachments(path)
     read_telemetry(path, PICTURE)
-
-
-def _sealed_fit(data: bytes, change: Change) -> bytes:
-    body = change(data[: -len(b"\nscissorcal sha256 ") - 65])
-    return body + b"\nscissorcal sha256 " + bytes_digest(body).encode() + b"\n"
 
 
 def _fit(name: str) -> Callable[[Path], None]:
@@ -167,20 +162,6 @@ def _read_photo(path: Path) -> None:
     assert photo.sha256 == bytes_digest(path.read_bytes())
 
 
-def _sealed_png(data: bytes, change: Change) -> bytes:
-    """A changed picture with right checksums for the chunks that can be found."""
-    data = change(data)
-    parts, at = [data[:8]], 8
-    while at + 12 <= len(data):
-        (length,) = struct.unpack_from(">I", data, at)
-        body = data[at + 4 : at + 8 + length]
-        if at + 12 + length > len(data):
-            break
-        parts.append(data[at : at + 4] + body + struct.pack(">I", zlib.crc32(body)))
-        at += 12 + length
-    return b"".join(parts) + data[at:]
-
-
 def _package(path: Path) -> None:
     from scissorcal.package import build_package
     from tests.package.fits import cut_fit, friction_fit, recipe
@@ -199,59 +180,6 @@ def _read_package(path: Path) -> None:
         assert np.isfinite(package.torque(opening, -0.2, contact)).all()
         package.band(opening, -0.2, contact)
     _ = package.warnings, package.kernel()
-
-
-def _changed_member(data: bytes, change: Change) -> bytes:
-    """A zip of which one member is changed, with right checksums."""
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        content = {name: archive.read(name) for name in archive.namelist()}
-    names = sorted(content)
-    name = names[zlib.crc32(change(bytes(range(256)))) % len(names)]
-    content[name] = change(content[name])
-    return _packed(content)
-
-
-def _packed(content: dict[str, bytes]) -> bytes:
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w") as archive:
-        for name, body in content.items():
-            archive.writestr(name, body)
-    return stream.getvalue()
-
-
-def _sealed_package(data: bytes, change: Change) -> bytes:
-    """A package of which a member is changed, with right hashes in a manifest that can be read."""
-    changed = _changed_member(data, change)
-    with zipfile.ZipFile(io.BytesIO(changed)) as archive:
-        content = {name: archive.read(name) for name in archive.namelist()}
-    try:
-        facts = json.loads(content["manifest.json"])
-        for member in facts["members"]:
-            body = content[member["file"]]
-            member["bytes"], member["sha256"] = len(body), bytes_digest(body)
-        facts["content_hash"] = content_hash(facts)
-        content["manifest.json"] = json.dumps(facts).encode()
-    except (ValueError, KeyError, TypeError, RecursionError):  # no manifest any more
-        return changed
-    return _packed(content)
-
-
-def _sealed_recording(data: bytes, change: Change) -> bytes:
-    """A recording of which the unpacked bytes of every chunk are changed, with right checksums."""
-    import zstandard
-
-    parts, at = [data[:8]], 8
-    while at + 9 <= len(data) - 8:
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        body = data[at + 9 : at + 9 + length]
-        if opcode == 6:
-            plain = change(zstandard.decompress(body[44:]))
-            packed = zstandard.compress(plain)
-            head = struct.pack("<QI", len(plain), zlib.crc32(plain))
-            body = body[:16] + head + body[28:36] + struct.pack("<Q", len(packed)) + packed
-        parts.append(struct.pack("<BQ", opcode, len(body)) + body)
-        at += 9 + length
-    return b"".join(parts) + data[at:]
 
 
 def _report(path: Path) -> None:
@@ -412,8 +340,8 @@ SAMPLES: dict[str, Sample] = {
     "MATLAB 5": Sample("log5.mat", _mat, _log(MAT_COLUMNS, MAT_UNITS)),
     "MATLAB 5, not packed": Sample("plain5.mat", _plain_mat, _log(MAT_COLUMNS, MAT_UNITS)),
     "MATLAB 7.3": Sample("log73.mat", written_mat73, _log(MAT_COLUMNS, MAT_UNITS)),
-    "recording MCAP": Sample("a.mcap", _recording, _read_recording, _sealed_recording),
-    "fit netCDF": Sample("plate.nc", _fit("plate"), _read_fit("plate"), _sealed_fit),
+    "recording MCAP": Sample("a.mcap", _recording, _read_recording, sealed_recording),
+    "fit netCDF": Sample("plate.nc", _fit("plate"), _read_fit("plate"), sealed_fit),
     "trust check": Sample("cut.verify.json", _trust_check, _read_trust_check),
     "OpenCV YAML": Sample("camera.yml", _opencv, _read_camera),
     "OpenCV YAML 1.0": Sample("camera1.yml", _camera(OPENCV_1), _read_camera),
@@ -423,12 +351,12 @@ SAMPLES: dict[str, Sample] = {
     "ROS message": Sample("message.yaml", _camera(ROS_MESSAGE), _read_camera),
     "Kalibr YAML": Sample("kalibr.yaml", _camera(KALIBR), _read_camera),
     "JPEG": Sample("a.jpg", _photo("JPEG", exif=b"Exif\0\0II*\0\x08\0\0\0\0\0"), _read_photo),
-    "PNG": Sample("a.png", _photo("PNG"), _read_photo, _sealed_png),
-    "PNG, 16 bits": Sample("deep.png", _deep_photo, _read_photo, _sealed_png),
+    "PNG": Sample("a.png", _photo("PNG"), _read_photo, sealed_png),
+    "PNG, 16 bits": Sample("deep.png", _deep_photo, _read_photo, sealed_png),
     "TIFF": Sample("a.tif", _photo("TIFF", compression="tiff_lzw"), _read_photo),
     "BMP": Sample("a.bmp", _photo("BMP"), _read_photo),
     "WebP": Sample("a.webp", _photo("WEBP"), _read_photo),
-    "model package": Sample("paper.zip", _package, _read_package, _sealed_package),
+    "model package": Sample("paper.zip", _package, _read_package, sealed_package),
     "report.json": Sample("report.json", _report, _read_report),
     "signature.json": Sample("signature.json", _signature, _read_signature),
     "capture.json": Sample("capture.json", _photo_index, _read_photo_index),
@@ -436,7 +364,7 @@ SAMPLES: dict[str, Sample] = {
     "surface CSV": Sample("heights.csv", _surface, _read_surface),
     "stances CSV": Sample("stances.csv", _stances, _read_stances),
     "track of lines": Sample("track.jsonl", _track_lines, _read_track_lines),
-    "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint, _changed_member),
+    "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint, changed_member),
     "file index": Sample("index.json", _state_index, _read_state_index),
 }
 """By the names of the table."""

@@ -1,6 +1,7 @@
 """A parser in a child process: its answer, and every way in which it dies as one sentence."""
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -34,6 +35,13 @@ def test_numbers_text_and_lists_come_back() -> None:
 def test_one_child_serves_many_files() -> None:
     pids = {parse_isolated(f"{HERE}:good", b"a", "a.bin", KIND)["pid"] for _ in range(20)}
     assert len(pids) == 1
+
+
+def test_a_child_that_ended_while_it_waited_is_replaced() -> None:
+    first = parse_isolated(f"{HERE}:good", b"a", "a.bin", KIND)["pid"]
+    os.kill(first, signal.SIGKILL)
+    os.waitid(os.P_PID, first, os.WEXITED | os.WNOWAIT)
+    assert parse_isolated(f"{HERE}:good", b"a", "a.bin", KIND)["pid"] != first
 
 
 def test_threads_have_children_of_their_own() -> None:

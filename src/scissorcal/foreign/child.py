@@ -61,6 +61,11 @@ class Child:
         """The number of the process."""
         return self._process.pid
 
+    @property
+    def runs(self) -> bool:
+        """Whether the process has not ended by itself, or by somebody's hand."""
+        return self._process.poll() is None
+
     def ask(
         self, function: str, data: bytes, options: dict[str, Any], kind: Format
     ) -> dict[str, Any]:

@@ -35,10 +35,7 @@ def parse_isolated(
     """
     from scissorcal.foreign.child import Child, DiedError
 
-    try:
-        child = _idle.pop()
-    except IndexError:
-        child = Child()
+    child = _waiting() or Child()
     try:
         answer = child.ask(function, data, options, kind)
     except DiedError as death:
@@ -60,6 +57,19 @@ def close_children() -> None:
     """End all children that wait for a file; the next file starts one anew."""
     while _idle:
         _idle.pop().close()
+
+
+def _waiting() -> "Child | None":
+    """A child that waits for a file; None where there is none, or all have ended meanwhile."""
+    while _idle:
+        try:
+            child = _idle.pop()
+        except IndexError:  # another thread took the last one
+            return None
+        if child.runs:
+            return child
+        child.close()
+    return None
 
 
 def _reported(answer: dict[str, Any], path: Path | str, kind: Format) -> ScissorcalError:
