@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import tempfile
 import time
 from typing import Any
 
@@ -61,7 +62,7 @@ def talk(data: bytes) -> str:
 
 
 def write_a_file(data: bytes) -> None:
-    with open("/tmp/never-written", "wb") as file:  # noqa: PTH123
+    with tempfile.TemporaryFile() as file:
         file.write(b"a")
         file.flush()
 
