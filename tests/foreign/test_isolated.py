@@ -70,7 +70,7 @@ def test_threads_have_children_of_their_own() -> None:
         ("fail", "or it is damaged (AttributeError: no such thing)"),
         ("nothing_plain", "or it is damaged (TypeError: set is no plain value)"),
         ("not_there", "or it is damaged (AttributeError"),
-        ("write_a_file", "or it is damaged (OSError"),
+        ("write_a_file", "No usable temporary directory"),
     ],
 )
 def test_what_goes_wrong_is_a_sentence_and_the_next_file_is_read(name: str, words: str) -> None:
