@@ -130,14 +130,16 @@ def test_a_flipped_or_missing_byte_is_refused(
         content[index] ^= flip
     path = stored.with_name("damaged.nc")
     path.write_bytes(content)
-    refused(path, PlateFit, "or it is damaged", "run 'scissorcal fit plate' again")
+    why = "or it is damaged" if content else "is empty"
+    refused(path, PlateFit, why, "run 'scissorcal fit plate' again")
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"[1, 2", b"not a fit", b"\x89HDF\r\n\x1a\n"])
 def test_a_file_of_another_format_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "camera.nc"
     path.write_bytes(content)
-    refused(path, CameraFit, "is not a", "run 'scissorcal fit camera' again")
+    why = "is not a" if content else "is empty"
+    refused(path, CameraFit, why, "run 'scissorcal fit camera' again")
 
 
 def test_a_result_of_another_kind_is_refused(stored: Path) -> None:

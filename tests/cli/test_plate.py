@@ -105,7 +105,7 @@ def test_stances_are_checked_line_by_line(
     assert captured(workspace) == []
     said = cli("capture", "plate", "-i", cards(album)[0], "--stances", tmp_path / "none.csv")
     assert said.code == 2
-    assert "none.csv cannot be read" in said.err
+    assert "none.csv does not exist" in said.err
 
 
 def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Path) -> None:

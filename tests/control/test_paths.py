@@ -57,7 +57,7 @@ def test_a_path_is_read_with_its_lines(tmp_path: Path) -> None:
         ("x,y\n1,2\n", "line 1: the columns must be x_mm"),
         ("y_mm\n1\n2\n", "line 1: the columns must be x_mm"),
         ("x_mm,x_mm\n1,2\n", "line 1"),
-        ("", "line 1"),
+        ("", "is empty"),
         ("x_mm\n1\n", "has 1 points"),
         ('x_mm\n"1\n2\n', "line 2: x_mm is"),
         (f"x_mm\n1\n{'2' * 200_000}\n", "line 3: no number has so many characters"),
@@ -75,7 +75,7 @@ def test_a_path_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         read_path(tmp_path)
     (tmp_path / "path.csv").write_bytes(b"x_mm\n\xff\xfe\n")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="byte 5: this is not UTF-8"):
         read_path(tmp_path / "path.csv")
 
 

@@ -17,8 +17,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError, MissingError, ScissorcalError
+from scissorcal.foreign.formats import PACKAGE
 from scissorcal.package import PackageSummary, build_package, check_package, open_package
-from scissorcal.package.archive import LARGEST_ARCHIVE, array_bytes, member_of
+from scissorcal.package.archive import array_bytes, member_of
 from scissorcal.package.manifest import content_hash
 from tests.package.fits import cut_fit, friction_fit, recipe
 
@@ -350,9 +351,19 @@ def test_foreign_files_are_refused(data: bytes, tmp_path: Path) -> None:
         open_package(path)
 
 
+@pytest.mark.parametrize("kappa", [1e-300, 1e-60])
+def test_numbers_that_the_kernel_cannot_hold_are_refused(copy_of_paper: Path, kappa: float) -> None:
+    def change(facts: Any, _: Members) -> None:
+        facts["mechanics"]["fracture"]["kappa"] = kappa
+
+    forge(copy_of_paper, change)
+    with pytest.raises(InputError, match=r"copy\.zip: its tables .* do not form a model"):
+        open_package(copy_of_paper)
+
+
 def test_deeply_nested_json_is_refused(copy_of_paper: Path) -> None:
     pack(copy_of_paper, members(copy_of_paper) | {"manifest.json": b"[" * 200_000})
-    with pytest.raises(InputError, match="not JSON"):
+    with pytest.raises(InputError, match="nested too deeply for JSON"):
         open_package(copy_of_paper)
 
 
@@ -363,7 +374,7 @@ def test_a_missing_file_a_folder_and_a_large_file_are_refused(tmp_path: Path) ->
         open_package(tmp_path)
     giant = tmp_path / "giant.zip"
     with giant.open("wb") as stream:
-        stream.truncate(LARGEST_ARCHIVE + 1)
+        stream.truncate(PACKAGE.most_bytes + 1)
     with pytest.raises(InputError, match="another file"):
         open_package(giant)
     with pytest.raises(ScissorcalError):

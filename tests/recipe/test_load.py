@@ -215,7 +215,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         load_recipe(latin)
     huge = tmp_path / "huge.toml"
     huge.write_bytes(b"#" * 1_000_001)
-    with pytest.raises(InputError, match="too many for a recipe"):
+    with pytest.raises(InputError, match="has more than 1 MB, too much for a recipe"):
         load_recipe(huge)
     with pytest.raises(InputError, match="cannot be read"):
         load_recipe(tmp_path)

@@ -240,9 +240,9 @@ def test_repeated_headings(tmp_path: Path) -> None:
         ("log.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text table"),
         ("log.csv", "t,angle,torque\n0,1,2\n".encode("utf-16"), "Save it as CSV in UTF-8"),
         ("log.csv", b"hello\nworld\n", "no row of numbers"),
-        ("log.mat", b"hello" * 100, "cannot be read as a MATLAB file"),
-        ("log.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "cannot be read as a MATLAB 7.3 file"),
-        ("log.parquet", b"PAR1" + bytes(60) + b"PAR1", "cannot be read as Parquet"),
+        ("log.mat", b"hello" * 100, "is not a MATLAB file, or it is damaged"),
+        ("log.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "is not a MATLAB file, or it is damaged"),
+        ("log.parquet", b"PAR1" + bytes(60) + b"PAR1", "is not a Parquet table, or it is damaged"),
     ],
 )
 def test_files_that_are_no_tables(tmp_path: Path, name: str, data: bytes, words: str) -> None:
@@ -253,7 +253,7 @@ def test_files_that_are_no_tables(tmp_path: Path, name: str, data: bytes, words:
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
-    assert "is not a file" in refusal(tmp_path / "log.csv")
+    assert "does not exist" in refusal(tmp_path / "log.csv")
 
 
 def test_no_motion_is_noted(tmp_path: Path) -> None:

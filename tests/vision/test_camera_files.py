@@ -93,7 +93,8 @@ def test_camera_files_of_other_tools_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is not a camera file"),
+        ("", "is empty"),
+        ("- 1\n", "is not a camera file"),
         ("a: 1\n", "neither camera_matrix nor cam0"),
         ("{{", "damaged"),
         ("%YAML:1.0\n---\ncamera_matrix: 5\n", "no 3 x 3 matrix"),

@@ -10,7 +10,7 @@ bytes. A result without arrays may be kept as plain JSON, in a file that ends in
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from io import BytesIO
 from operator import attrgetter
@@ -33,13 +33,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.result import FitResult, Result, Stored, command_words
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.files import replacing
+from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
+from scissorcal.foreign.formats import FIT
 from scissorcal.identity import bytes_digest
 
 if TYPE_CHECKING:
     import h5netcdf
-    import h5py
 
 R = TypeVar("R", bound=Result)
 
@@ -90,11 +91,11 @@ def load(path: Path, kind: type[R]) -> R:
     """
     with _reported(path, kind):
         if path.suffix == ".json":
-            return cast(R, _built(kind, json.loads(path.read_bytes()), None))
-        with _opened(path, kind) as file:
-            if file.attrs["kind"] != kind.__name__:
-                raise ValueError(f"it holds a {file.attrs['kind']}")
-            return cast(R, _built(kind, json.loads(file.attrs["scissorcal"]), file))
+            return cast(R, _built(kind, read_json(path, _format_of(path, kind)), None))
+        file = _opened(path, kind)
+        if file.attributes["kind"] != kind.__name__:
+            raise ValueError(f"it holds a {file.attributes['kind']}")
+        return cast(R, _built(kind, json.loads(file.attributes["scissorcal"]), file))
 
 
 def load_fit(path: Path) -> FitResult:
@@ -104,8 +105,9 @@ def load_fit(path: Path) -> FitResult:
 
 def read_header(path: Path) -> Header:
     """Read what a stored result is of; raises InputError as :func:`load` does."""
-    with _reported(path, Result), _opened(path, Result) as file:
-        return cast(Header, _built(Header, json.loads(file.attrs["header"]), None))
+    with _reported(path, Result):
+        file = _opened(path, Result, with_variables=False)
+        return cast(Header, _built(Header, json.loads(file.attributes["header"]), None))
 
 
 @contextmanager
@@ -113,7 +115,9 @@ def _reported(path: Path, kind: type[Result]) -> Iterator[None]:
     """Turn what goes wrong within into an InputError that names the file and the remedy."""
     try:
         yield
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+    except ScissorcalError:
+        raise
+    except Exception as error:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"{path} is not a {kind.title} of scissorcal, or it is damaged ({why}): "
@@ -128,12 +132,30 @@ def _again(path: Path, kind: type[Result]) -> str:
     return f"run '{kind.command} {command_words(path.stem)} --force'"
 
 
-@contextmanager
-def _opened(path: Path, kind: type[Result]) -> "Iterator[h5py.File]":
-    """The netCDF data of a file whose hash and version are right."""
-    import h5py
+def _format_of(path: Path, kind: type[Result]) -> Format:
+    again = _again(path, kind)
+    return replace(
+        FIT, name=f"a {kind.title} of scissorcal", remedy=f"{again[0].upper()}{again[1:]}."
+    )
 
-    content = path.read_bytes()
+
+@dataclass(frozen=True)
+class _Contents:
+    """The netCDF data of a file: its root's texts, and its variables by path."""
+
+    attributes: Mapping[str, str]
+    variables: Mapping[str, NDArray[Any]]
+
+    def __getitem__(self, at: str) -> NDArray[Any]:
+        return self.variables[at.strip("/")]
+
+
+def _opened(path: Path, kind: type[Result], *, with_variables: bool = True) -> _Contents:
+    """The netCDF data of a file whose hash and version are right."""
+    if not path.exists():
+        raise FileNotFoundError("No such file")
+    form = _format_of(path, kind)
+    content = read_foreign(path, form)
     data, seal = content[:-_SEAL_SIZE], content[-_SEAL_SIZE:]
     if seal != _seal(data):
         for version in EARLIER:
@@ -143,10 +165,12 @@ def _opened(path: Path, kind: type[Result]) -> "Iterator[h5py.File]":
                     f"this version does not read: remove it and run '{kind.command}' again."
                 )
         raise ValueError("its SHA-256 does not match its content")
-    with h5py.File(BytesIO(data), "r") as file:
-        if file.attrs["format"] != FORMAT:
-            raise ValueError(f"its format is {file.attrs['format']}, and this reads {FORMAT}")
-        yield file
+    load_contents = "scissorcal.calibration.store_contents:load_contents"
+    found = parse_isolated(load_contents, data, path, form, with_variables=with_variables)
+    file = _Contents(found["attributes"], found["variables"])
+    if file.attributes["format"] != FORMAT:
+        raise ValueError(f"its format is {file.attributes['format']}, and this reads {FORMAT}")
+    return file
 
 
 def _seal(data: bytes) -> bytes:
@@ -287,7 +311,7 @@ def _fields(kind: Any) -> Mapping[str, tuple[Any, Stored | None]]:
     return found
 
 
-def _built(hint: Any, value: Any, file: "h5py.File | None", stored: Stored | None = None) -> Any:
+def _built(hint: Any, value: Any, file: _Contents | None, stored: Stored | None = None) -> Any:
     """A value of type ``hint`` from its JSON. Raises ValueError where it is of another type."""
     origin, arguments = get_origin(hint), get_args(hint)
     if hint is Any:
@@ -311,7 +335,7 @@ def _built(hint: Any, value: Any, file: "h5py.File | None", stored: Stored | Non
 
 
 def _one_of(
-    kinds: tuple[Any, ...], value: Any, file: "h5py.File | None", stored: Stored | None
+    kinds: tuple[Any, ...], value: Any, file: _Contents | None, stored: Stored | None
 ) -> Any:
     if value is None and NoneType in kinds:
         return None
@@ -325,7 +349,7 @@ def _one_of(
 
 
 def _object_of(
-    kind: Any, value: dict[str, Any], file: "h5py.File | None", stored: Stored | None
+    kind: Any, value: dict[str, Any], file: _Contents | None, stored: Stored | None
 ) -> Any:
     known = _fields(kind)
     every = {one.name for one in fields(kind)}
@@ -340,7 +364,7 @@ def _object_of(
 
 
 def _array_of(
-    dtype: Any, value: Any, file: "h5py.File | None", stored: Stored | None
+    dtype: Any, value: Any, file: _Contents | None, stored: Stored | None
 ) -> NDArray[Any]:
     if not isinstance(value, dict) or len(value) != 1:
         _refuse(np.ndarray, value)
@@ -348,9 +372,9 @@ def _array_of(
         return np.zeros(value["empty"], dtype)
     assert file is not None
     if "variable" in value:
-        values = file[value["variable"]][...]
+        values = file[value["variable"]]
     else:
-        values = np.stack([file[at][...] for at in value["variables"]], axis=-1)
+        values = np.stack([file[at] for at in value["variables"]], axis=-1)
     chained = stored is not None and stored.dims[:1] == ("chain",)
     return np.asarray(values[0] if chained else values, dtype=dtype)
 

@@ -86,13 +86,14 @@ def import_(
         return _import_camera(file, folder)
 
     from scissorcal.recording import Joint, import_table, write_recording
+    from scissorcal.recording.table import column_of
 
     workspace = None if output else open_workspace(folder)
     rig = workspace.recipe().rig if workspace else None
     radius_mm = handle_radius_mm if handle_radius_mm or not rig else rig.handle_radius_mm
     recording = import_table(
         file,
-        columns={name: int(at) if at.isdigit() else at for name, at in _pairs("column", columns)},
+        columns={name: column_of(at) for name, at in _pairs("column", columns)},
         units=dict(_pairs("unit", units)),
         scale=dict(_pairs("scale", scales)),
         rate_Hz=rate_Hz,

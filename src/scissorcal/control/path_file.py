@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign_text
+from scissorcal.foreign.formats import PATH
 
 Array = NDArray[np.float64]
 
 COLUMNS = ("x_mm", "y_mm", "force_N", "speed_mm_per_s")
-LARGEST_FILE = 5_000_000
 LARGEST_MM = 10_000.0
 
 
@@ -55,14 +56,7 @@ def read_path(path: Path) -> SurfacePoints:
     One point a line, in the order in which they are passed. Raises InputError with file and line
     for a column or a number that is none, and where fewer than two points are left.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path} is larger than {LARGEST_FILE // 10**6} MB: thin it out.")
-        rows = csv.reader(path.read_text("utf-8-sig").splitlines(), quoting=csv.QUOTE_NONE)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist. Check the name and the folder.") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {error}.") from None
+    rows = csv.reader(read_foreign_text(path, PATH).splitlines(), quoting=csv.QUOTE_NONE)
     try:
         head = [name.strip() for name in next(rows, [])]
     except csv.Error:

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import open_foreign
+from scissorcal.foreign.formats import CHECKPOINT
 
 Array = NDArray[np.float64]
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
@@ -67,7 +68,8 @@ def load_walks(
     """
     walks = _read(path)
     first = walks[0]
-    own = first.coords.shape == shape
+    own = first.coords.shape == first.chain.shape[1:] == shape
+    own = own and first.heights.shape == shape[:1]
     heights = [log_posterior(point) for point in first.coords] if own else []
     if not own or not np.allclose(heights, first.heights, rtol=1e-6, atol=1e-3):
         raise CheckpointError(
@@ -79,7 +81,7 @@ def load_walks(
 
 def _read(path: Path) -> list[Walk]:
     try:
-        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+        with open_foreign(path, CHECKPOINT) as raw, np.load(raw, allow_pickle=False) as file:
             steps, thin = (int(count) for count in file["counts"])
             positions = file["positions"]
             return [
@@ -103,7 +105,7 @@ def _read(path: Path) -> list[Walk]:
                     strict=True,
                 )
             ]
-    except (OSError, ValueError, KeyError, EOFError, IndexError, BadZipFile) as error:
+    except Exception as error:
         raise CheckpointError(
             f"{path}: not a readable checkpoint ({error}); move it away, or name another file, to "
             "start afresh."

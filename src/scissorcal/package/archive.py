@@ -5,11 +5,9 @@ or names with another content, is refused before use.
 """
 
 import io
-import json
 import math
 import stat
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -20,6 +18,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
+from scissorcal.foreign import open_foreign, parse_json, reading
+from scissorcal.foreign.formats import PACKAGE
 from scissorcal.identity import bytes_digest
 from scissorcal.kernel import Row16, Table, Table16
 from scissorcal.package.manifest import (
@@ -34,24 +34,11 @@ from scissorcal.package.table_record import StoredRow
 from scissorcal.package.tables import Rows
 
 MANIFEST_FILE = "manifest.json"
-LARGEST_ARCHIVE = 16_000_000
 LARGEST_MANIFEST = 1_000_000
 MOST_MEMBERS = 32
 LARGEST_HEADER = 1_000
 
-REMEDY = "Build it again with 'scissorcal package build', or fetch an unchanged copy."
-
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    RuntimeError,
-    ValueError,
-    OverflowError,
-)
-"""What the standard library raises for a damaged archive or another file."""
+REMEDY = PACKAGE.remedy
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -162,33 +149,16 @@ def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 @contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open the zip; what the standard library says of a damaged one becomes an InputError."""
-    _check_file(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            yield archive
-    except _DAMAGE as error:
-        reason = str(error) or type(error).__name__
-        raise InputError(
-            f"{path} is not a readable package, or it is damaged ({reason}). {REMEDY}"
-        ) from error
-
-
-def _check_file(path: Path) -> None:
-    try:
-        facts = path.stat()
-    except FileNotFoundError:
+    if not path.exists():
         raise MissingError(
             f"{path} does not exist: build a package first with 'scissorcal package build'."
-        ) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read ({error}): check the path.") from None
-    if not stat.S_ISREG(facts.st_mode):
-        raise InputError(f"{path} is not a file: name the package's .zip file.")
-    if facts.st_size > LARGEST_ARCHIVE:
-        raise InputError(
-            f"{path} has {facts.st_size} bytes; a package has at most {LARGEST_ARCHIVE}, so this "
-            f"is another file. {REMEDY}"
         )
+    with (
+        reading(path, PACKAGE),
+        open_foreign(path, PACKAGE) as file,
+        zipfile.ZipFile(file) as archive,
+    ):
+        yield archive
 
 
 def _entries(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -228,8 +198,8 @@ def _read_manifest(
     if MANIFEST_FILE not in infos:
         raise InputError(f"{path} has no {MANIFEST_FILE}, so it is not a package. {REMEDY}")
     data = _read_bounded(where, archive, infos[MANIFEST_FILE], LARGEST_MANIFEST)
+    facts = parse_json(data, where, REMEDY)
     try:
-        facts = json.loads(data.decode("utf-8"))
         plain = canonical(facts)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where} is not JSON ({error}). {REMEDY}") from None
@@ -275,10 +245,11 @@ def _read_member(
         if member.rows is not None:
             table = Table16(array, _rows16(member.rows)).decoded()
             array = np.stack([table.x, table.y, table.slope])
-    except (ValueError, SyntaxError, TypeError, KeyError) as error:
+    except Exception as error:
+        why = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"{where} is not an array as the manifest states: {error}. {REMEDY}"
-        ) from None
+            f"{where} is not an array as the manifest states: {why.rstrip('.')}. {REMEDY}"
+        ) from error
     if not np.isfinite(array).all():
         raise InputError(f"{where} holds a number that is not finite. {REMEDY}")
     return array

@@ -250,8 +250,8 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
                 f"fit has parameters. {REMEDY}"
             )
     try:
-        _ = package.tables, package.exact, package.average
-    except (ValueError, KeyError) as error:
+        _ = package.tables, package.exact, package.average, package.kernel()
+    except Exception as error:
         raise InputError(
             f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
         ) from error

@@ -1,10 +1,13 @@
 """Read a TOML file into a checked model, or say in whole sentences what is wrong with it."""
 
+import sys
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign_text
+from scissorcal.foreign.formats import RECIPE
 from scissorcal.recipe.locate import broken_statement
 
 if TYPE_CHECKING:
@@ -13,8 +16,6 @@ if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
 
     Model = TypeVar("Model", bound=BaseModel)
-
-_LARGEST_FILE = 1_000_000
 
 
 def load_recipe(path: Path | str) -> "Recipe":
@@ -60,25 +61,13 @@ def parse_toml(text: str, model: "type[Model]", source: str) -> "Model":
 
 def read_text(path: Path) -> str:
     """Read a UTF-8 text file of a sane size, else raise InputError."""
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST_FILE:
-            raise InputError(f"{path} has {size} bytes, too many for a recipe: is it another file?")
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist: check the path.") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}, byte {error.start}: this is not UTF-8 text; save the file as UTF-8."
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    return read_foreign_text(path, RECIPE)
 
 
 def _parse(text: str, source: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return _bounded(tomllib.loads(text))
+    except ValueError as error:  # TOML's own, and a number of more digits than Python converts
         reason = str(error)
     except RecursionError:
         reason = "tables or arrays are nested too deeply"
@@ -96,6 +85,18 @@ def _parse(text: str, source: str) -> dict[str, Any]:
     seen = f' It reads: "{shown[:80]}".' if shown else ""
     hint = _syntax_hint(shown, reason)
     raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{seen}{hint}")
+
+
+def _bounded(document: dict[str, Any]) -> dict[str, Any]:
+    """The document; ValueError where a whole number is larger than any float."""
+    waiting: list[Any] = [document]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, dict | list):
+            waiting += one.values() if isinstance(one, dict) else one
+        elif isinstance(one, int) and abs(one) > sys.float_info.max:
+            raise ValueError("a whole number has more than 308 digits")
+    return document
 
 
 def _syntax_hint(line: str, reason: str) -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign_text, reading
+from scissorcal.foreign.formats import SURFACE
 from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
@@ -19,7 +21,6 @@ SMALLEST_RADIUS_MM = 2.0
 refuses probed surfaces by the same figure."""
 
 _COLUMNS = ("x_mm", "y_mm", "z_mm")
-_LARGEST_FILE = 5_000_000
 
 
 class PlateSurface(Section):
@@ -104,19 +105,17 @@ def _read(path: Path) -> tuple[list[int], list[list[float]]]:
     """Lines and points in metres."""
     import csv
 
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(
-                f"{path} is larger than {_LARGEST_FILE // 10**6} MB: probe fewer points."
-            )
-        rows = csv.reader(path.read_text("utf-8-sig").splitlines())
-    except FileNotFoundError:
+    if not path.exists():
         raise InputError(
             f"{path} does not exist: plate.surface.file in the recipe names it. Put the probed "
             f"points there, with the columns {', '.join(_COLUMNS)}."
-        ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {error}.") from None
+        )
+    rows = csv.reader(read_foreign_text(path, SURFACE).splitlines(), quoting=csv.QUOTE_NONE)
+    with reading(path, SURFACE):
+        return _points(path, rows)
+
+
+def _points(path: Path, rows: Any) -> tuple[list[int], list[list[float]]]:
     head = [name.strip() for name in next(rows, [])]
     if sorted(head) != sorted(_COLUMNS):
         raise InputError(

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from scissorcal.foreign import open_foreign, reading
+from scissorcal.foreign.formats import RECORDING
+
 Kind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
 """What was recorded: empty motion of the blades, of the sledge, cuts and presses, a rendering, a
 path along a surface, a plate's pose."""
@@ -101,11 +104,8 @@ def read_header(path: str | Path) -> RecordingHeader:
     as that does.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as stream:
-            header = _from_index(stream)
-    except OSError:
-        header = None
+    with open_foreign(path, RECORDING) as stream:
+        header = _from_index(stream)
     return header or _from_scan(path)
 
 
@@ -128,6 +128,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
         summary = stream.read(end - start)
         found: dict[str, list[dict[str, str]]] = {}
         count = duration_ns = None
+        room = end
         for opcode, body in _records(summary):
             if opcode == 0x0B:
                 count, *_, first, last = _STATISTICS.unpack_from(body)
@@ -135,6 +136,9 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
                 duration_ns = last - first
             elif opcode == 0x0D:
                 offset, length = _METADATA_INDEX.unpack_from(body)
+                room -= length
+                if length < HEAD.size or room < 0:  # more metadata than the file has bytes
+                    return None
                 stream.seek(offset + HEAD.size)
                 name, entries = _metadata(stream.read(length - HEAD.size))
                 found.setdefault(name, []).append(entries)
@@ -143,7 +147,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
             return None
         notes = tuple(entries.get("note", "") for entries in found.get(NOTE_NAME, ()))
         return _header(described[-1], notes, count, duration_ns * 1e-9)
-    except (struct.error, KeyError, ValueError, TypeError):
+    except Exception:  # noqa: BLE001 - without a sound index, the scan says what is wrong
         return None
 
 
@@ -221,4 +225,5 @@ def _from_scan(path: Path) -> RecordingHeader:
     time_ns = scan.samples()["host_time_ns"]
     duration_s = float(time_ns[-1] - time_ns[0]) * 1e-9 if len(time_ns) else 0.0
     entries = to_entries(scan.metadata)
-    return _header(entries, scan.notes(), len(time_ns), duration_s, finished=scan.finished)
+    with reading(path, RECORDING):
+        return _header(entries, scan.notes(), len(time_ns), duration_s, finished=scan.finished)

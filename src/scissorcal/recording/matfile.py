@@ -1,15 +1,16 @@
 """MATLAB files, version 5 (scipy) and 7.3 (which is HDF5): arrays and single numbers by name."""
 
 import re
-import struct
-import zlib
 from collections.abc import Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import parse_isolated, read_foreign
+from scissorcal.foreign.formats import MATLAB
 from scissorcal.recording.table import Column, Table, Wanted
 
 
@@ -17,16 +18,18 @@ def read_mat(path: Path, wanted: Wanted) -> Table:
     """Read variables of a MATLAB file as columns.
 
     A column is named as the variable is; ``data.q`` is a field of a structure, ``X[2]`` the third
-    column of a matrix. All numbers of size one are the table's ``scalars``.
+    column of a matrix. All numbers of size one are the table's ``scalars``. The parsers of both
+    versions run in a child process.
     """
-    variables = dict(_flat(_load(path)))
+    data = read_foreign(path, MATLAB)
+    variables = parse_isolated(f"{__name__}:load_variables", data, path, MATLAB)
     columns = {channel: _column(path, variables, name, channel) for channel, name in wanted.items()}
     scalars = {name: float(v.ravel()[0]) for name, v in variables.items() if v.size == 1}
     return Table(path, columns, scalars)
 
 
 def _column(path: Path, variables: Mapping[str, Any], name: str | int, channel: str) -> Column:
-    match = re.fullmatch(r"\s*([\w.]+)(?:\[(\d+)\])?\s*", str(name))
+    match = re.fullmatch(r"\s*([\w.]+)(?:\[(\d{1,9})\])?\s*", str(name))
     values = variables.get(match[1]) if match else None
     if match is None or values is None:
         listed = ", ".join(f"{key} {_size(value)}" for key, value in variables.items())
@@ -59,37 +62,21 @@ def _flat(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
                 yield prefix + name, array
 
 
-def _load(path: Path) -> Mapping[str, Any]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
+def load_variables(data: bytes) -> dict[str, Any]:
+    """The real numeric arrays of a MATLAB file by name; called in a child process."""
+    load = _load_hdf5 if data.startswith(b"MATLAB 7.3") else _load_version_5
+    return dict(_flat(load(data)))
 
-    with path.open("rb") as stream:
-        head = stream.read(128)
-    if head.startswith(b"MATLAB 7.3"):
-        return _load_hdf5(path)
-    try:
-        variables: Mapping[str, Any] = loadmat(path, simplify_cells=True)
-    except (
-        MatReadError,
-        NotImplementedError,
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        OverflowError,
-        MemoryError,
-        OSError,
-        zlib.error,
-        struct.error,
-    ) as error:
-        raise InputError(
-            f"{path} cannot be read as a MATLAB file: {error}. Save it again in MATLAB "
-            "(save -v7), or export it as CSV."
-        ) from error
+
+def _load_version_5(data: bytes) -> Mapping[str, Any]:
+    from scipy.io import loadmat
+
+    stream: Any = BytesIO(data)
+    variables: Mapping[str, Any] = loadmat(stream, simplify_cells=True)
     return variables
 
 
-def _load_hdf5(path: Path) -> Mapping[str, Any]:
+def _load_hdf5(data: bytes) -> Mapping[str, Any]:
     """Read version 7.3, which keeps arrays transposed in HDF5; cells and text are left out."""
     import h5py
 
@@ -104,14 +91,8 @@ def _load_hdf5(path: Path) -> Mapping[str, Any]:
                 found[name] = np.asarray(item).T
         return found
 
-    try:
-        with h5py.File(path, "r") as file:
-            return read(file)
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise InputError(
-            f"{path} cannot be read as a MATLAB 7.3 file: {error}. Save it again in MATLAB "
-            "(save -v7), or export it as CSV."
-        ) from error
+    with h5py.File(h5py.h5f.open_file_image(data), "r") as file:
+        return read(file)
 
 
 def _size(value: Any) -> str:

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import InputError
+from scissorcal.foreign import reading, refuse_unless_regular
+from scissorcal.foreign.formats import RECORDING
 from scissorcal.identity import file_digest
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.recording.scan import Attachment, Scan, Sheet, scan_file
@@ -30,7 +31,8 @@ def read_recording(path: str | Path) -> Recording:
     samples = scan.samples()
     strokes = metadata.strokes_of_recording
     if metadata.min_travel is not None:
-        strokes = _label(samples, metadata.min_travel, scan)
+        with reading(path, RECORDING):
+            strokes = _label(samples, metadata.min_travel, scan)
     radius = metadata.handle_radius_m
     notes = [*scan.notes(), *_condition(scan, len(samples)), *gap_note(samples)]
     return Recording(
@@ -68,12 +70,8 @@ def content_hash(path: str | Path) -> str:
 
     Raises InputError if the file cannot be read.
     """
-    try:
-        return file_digest(Path(path))
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read: {error.strerror}. Check the name and the folder."
-        ) from error
+    refuse_unless_regular(Path(path), RECORDING)
+    return file_digest(Path(path))
 
 
 def _label(samples: NDArray[np.void], min_travel: float, scan: Scan) -> tuple[Stroke, ...]:

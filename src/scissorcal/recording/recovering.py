@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import open_foreign
+from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording import layout
 from scissorcal.recording.partfile import explained, is_same_file, seal, try_lock
 from scissorcal.recording.samplefile import SampleFile
@@ -45,15 +47,9 @@ def recover(folder: str | Path) -> tuple[Recovered, ...]:
 
 
 def _recover_one(part: Path) -> Recovered | None:
-    try:
-        stream = part.open("rb")
-    except FileNotFoundError:
+    if not part.exists():
         return None
-    except OSError as error:
-        raise InputError(
-            f"{part} cannot be recovered: {error.strerror}. Make the file readable first."
-        ) from error
-    with stream, explained(part):
+    with open_foreign(part, RECORDING) as stream, explained(part):
         if not try_lock(stream):
             sentence = f"{part.name} is still being written, so it was not touched."
             return Recovered("busy", part, None, 0, sentence)

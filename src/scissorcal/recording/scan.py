@@ -1,28 +1,41 @@
 """Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign, reading
+from scissorcal.foreign.formats import RECORDING
 from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
 from scissorcal.recording.channels import CHANNELS
+from scissorcal.recording.chunks import (
+    LARGEST_CHUNK,
+    ChunkPlaces,
+    DamageError,
+    open_chunk,
+    parse_record,
+    run_end,
+)
 from scissorcal.recording.foreign import refuse_other_formats
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
 from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
-LARGEST_CHUNK = 64 * 1024 * 1024
-_ZSTD_FIELD = b"\x04\x00\x00\x00zstd"
-_ZSTD_FIELD_AT = HEAD.size + 28
-_MESSAGE_BODY = layout.MESSAGE_DTYPE.itemsize - HEAD.size
+LARGEST_RATIO = 100
+"""Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any
+noise, have 9 at most."""
+MOST_RECORDS = LARGEST_CHUNK // 50
+"""Records of a chunk, or runs of them: the smallest message that tools write has 50 bytes."""
+MOST_CHANNELS = 1000
+"""Different channels of a file; scissorcal writes four."""
+LONGEST_SHEET_NUMBER = 9
+MOST_DAMAGE = 20
+"""Places of damage that are listed; of further ones the number."""
 
 
 @dataclass(frozen=True)
@@ -110,14 +123,15 @@ class Scan:
 
 def scan_file(path: Path) -> Scan:
     """Read a whole file, complete, cut off or damaged; InputError if it is no recording."""
-    data = read_bytes(path)
+    data = read_foreign(path, RECORDING)
     refuse_other_formats(path, data)
-    walk = _Walk()
-    for offset, opcode, body in _records(data, walk):
-        try:
-            walk.take(offset, opcode, body)
-        except _DamageError as damage:
-            walk.damage.append(f"The bytes from {offset} on are damaged ({damage}); left out.")
+    walk = _Walk(room=LARGEST_CHUNK + LARGEST_RATIO * len(data))
+    with reading(path, RECORDING):
+        for offset, opcode, body in _records(data, walk):
+            try:
+                walk.take(offset, opcode, body)
+            except DamageError as damage:
+                walk.damage.append(f"The bytes from {offset} on are damaged ({damage}); left out.")
     if walk.metadata is None:
         raise InputError(_why_no_recording(path, walk))
     if walk.finished:
@@ -126,6 +140,9 @@ def scan_file(path: Path) -> Scan:
             walk.damage.append(
                 f"{walk.stated_count - found} of {walk.stated_count} samples cannot be read."
             )
+    more = len(walk.damage) - MOST_DAMAGE
+    if more > 1:
+        walk.damage[MOST_DAMAGE:] = [f"{more} further places are damaged; left out."]
     return Scan(
         path,
         bytes_digest(data),
@@ -136,33 +153,16 @@ def scan_file(path: Path) -> Scan:
     )
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return a file's bytes; InputError with the reason if it cannot be read or is empty."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist. Check the name and the folder.") from None
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read: {error.strerror}. Name a file that you may read."
-        ) from error
-    if not data:
-        raise InputError(f"{path} is empty (0 bytes). Capture again.")
-    return data
-
-
-class _DamageError(Exception):
-    """One record is damaged; the message says how."""
-
-
 @dataclass
 class _Walk:
-    """State while walking: what was found so far."""
+    """State while walking: what was found so far; ``room`` is left for unpacked chunks."""
 
+    room: int
     metadata: RecordingMetadata | None = None
     events: list[Event] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     topics: set[str] = field(default_factory=set)
+    channels: set[bytes] = field(default_factory=set)
     channel: int | None = None
     others: dict[int, TelemetryChannel] = field(default_factory=dict)
     stated_count: int | None = None
@@ -174,7 +174,7 @@ class _Walk:
         from mcap.records import Statistics
 
         if opcode == Opcode.CHUNK:
-            self._take_chunk(_open_chunk(body))
+            self._take_chunk(open_chunk(body, self.room))
         elif opcode == Opcode.CHANNEL:
             self._take_channel(body)
         elif opcode == Opcode.METADATA:
@@ -182,21 +182,21 @@ class _Walk:
         elif opcode == Opcode.ATTACHMENT:
             self.events.append(_open_attachment(body))
         elif opcode == Opcode.STATISTICS:
-            stated = _parse(Statistics, body)
+            stated = parse_record(Statistics, body)
             others = sum(stated.channel_message_counts.get(number, 0) for number in self.others)
             self.stated_count = stated.message_count - others
 
     def _take_metadata(self, offset: int, body: bytes) -> None:
         from mcap.records import Metadata
 
-        record = _parse(Metadata, body)
+        record = parse_record(Metadata, body)
         if record.name == NOTE_NAME:
             self.events.append(Note(record.metadata.get("note", "")))
         elif record.name == layout.SHEET_NAME:
-            try:
-                self.events.append(Sheet(int(record.metadata["sheet"])))
-            except (KeyError, ValueError):
-                raise _DamageError("a sheet mark without a number") from None
+            digits = record.metadata.get("sheet", "").removeprefix("-")
+            if not digits.isdecimal() or len(digits) > LONGEST_SHEET_NUMBER:
+                raise DamageError("a sheet mark without a number")
+            self.events.append(Sheet(int(record.metadata["sheet"])))
         elif record.name == layout.MARK_NAME:
             entries = record.metadata
             self.events.append(Mark(entries.get("name", ""), entries.get("value", "")))
@@ -205,13 +205,16 @@ class _Walk:
                 metadata = from_entries(record.metadata)
             except ValueError as error:
                 self.metadata_complaint = f"at byte {offset}, {error}"
-                raise _DamageError("the description of the recording") from None
+                raise DamageError("the description of the recording") from None
             self.metadata = metadata
 
     def _take_channel(self, body: bytes) -> None:
         from mcap.records import Channel
 
-        channel = _parse(Channel, body)
+        if body in self.channels:
+            return
+        self.channels.add(body)
+        channel = parse_record(Channel, body)
         self.topics.add(channel.topic)
         if channel.topic == layout.TOPIC:
             self.channel = channel.id
@@ -219,63 +222,61 @@ class _Walk:
             self.others[channel.id] = CHANNELS[channel.topic]
 
     def _take_chunk(self, data: bytes) -> None:
-        """Take a chunk's records; runs of sample messages in one sweep each."""
+        """Take a chunk's records: runs of messages of one size and channel in one sweep each."""
         from mcap.opcode import Opcode
 
-        at = 0
+        self.room -= len(data)
+        runs: dict[int | None, list[memoryview]] = {}
+        view, at, count = memoryview(data), 0, 0
         while at + HEAD.size <= len(data):
+            count += 1
+            if count > MOST_RECORDS or len(self.channels) > MOST_CHANNELS:
+                raise DamageError("a chunk of records that are smaller than any message")
             opcode, length = HEAD.unpack_from(data, at)
-            if opcode == Opcode.MESSAGE and length == _MESSAGE_BODY:
-                count = (len(data) - at) // layout.MESSAGE_DTYPE.itemsize
-                view = np.frombuffer(data, layout.MESSAGE_DTYPE, count, at)
-                same = (view["opcode"] == opcode) & (view["length"] == length)
-                same &= view["channel"] == view["channel"][0]
-                run = count if same.all() else int(np.argmin(same))
-                if self.channel in (None, int(view["channel"][0])):
-                    self.events.append(view["sample"][:run].copy())
-                at += run * layout.MESSAGE_DTYPE.itemsize
-                continue
+            end = at + HEAD.size + length
             if opcode == Opcode.CHANNEL:
-                self._take_channel(data[at + HEAD.size : at + HEAD.size + length])
-            elif opcode == Opcode.MESSAGE:
-                at += self._take_telemetry(data, at)
-                continue
-            at += HEAD.size + length
+                self._take_channel(data[at + HEAD.size : end])
+            elif opcode == Opcode.MESSAGE and end <= len(data):
+                number = int.from_bytes(data[at + HEAD.size : at + HEAD.size + 2], "little")
+                if self._is_known(number, end - at):
+                    end = run_end(data, at, end - at)
+                    stated = number in self.others or self.channel is not None
+                    runs.setdefault(number if stated else None, []).append(view[at:end])
+            at = end
+        for channel, parts in runs.items():
+            self._take_run(channel, b"".join(parts))
 
-    def _take_telemetry(self, data: bytes, at: int) -> int:
-        """Take a run of messages of a known channel beside the samples; returns its bytes."""
-        _, length = HEAD.unpack_from(data, at)
-        channel = self.others.get(
-            int.from_bytes(data[at + HEAD.size : at + HEAD.size + 2], "little")
-        )
-        kind = None if channel is None else channel.message_dtype
-        if channel is None or kind is None or HEAD.size + length != kind.itemsize:
-            return HEAD.size + int(length)
-        view = np.frombuffer(data, kind, (len(data) - at) // kind.itemsize, at)
-        same = (view["length"] == length) & (view["channel"] == view["channel"][0])
-        same &= view["opcode"] == view["opcode"][0]
-        run = len(view) if same.all() else int(np.argmin(same))
-        self.events.append(Telemetry(channel, view[:run].copy()))
-        return run * kind.itemsize
+    def _is_known(self, number: int, size: int) -> bool:
+        """Whether a message record of this size is of a channel that scissorcal reads."""
+        if number in self.others:
+            return size == self.others[number].message_dtype.itemsize
+        return self.channel in (None, number) and size == layout.MESSAGE_DTYPE.itemsize
+
+    def _take_run(self, number: int | None, messages: bytes) -> None:
+        channel = None if number is None else self.others.get(number)
+        if channel is not None:
+            self.events.append(Telemetry(channel, np.frombuffer(messages, channel.message_dtype)))
+        else:
+            self.events.append(np.frombuffer(messages, layout.MESSAGE_DTYPE)["sample"].copy())
 
 
 def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
     """Yield (offset, opcode, body) of the whole records; skip damage and note where it is."""
-    offset = len(MAGIC)
+    offset, chunks = len(MAGIC), ChunkPlaces(data)
     while offset < len(data):
-        if walk.finished and data[offset:] == MAGIC:
+        if walk.finished and _is_end(data, offset):
             return
         end, opcode = offset, 0
         if offset + HEAD.size <= len(data):
             opcode, length = HEAD.unpack_from(data, offset)
             end = offset + HEAD.size + length
-        if _may_be_record(opcode) and end <= len(data) and not _too_long(data, offset, end):
+        if _may_be_record(opcode) and end <= len(data) and not _too_long(data, chunks, offset, end):
             yield offset, opcode, data[offset + HEAD.size : end]
             walk.finished = opcode == 2
             offset = end
             continue
         walk.finished = False
-        resume = _next_chunk(data, offset + 1)
+        resume = chunks.after(offset)
         if resume is None:
             walk.damage.append(
                 f"The file is cut off at byte {offset}: {len(data) - offset} bytes of an "
@@ -291,62 +292,20 @@ def _may_be_record(opcode: int) -> bool:
     return 1 <= opcode <= 15
 
 
-def _too_long(data: bytes, offset: int, end: int) -> bool:
+def _is_end(data: bytes, offset: int) -> bool:
+    return len(data) - offset == len(MAGIC) and data.endswith(MAGIC)
+
+
+def _too_long(data: bytes, chunks: "ChunkPlaces", offset: int, end: int) -> bool:
     """Whether a record's length is wrong: no record follows it, and a chunk begins within it."""
-    if data[end:] in (b"", MAGIC):
+    if end == len(data) or _is_end(data, end):
         return False
     if end + HEAD.size <= len(data):
         opcode, length = HEAD.unpack_from(data, end)
         if _may_be_record(opcode) and end + HEAD.size + length <= len(data):
             return False
-    within = _next_chunk(data, offset + 1)
+    within = chunks.after(offset)
     return within is not None and within < end
-
-
-def _next_chunk(data: bytes, start: int) -> int | None:
-    """Find the next chunk by the name of its compression, which has a fixed place in it."""
-    found = data.find(_ZSTD_FIELD, start + _ZSTD_FIELD_AT)
-    while found >= 0:
-        offset = found - _ZSTD_FIELD_AT
-        opcode, length = HEAD.unpack_from(data, offset)
-        if opcode == 6 and offset + HEAD.size + length <= len(data):
-            return offset
-        found = data.find(_ZSTD_FIELD, found + 1)
-    return None
-
-
-def _parse(record: Any, body: bytes) -> Any:
-    from mcap.data_stream import ReadDataStream
-    from mcap.exceptions import McapError
-
-    try:
-        return record.read(ReadDataStream(BytesIO(body)))
-    except (McapError, struct.error, UnicodeDecodeError, MemoryError, OverflowError) as error:
-        raise _DamageError(f"not a whole {record.__name__} record") from error
-
-
-def _open_chunk(body: bytes) -> bytes:
-    """Return a chunk's bytes after checking its size and checksum."""
-    import zstandard
-    from mcap.records import Chunk
-    from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
-
-    chunk = _parse(Chunk, body)
-    if len(body) != 40 + len(chunk.compression) + len(chunk.data):
-        raise _DamageError("a chunk whose length is wrong")
-    if chunk.uncompressed_size > LARGEST_CHUNK:
-        raise _DamageError(f"a chunk that claims {chunk.uncompressed_size} bytes")
-    try:
-        if chunk.compression == "zstd":
-            stated = zstandard.get_frame_parameters(chunk.data).content_size
-            if stated != chunk.uncompressed_size:
-                raise _DamageError("a chunk whose size is wrong")
-        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-        return stream.read(length)
-    except CRCValidationError as error:
-        raise _DamageError("a chunk whose checksum does not match") from error
-    except (zstandard.ZstdError, RuntimeError) as error:
-        raise _DamageError("a chunk that cannot be decompressed") from error
 
 
 def _open_attachment(body: bytes) -> Attachment:
@@ -354,9 +313,9 @@ def _open_attachment(body: bytes) -> Attachment:
 
     from mcap.records import Attachment as Record
 
-    record = _parse(Record, body)
+    record = parse_record(Record, body)
     if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-        raise _DamageError(f"attachment {record.name!r}, whose checksum does not match")
+        raise DamageError(f"attachment {record.name!r}, whose checksum does not match")
     return Attachment(record.name, record.media_type, record.data)
 
 

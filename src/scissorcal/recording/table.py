@@ -9,10 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import reading
+from scissorcal.foreign.formats import LOG
 
 Array = NDArray[np.float64]
 Wanted = Mapping[str, str | int]
 """Channel to column: the column's heading, or its number from 0."""
+
+LONGEST_COLUMN_NUMBER = 9
+"""Digits of a column's number; a longer one is a heading."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +57,6 @@ def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Tabl
     ``.mat`` is MATLAB, ``.parquet`` and ``.pq`` are Parquet, everything else is text with one
     row a line. Every number is finite. Raises InputError naming file, place and remedy.
     """
-    if not path.is_file():
-        raise InputError(f"{path} is not a file. Check the name and the folder.")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path} is empty (0 bytes). Name a table with numbers in it.")
     suffix = path.suffix.lower()
     if suffix == ".mat":
         from scissorcal.recording.matfile import read_mat
@@ -68,7 +69,8 @@ def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Tabl
     else:
         from scissorcal.recording.textfile import read_text
 
-        table = read_text(path, wanted, delimiter)
+        with reading(path, LOG):
+            table = read_text(path, wanted, delimiter)
     _check_lengths(table)
     _check_finite(table)
     return table
@@ -122,9 +124,10 @@ def find_column(path: Path, headings: Sequence[str], column: str | int, channel:
                 )
             if found:
                 return found[0]
-    if isinstance(column, int) or column.strip().isdecimal():
-        if 0 <= int(column) < len(headings):
-            return int(column)
+    number = column if isinstance(column, int) else column_of(column)
+    if isinstance(number, int):
+        if 0 <= number < len(headings):
+            return number
         raise InputError(
             f"{path} has no column {column} for {channel}: its columns are numbered 0 to "
             f"{len(headings) - 1}."
@@ -134,6 +137,16 @@ def find_column(path: Path, headings: Sequence[str], column: str | int, channel:
         f"{path} has no column {column!r} for {channel}. Name one of these, or its number from 0: "
         f"{listed}."
     )
+
+
+def column_of(word: str) -> str | int:
+    """A column as a person names it: the number that it is, or else a heading.
+
+    >>> column_of(" 12 "), column_of("²"), column_of("q")
+    (12, '²', 'q')
+    """
+    digits = word.strip()
+    return int(digits) if digits.isdecimal() and len(digits) <= LONGEST_COLUMN_NUMBER else word
 
 
 def _plain(heading: str) -> str:

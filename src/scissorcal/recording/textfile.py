@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import LOG
 from scissorcal.recording.table import Column, Table, Wanted, find_column
 
 COMMENT_MARKS = ("%", "#")
@@ -57,7 +59,7 @@ def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table
 
 def _lines(path: Path) -> tuple[list[Line], list[Line]]:
     """Return the comment lines, without their mark, and the other lines that are not blank."""
-    data = path.read_bytes()
+    data = read_foreign(path, LOG)
     if b"\0" in data:
         raise InputError(
             f"{path} is not a text table: it contains zero bytes. Save it as CSV in UTF-8, or give "

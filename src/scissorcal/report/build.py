@@ -14,6 +14,8 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import SIGNATURE
 from scissorcal.identity import bytes_digest
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
@@ -159,8 +161,9 @@ def _standing(review: Review | None, page: str, twin: str, files: ReportFiles) -
     """The review, or the one in the folder, if it is of this very page and twin."""
     if review is None:
         try:
-            review = Review.model_validate_json((files.json.parent / "signature.json").read_bytes())
-        except (OSError, ValueError):
+            path = files.json.parent / "signature.json"
+            review = Review.model_validate_json(read_foreign(path, SIGNATURE))
+        except (InputError, ValueError):
             return None  # not signed, or damaged, which `plan` says
     now = {REPORT_PAGE: bytes_digest(page.encode()), REPORT_TWIN: bytes_digest(twin.encode())}
     return review if now.items() <= review.content.items() else None

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 from pathlib import Path
 
+from scissorcal.errors import InputError
+
 QUALITY = 70
 PAGE_BYTES = 4_800_000
 """What the whole page may take, pictures in it included."""
@@ -56,19 +58,17 @@ def place_pictures(
 def _read(file: PictureFile) -> Image:
     """The picture as a small JPEG; with the reason where it cannot be read."""
     import cv2
-    import numpy as np
+
+    from scissorcal.vision.photo import read_photo
 
     try:
-        raw = np.frombuffer(file.path.read_bytes(), dtype=np.uint8)
-    except OSError:
-        raw = np.empty(0, dtype=np.uint8)
-    image = cv2.imdecode(raw, cv2.IMREAD_COLOR) if len(raw) else None
-    if image is None:
+        image = read_photo(file.path).image
+    except InputError:
         return _without(file, "not there any more, or damaged")
     height, width = image.shape[:2]
     if width > file.widest_px:
         size = (file.widest_px, max(round(height * file.widest_px / width), 1))
-        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
     height, width = image.shape[:2]
     # colours at full resolution: what is drawn is one pixel wide
     full = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)

@@ -1,7 +1,7 @@
 """Camera files: read from OpenCV, ROS and Kalibr, written for OpenCV and ROS."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -10,7 +10,12 @@ import numpy as np
 
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign_text
+from scissorcal.foreign.formats import CAMERA
+from scissorcal.foreign.text_tree import parse_yaml
 from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.opencv_storage import matrix_of, number_of, read_storage
+from scissorcal.vision.photo_decoding import MOST_SIDE_PX
 
 Style = Literal["opencv", "ros"]
 
@@ -29,7 +34,8 @@ _WIDTHS, _HEIGHTS = (
     ("image_height", "image_Height", "height"),
 )
 _RMS = ("avg_reprojection_error", "rms")
-_OPENCV_KEYS = (*MATRIX_KEYS, *DISTORTION_KEYS, *_WIDTHS, *_HEIGHTS, *_RMS, "fisheye_model")
+LARGEST_NUMBER = 1e7
+"""Of focal lengths and centres in pixels, and of distortion coefficients."""
 _ROS_MODELS = ("plumb_bob", "rational_polynomial")
 
 
@@ -48,14 +54,17 @@ def read_camera_file(path: Path) -> CameraFile:
     Distortion must be the pinhole camera's radial-tangential one (plumb_bob, radtan; up to k6).
     None of these files holds a covariance. Raises InputError with what is missing or unsupported.
     """
+    text = read_foreign_text(path, CAMERA)
+    start = text.lstrip(" \t\r\n")
+    of_opencv = start.startswith(("%YAML", "<?xml", "<opencv_storage", "{"))
     try:
-        text = path.read_text("utf-8", errors="replace")
-    except OSError as error:
-        raise file_error(error, path) or error from None
-    start = text.lstrip("\ufeff \t\r\n")
-    if start.startswith(("%YAML", "<?xml", "<opencv_storage", "{")) or "!!opencv-matrix" in text:
-        return _opencv(path)
-    return _plain_yaml(path, text)
+        if of_opencv or "!!opencv-matrix" in text:
+            return _opencv(path, read_storage(text))
+        facts = parse_yaml(text)
+    except ValueError as error:
+        what = "damaged" if of_opencv else "not readable YAML"
+        raise InputError(f"{path} is {what} ({error}). {CAMERA.remedy}") from None
+    return _plain_yaml(path, facts)
 
 
 def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "camera") -> Path:
@@ -76,51 +85,22 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
     return path
 
 
-def _opencv(path: Path) -> CameraFile:
-    import cv2
+def _opencv(path: Path, facts: Mapping[str, Any]) -> CameraFile:
+    def first(keys: Sequence[str], read: Callable[[Any], Any]) -> Any:
+        found = (read(facts[key]) for key in keys if key in facts)
+        return next((value for value in found if value is not None), None)
 
-    facts: dict[str, Any] = {}
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        if storage.isOpened():
-            facts = {key: _opencv_value(storage.getNode(key)) for key in _OPENCV_KEYS}
-    except (cv2.error, SystemError):
-        facts = {}
-    if not facts:
-        raise InputError(f"{path} is damaged: save it again.")
-
-    def first(keys: Sequence[str], kind: type) -> Any:
-        return next((facts[key] for key in keys if isinstance(facts.get(key), kind)), None)
-
-    K, bend = first(MATRIX_KEYS, np.ndarray), first(DISTORTION_KEYS, np.ndarray)
+    K, bend = first(MATRIX_KEYS, matrix_of), first(DISTORTION_KEYS, matrix_of)
     if K is None or np.shape(K) != (3, 3):
         raise InputError(f"{path} has no 3 x 3 matrix called {' or '.join(MATRIX_KEYS[:2])}.")
-    if facts.get("fisheye_model"):
+    if number_of(facts.get("fisheye_model")):
         raise InputError(f"{path} has a fisheye model; {_ONLY_PINHOLE}")
-    size = first(_WIDTHS, float), first(_HEIGHTS, float)
+    size = first(_WIDTHS, number_of), first(_HEIGHTS, number_of)
     camera = _camera(path, K, np.zeros(5) if bend is None else bend, size)
-    return CameraFile(camera, "OpenCV", first(_RMS, float))
+    return CameraFile(camera, "OpenCV", first(_RMS, number_of))
 
 
-def _opencv_value(node: Any) -> Any:
-    """A number or a matrix of OpenCV's file storage; None for anything else."""
-    import cv2
-
-    if node.isInt() or node.isReal():
-        return float(node.real())
-    try:
-        return node.mat() if node.isMap() else None
-    except cv2.error:
-        return None
-
-
-def _plain_yaml(path: Path, text: str) -> CameraFile:
-    import yaml
-
-    try:
-        facts = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{path} is not readable YAML ({_first(str(error))}).") from None
+def _plain_yaml(path: Path, facts: Any) -> CameraFile:
     if not isinstance(facts, Mapping):
         raise InputError(f"{path} is not a camera file of OpenCV, ROS or Kalibr.")
     try:
@@ -149,29 +129,42 @@ def _kalibr(path: Path, facts: Mapping[str, Any]) -> CameraFile:
     part = facts[cameras[0]]
     model = part.get("camera_model", "pinhole"), part.get("distortion_model", "radtan")
     if model not in (("pinhole", "radtan"), ("pinhole", "none")):
-        raise InputError(f"{path} has the model {'-'.join(model)}; {_ONLY_PINHOLE}")
-    fx, fy, cx, cy = (float(value) for value in part["intrinsics"])
+        raise InputError(f"{path} has the model {'-'.join(map(str, model))}; {_ONLY_PINHOLE}")
+    fx, fy, cx, cy = _numbers(part["intrinsics"])
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    bend = np.array(part.get("distortion_coeffs", ()), dtype=np.float64)
-    width, height = part["resolution"]
+    bend = np.array(_numbers(part.get("distortion_coeffs", [])))
+    width, height = _numbers(part["resolution"])
     return CameraFile(_camera(path, K, bend, (width, height)), "Kalibr", None)
 
 
 def _from_ros(path: Path, facts: Mapping[str, Any]) -> CameraFile:
     def data(*keys: str) -> Any:
-        found = next((facts[key] for key in keys if key in facts), ())
-        return np.array(found["data"] if isinstance(found, Mapping) else found, dtype=np.float64)
+        found: Any = next((facts[key] for key in keys if key in facts), [])
+        return np.array(_numbers(found["data"] if isinstance(found, Mapping) else found))
 
     model = facts.get("distortion_model", "plumb_bob")
     if model not in _ROS_MODELS:
         raise InputError(f"{path} has the model {model}; {_ONLY_PINHOLE}")
     size = tuple(
-        next((float(facts[key]) for key in keys if key in facts), None)
+        next((_number(facts[key]) for key in keys if key in facts), None)
         for keys in (_WIDTHS, _HEIGHTS)
     )
     K = data("camera_matrix", "K", "k").reshape(3, 3)
     bend = data("distortion_coefficients", "D", "d")
     return CameraFile(_camera(path, K, bend, (size[0], size[1])), "ROS", None)
+
+
+def _numbers(words: Any) -> list[float]:
+    if not isinstance(words, list):
+        raise ValueError("an entry that is no list of numbers")  # noqa: TRY004 - of a file
+    return [_number(word) for word in words]
+
+
+def _number(word: Any) -> float:
+    value = number_of(word)
+    if value is None:
+        raise ValueError(f"{str(word)[:40]!r} is no number")
+    return value
 
 
 _ONLY_PINHOLE = (
@@ -184,6 +177,8 @@ def _camera(path: Path, K: Any, bend: Any, size: tuple[float | None, float | Non
     width, height = size
     if not width or not height:
         raise InputError(f"{path} has no picture size: add image_width and image_height.")
+    if not all(1.0 <= side <= MOST_SIDE_PX and side == int(side) for side in (width, height)):
+        raise InputError(f"{path} has a picture size of {width:g} x {height:g}: correct it.")
     coefficients = [float(value) for value in np.ravel(bend)]
     if any(coefficients[8:]):
         raise InputError(f"{path} has {len(coefficients)} distortion coefficients; {_ONLY_PINHOLE}")
@@ -194,6 +189,8 @@ def _camera(path: Path, K: Any, bend: Any, size: tuple[float | None, float | Non
     fx, fy, cx, cy = (float(K[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
     if not all(math.isfinite(value) for value in (fx, fy, cx, cy, *coefficients)):
         raise InputError(f"{path} has numbers that are not finite.")
+    if max(map(abs, (fx, fy, cx, cy, *coefficients))) > LARGEST_NUMBER:
+        raise InputError(f"{path} has a number above {LARGEST_NUMBER:g}, which no camera has.")
     if min(fx, fy) <= 0.0 or abs(float(K[0, 1])) > 1e-6 * fx:
         raise InputError(f"{path} has a camera matrix with a negative focal length or a skew.")
     return Camera(fx, fy, cx, cy, tuple(coefficients), int(width), int(height))
@@ -233,7 +230,3 @@ def _ros(camera: Camera, name: str) -> str:
         "projection_matrix": matrix(projection, 3, 4),
     }
     return yaml.safe_dump(facts, sort_keys=False, default_flow_style=None)
-
-
-def _first(words: str) -> str:
-    return " ".join(words.split())[:120]

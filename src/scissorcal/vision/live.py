@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import refuse_unless_regular
+from scissorcal.foreign.formats import VIDEO
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
 from scissorcal.vision.targets.detect import Detection, find_any_board
@@ -27,6 +29,8 @@ one in a new place has moved farther than the second from where it was in every 
 LEAST_RATE_HZ, MOST_RATE_HZ = 0.5, 2000.0
 RATE_EVERY = 10
 RATE_SHARE = 0.05
+
+LONGEST_CAMERA_NUMBER = 4
 
 _ENCODE = "write it anew with its true rate, such as 'ffmpeg -r 30 -i VIDEO NEW.mp4'"
 
@@ -80,9 +84,11 @@ def frames_of(source: str) -> Iterator[Frame]:
     """
     import cv2
 
-    number = int(source) if source.isdigit() else None
-    if number is None and not Path(source).is_file():
+    number = camera_number(source)
+    if number is None and not Path(source).exists():
         raise InputError(f"{source} does not exist: give a video file, or a camera's number.")
+    if number is None:
+        refuse_unless_regular(Path(source), VIDEO)
     video = cv2.VideoCapture(source if number is None else number)
     try:
         good, image = video.read() if video.isOpened() else (False, None)
@@ -109,6 +115,15 @@ def frames_of(source: str) -> Iterator[Frame]:
             good, image = video.read()
     finally:
         video.release()
+
+
+def camera_number(source: str) -> int | None:
+    """The number of a camera that a person named; None where it is the name of a file.
+
+    >>> camera_number("0"), camera_number("\u00b2"), camera_number("plate.mp4")
+    (0, None, None)
+    """
+    return int(source) if source.isdecimal() and len(source) <= LONGEST_CAMERA_NUMBER else None
 
 
 def timed(frames: Iterable[Frame], source: str) -> Iterator[Frame]:

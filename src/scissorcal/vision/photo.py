@@ -1,19 +1,15 @@
 """Read a photograph: upright, eight bits, limited in size."""
 
-import struct
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.identity import file_digest
-
-if TYPE_CHECKING:
-    from PIL import Image
+from scissorcal.foreign import parse_isolated, read_foreign
+from scissorcal.foreign.formats import PHOTOGRAPH
+from scissorcal.identity import bytes_digest
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -21,9 +17,7 @@ Picture = NDArray[np.uint8]
 MAX_PIXELS = 25_000_000
 """Default size limit; larger photographs are reduced by 2, 4 or 8."""
 
-_EXIF_ORIENTATION = 0x0112
-_DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")
-_DAMAGE = (OSError, SyntaxError, ValueError, EOFError, IndexError, KeyError, struct.error)
+_DECODER = "scissorcal.vision.photo_decoding"
 
 
 @dataclass(frozen=True)
@@ -60,10 +54,12 @@ class Photo:
 
         Raises ValueError unless ``factor`` divides both sides, as the rest would be cut off.
         """
+        from scissorcal.vision.photo_decoding import averaged
+
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
-        image = _averaged(self.image, factor)
+        image = averaged(self.image, factor)
         return replace(self, image=image, reduction=self.reduction * factor)
 
     def whole(self, pixels: ArrayLike) -> Array:
@@ -83,55 +79,29 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
     Turns it as its EXIF data say, brings 16-bit, CMYK and palette pictures to eight bits of grey or
     colour, and lays transparent ones on white. A photograph of more than ``max_pixels`` is read at
     1/2, 1/4 or 1/8 (a JPEG without ever being held whole). ``colour=False`` gives grey, in less
-    time and memory. Raises InputError naming the file and what to do where it cannot be read.
+    time and memory. It is decoded in a child process. Raises InputError naming the file and what to
+    do where it cannot be read.
     """
-    from PIL import Image, UnidentifiedImageError
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("error", Image.DecompressionBombWarning)
-        try:
-            digest = file_digest(path)
-            with Image.open(path) as opened:
-                return _photo(path, opened, digest, max_pixels, colour)
-        except FileNotFoundError:
-            raise InputError(f"{path} does not exist: check the photograph's path.") from None
-        except (IsADirectoryError, PermissionError) as error:
-            raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-        except (Image.DecompressionBombWarning, Image.DecompressionBombError):
-            limit = (Image.MAX_IMAGE_PIXELS or 0) // 1_000_000
-            raise InputError(
-                f"{path} has more than {limit} million pixels: save it at a smaller size."
-            ) from None
-        except UnidentifiedImageError:
-            raise InputError(_not_a_picture(path)) from None
-        except _DAMAGE as error:
-            raise InputError(
-                f"{path} is damaged or truncated ({error}): copy it from the camera again."
-            ) from None
+    data = read_foreign(path, PHOTOGRAPH)
+    options = {"path": str(path), "max_pixels": max_pixels, "colour": colour}
+    facts = parse_isolated(f"{_DECODER}:decode", data, path, PHOTOGRAPH, **options)
+    return Photo(
+        facts["image"],
+        facts["width"],
+        facts["height"],
+        facts["reduction"],
+        (facts["across"], facts["down"]),
+        facts["orientation"],
+        bytes_digest(data),
+        path.name,
+    )
 
 
-def _photo(path: Path, opened: "Image.Image", digest: str, max_pixels: int, colour: bool) -> Photo:
-    width, height = opened.size
-    orientation = _orientation(opened)
-    reduction = _reduction(width, height, max_pixels)
-    if opened.mode == "F":
-        raise InputError(
-            f"{path} has floating-point pixels of unknown white level: save it as an 8- or 16-bit "
-            "picture."
-        )
-    left = reduction
-    if opened.format in ("JPEG", "MPO"):
-        mode = "L" if not colour and opened.mode in ("RGB", "L") else None
-        opened.draft(mode, (-(-width // reduction), -(-height // reduction)))
-        left = reduction // round(width / opened.size[0])
-    image = _eight_bits(opened, colour, left)
-    spare = (width - image.shape[1] * reduction, height - image.shape[0] * reduction)
-    image = _upright(image, orientation)
-    origin = _origin(spare, orientation)
-    if orientation >= 5:
-        width, height = height, width
-    return Photo(image, width, height, reduction, origin, orientation, digest, path.name)
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
+    data = read_foreign(path, PHOTOGRAPH)
+    found = parse_isolated(f"{_DECODER}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    return found[0], found[1]
 
 
 PictureShape = tuple[int, int, int]
@@ -155,83 +125,3 @@ def same_shape(photo: Photo, shape: PictureShape | None) -> PictureShape:
         f"{photo.source} has the EXIF orientation {own[2]}, the photographs before it "
         f"{shape[2]}: hold the camera the same way for all."
     )
-
-
-def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
-    """Decode to grey or blue-green-red, averaging blocks of ``reduction`` by as many pixels."""
-    from PIL import Image
-
-    if opened.mode in _DEEP:
-        return _averaged(_from_deep(np.asarray(opened)), reduction)
-    if opened.mode in ("1", "P", "PA", "LA", "La", "RGBa") or "transparency" in opened.info:
-        opened = opened.convert("L" if opened.mode == "1" else "RGBA")
-    if reduction > 1:
-        opened = opened.reduce(reduction)
-    if opened.mode == "RGBA":
-        paper = Image.new("RGBA", opened.size, "white")
-        opened = Image.alpha_composite(paper, opened).convert("RGB")
-    if opened.mode == "L" or not colour:
-        return np.array(opened.convert("L"), dtype=np.uint8)
-    return np.ascontiguousarray(np.asarray(opened.convert("RGB"), dtype=np.uint8)[:, :, ::-1])
-
-
-def _from_deep(deep: NDArray[Any]) -> Picture:
-    """Take the upper eight bits of those in use: 10-, 12- and 14-bit sensors fill 16 in part."""
-    values = np.maximum(deep, 0)
-    bits = max(8, int(values.max()).bit_length())
-    return np.asarray(values >> (bits - 8), dtype=np.uint8)
-
-
-def _averaged(image: Picture, factor: int) -> Picture:
-    """Average blocks of ``factor`` by ``factor`` pixels; an incomplete last block is dropped."""
-    import cv2
-
-    if factor == 1:
-        return image
-    rows, columns = image.shape[0] // factor, image.shape[1] // factor
-    whole = image[: rows * factor, : columns * factor]
-    return np.asarray(
-        cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8
-    )
-
-
-def _upright(image: Picture, orientation: int) -> Picture:
-    """Rotate and mirror by EXIF's orientation (1 to 8)."""
-    if orientation in (2, 4, 5, 7):
-        image = image[:, ::-1]
-    turns = {3: 2, 4: 2, 5: 1, 6: 3, 7: 3, 8: 1}.get(orientation, 0)
-    return np.ascontiguousarray(np.rot90(image, turns))
-
-
-def _origin(spare: tuple[int, int], orientation: int) -> tuple[int, int]:
-    """Place of the reduced picture's corner in the whole one, both upright.
-
-    A reduced picture lacks (or exceeds) the whole one by ``spare`` pixels at its right and lower
-    end, which the turn may bring to the left or to the top.
-    """
-    across = {2: spare[0], 3: spare[0], 6: spare[1], 7: spare[1]}.get(orientation, 0)
-    down = {3: spare[1], 4: spare[1], 7: spare[0], 8: spare[0]}.get(orientation, 0)
-    return across, down
-
-
-def _orientation(opened: "Image.Image") -> int:
-    try:
-        found = opened.getexif().get(_EXIF_ORIENTATION, 1)
-    except _DAMAGE:
-        return 1
-    return found if isinstance(found, int) and 1 <= found <= 8 else 1
-
-
-def _reduction(width: int, height: int, max_pixels: int) -> int:
-    for factor in (1, 2, 4):
-        if width * height <= max_pixels * factor**2:
-            return factor
-    return 8
-
-
-def _not_a_picture(path: Path) -> str:
-    if path.stat().st_size == 0:
-        return f"{path} is empty: copy it from the camera again."
-    if path.suffix.lower() in (".heic", ".heif"):
-        return f"{path} is an HEIF photograph: set the camera to JPEG, or save it as JPEG or PNG."
-    return f"{path} is not a readable photograph: give a JPEG, PNG, TIFF, BMP or WebP file."

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign_text, reading
+from scissorcal.foreign.formats import STANCES
 
 Stances = Mapping[str, tuple[float, float]]
 """Stance of the rig by the photograph's file name: advance in mm, opening in deg."""
@@ -16,10 +18,9 @@ def read_stances(path: Path) -> Stances:
 
     Raises InputError with the file and line that is wrong.
     """
-    try:
-        rows = list(csv.DictReader(path.read_text("utf-8-sig").splitlines()))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {error}.") from None
+    text = read_foreign_text(path, STANCES)
+    with reading(path, STANCES):
+        rows = list(csv.DictReader(text.splitlines()))
     wanted = {"file", "advance_mm", "opening_deg"}
     if not rows or not wanted <= set(rows[0]):
         raise InputError(

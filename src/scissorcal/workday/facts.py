@@ -5,12 +5,14 @@ One function a kind of file; each gives plain values, which the index keeps. Eve
 ``failed`` (names of failed checks).
 """
 
-import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import parse_json, read_foreign, read_json, reading
+from scissorcal.foreign.formats import PHOTO_INDEX, RECORDING, REPORT, SIGNATURE
 from scissorcal.identity import file_digest
 
 Facts = dict[str, Any]
@@ -58,27 +60,17 @@ def trust_check(path: Path) -> Facts:
 
 def report(path: Path) -> Facts:
     """Facts of a report by its JSON twin."""
-    try:
-        twin = json.loads(path.read_text(encoding="utf-8"))
-        inputs = str(twin["inputs_hash"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} cannot be read ({error}): run 'scissorcal report'.") from None
+    with reading(path, REPORT):
+        inputs = str(read_json(path, REPORT)["inputs_hash"])
     return {"inputs": inputs, "label": "shows the current fits", "failed": []}
 
 
 def signature(path: Path) -> Facts:
     """Facts of a signature; its inputs are what was signed."""
-    from pydantic import ValidationError
-
     from scissorcal.package import Review
 
-    try:
-        review = Review.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
-        raise InputError(
-            f"{path} is damaged, was changed, or is of an earlier version: read the report and "
-            "sign it again with 'scissorcal report sign'."
-        ) from None
+    with reading(path, SIGNATURE):
+        review = Review.model_validate_json(read_foreign(path, SIGNATURE))
     return {
         "inputs": review.digest,
         "label": review.words,
@@ -107,7 +99,9 @@ def rendering(path: Path) -> Facts:
 
     for attached in read_attachments(path):
         if attached.name == "package-manifest.json":
-            return {"package": json.loads(attached.data)["content_hash"]}
+            with reading(path, RECORDING):
+                manifest = parse_json(attached.data, str(path), RECORDING.remedy)
+                return {"package": str(manifest["content_hash"])}
     return {"package": ""}
 
 
@@ -126,12 +120,9 @@ def refuse_changed(folder: Path, sha256: Mapping[str, str], digest: Callable[[Pa
 
 def photographs(path: Path) -> Facts:
     """Facts of a folder of photographs by its index file."""
-    try:
-        index = json.loads(path.read_text(encoding="utf-8"))
+    remedy = f"Remove {path.parent.name} and capture its photographs again."
+    kind = replace(PHOTO_INDEX, remedy=remedy)
+    with reading(path, kind):
+        index = read_json(path, kind)
         sha256 = {str(one["file"]): str(one["sha256"]) for one in index["photographs"]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"{path} cannot be read ({error}): remove {path.parent.name} and capture its "
-            "photographs again."
-        ) from None
     return {"content": file_digest(path), "photographs": len(sha256), "sha256": sha256}

@@ -6,7 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_json
+from scissorcal.foreign.formats import STATE
 from scissorcal.identity import file_digest
 
 FORMAT = "scissorcal-index/3"
@@ -66,13 +69,27 @@ class FileIndex:
 
     def _read(self) -> dict[str, Any]:
         try:
-            found = json.loads(self.path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            found = read_json(self.path, STATE)
+        except InputError:
             return {}
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             return {}
         entries = found.get("files")
-        return entries if isinstance(entries, dict) else {}
+        return entries if isinstance(entries, dict) and _is_whole(entries) else {}
+
+
+def _is_whole(entries: dict[str, Any]) -> bool:
+    """Whether entries have the form that `FileIndex.facts` gives them."""
+    return all(
+        isinstance(entry, dict)
+        and "stamp" in entry
+        and isinstance(entry.get("facts"), dict)
+        and all(
+            isinstance(known, dict) and "given" in known and isinstance(known.get("facts"), dict)
+            for known in entry["facts"].values()
+        )
+        for entry in entries.values()
+    )
 
 
 def _stamp(path: Path) -> list[int]:

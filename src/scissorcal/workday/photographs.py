@@ -1,16 +1,17 @@
 """Photographs in a workspace: a folder per capture, with what was found in each."""
 
-import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign, reading
+from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard, MarkerBoard
 from scissorcal.workday.workspace import Workspace
 
@@ -279,11 +280,7 @@ def _new_folder(workspace: Workspace, kind: PhotoKind) -> Path:
 
 
 def _index(path: Path) -> PhotoIndex:
-    try:
-        return PhotoIndex.model_validate_json(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, ValidationError) as error:
-        why = str(error).splitlines()[0]
-        raise InputError(
-            f"{path} cannot be read ({why}): remove {path.parent.name} and capture its "
-            "photographs again."
-        ) from None
+    remedy = f"Remove {path.parent.name} and capture its photographs again."
+    kind = replace(PHOTO_INDEX, remedy=remedy)
+    with reading(path, kind):
+        return PhotoIndex.model_validate_json(read_foreign(path, kind))

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_json
+from scissorcal.foreign.formats import STATE
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, capture_facts
 from scissorcal.recipe.schema import Recipe
@@ -196,9 +198,9 @@ def exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
     if not path.is_file():
         return {}
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path, STATE)
         return {str(name): {**row, "why": str(row["why"])} for name, row in found.items()}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (InputError, ValueError, TypeError, KeyError, AttributeError):
         raise InputError(
             f"{path} is not a list of exclusions. It lists the excluded recordings: correct it, or "
             "remove it to use every recording."

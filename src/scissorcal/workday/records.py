@@ -116,7 +116,7 @@ def _read(path: Path) -> tuple[str, list[Record], int]:
     for line in lines:
         try:
             record = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             break
         if not line.endswith(b"\n") or not isinstance(record, dict):
             break

@@ -2,6 +2,9 @@
 
 from typing import TYPE_CHECKING
 
+from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign, reading
+from scissorcal.foreign.formats import STATE
 from scissorcal.workday.engine import Engine
 
 if TYPE_CHECKING:
@@ -16,12 +19,11 @@ def known_scene_choice(engine: Engine) -> "SceneChoice | None":
     path = engine.workspace.scene_choice_path
     if not path.is_file():
         return None
-    from pydantic import ValidationError
-
     from scissorcal.package.simplest.choice import SceneChoice
 
     try:
-        found = SceneChoice.model_validate_json(path.read_bytes())
-    except ValidationError:
+        with reading(path, STATE):
+            found = SceneChoice.model_validate_json(read_foreign(path, STATE))
+    except InputError:
         return None  # of another version, or damaged: it is worked out again
     return found if found.identity == engine.identity(STEP) else None

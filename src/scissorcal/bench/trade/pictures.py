@@ -15,7 +15,7 @@ from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError
 from scissorcal.vision.blade.photo import Laid, by_blade, photograph_laid
-from scissorcal.vision.photo import Photo, read_photo
+from scissorcal.vision.photo import Photo, picture_size, read_photo
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.targets.detect import find_any_board
 
@@ -46,10 +46,7 @@ def factors_of(width: int, height: int) -> tuple[int, ...]:
 
 def size_of(photographed: Sequence[Photographed]) -> tuple[int, int]:
     """Width and height in pixels of the first photograph, by its file's header alone."""
-    from PIL import Image
-
-    with Image.open(photographed[0].paths[0]) as opened:
-        return opened.size
+    return picture_size(photographed[0].paths[0])
 
 
 def count_of(photographed: Sequence[Photographed]) -> int:

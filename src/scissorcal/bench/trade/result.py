@@ -8,6 +8,8 @@ from typing import Literal
 
 from scissorcal.bench.trade.point import Curve, Spread
 from scissorcal.errors import InputError, MissingError
+from scissorcal.foreign import read_json
+from scissorcal.foreign.formats import STATE
 
 TradeFormat = Literal["scissorcal-trade/1"]
 FORMAT: TradeFormat = "scissorcal-trade/1"
@@ -64,9 +66,9 @@ def read_trade(path: Path) -> Trade:
     if not path.is_file():
         raise MissingError(f"There is no {path} yet: run 'scissorcal bench trade' first.")
     try:
-        plain = json.loads(path.read_text(encoding="utf-8"))
+        plain = read_json(path, STATE)
         found = plain["format"]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InputError, KeyError, TypeError):
         raise InputError(
             f"{path} holds no results of 'bench trade': remove it and run 'scissorcal bench trade'."
         ) from None

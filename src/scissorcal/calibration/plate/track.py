@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign_text
+from scissorcal.foreign.formats import TRACK_LINES
 from scissorcal.vision.track import State
 
 
@@ -65,10 +67,10 @@ def read_track_lines(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
 
     Raises InputError, with file and line, where it is none.
     """
+    first, *lines = read_foreign_text(path, TRACK_LINES).splitlines() or [""]
     try:
-        first, *lines = path.read_text(encoding="utf-8").splitlines()
         head = TrackHead.model_validate_json(first)
-    except (OSError, UnicodeDecodeError, ValueError):
+    except ValidationError:
         raise InputError(
             f"{path} is no track: its first line must be an object with the format "
             "scissorcal-track/1."

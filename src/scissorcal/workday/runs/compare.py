@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import scissorcal
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import MissingError
+from scissorcal.foreign import read_foreign, reading
+from scissorcal.foreign.formats import REPORT
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
@@ -58,14 +60,9 @@ def load_side(path: Path) -> "Side":
         )
     if path.suffix == ".nc":
         return _side_of_fit(path)
-    try:
-        return Side(str(path), read_twin(path.read_bytes()))
-    except (OSError, ValueError) as error:
-        first = str(error).splitlines()[0]
-        raise InputError(
-            f"{path} is not a report of this version of scissorcal ({first}): run 'scissorcal "
-            "report' again, or name a workspace or a fit (.nc)."
-        ) from error
+    remedy = "Run 'scissorcal report' again, or name a workspace or a fit (.nc)."
+    with reading(path, REPORT, remedy):
+        return Side(str(path), read_twin(read_foreign(path, REPORT)))
 
 
 def _side_of_workspace(workspace: Workspace, source: str) -> "Side":

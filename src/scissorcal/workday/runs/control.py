@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import PATH
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import line_of, open_rig
@@ -302,7 +304,7 @@ def _open_writer(
         rig_facts(link.identity, recipe.rig.motor_sign, probe),
         link.identity.handle_radius,
     )
-    writer.attach("path.csv", path_file.read_bytes(), "text/csv")
+    writer.attach("path.csv", read_foreign(path_file, PATH), "text/csv")
     return writer
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign, reading
+from scissorcal.foreign.formats import STATE
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.workday.workspace import Workspace
@@ -164,8 +166,9 @@ def stored_design(engine: "Engine") -> CaptureDesign | None:
     from pydantic import TypeAdapter
 
     try:
-        found = TypeAdapter(CaptureDesign).validate_json(path.read_bytes())
-    except (OSError, ValueError):
+        with reading(path, STATE):
+            found = TypeAdapter(CaptureDesign).validate_json(read_foreign(path, STATE))
+    except InputError:
         return None  # of another version, or damaged: 'plan --explain' designs it again
     return found if found.inputs == inputs_of(engine) else None
 

@@ -239,7 +239,9 @@ def _refuse_without_data(engine: Engine, capture: Step) -> None:
     if state.content:
         return
     if state.state == "failed":
-        raise InputError(" ".join((f"{capture.name}: {state.found}.", *state.notes)))
+        raise InputError(
+            " ".join((f"{capture.name}: {state.found.removesuffix('.')}.", *state.notes))
+        )
     notes = "".join(f" {sentence}" for sentence in state.notes)
     sim = " (or --device sim)" if capture.kind == "recordings" else ""
     raise MissingError(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import open_foreign, reading
+from scissorcal.foreign.formats import LOG
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import load_result
@@ -20,6 +22,7 @@ Progress = Callable[[float, str], None]
 What = Literal["friction", "load"]
 
 CHANNELS = ("opening", "motor_torque", "handle_force", "torque_command", "force_command")
+_LONGEST_HEADING = 100_000
 TABLES = (".csv", ".parquet")
 PLOTS = (".svg", ".png")
 MOST_POINTS = 4000
@@ -147,17 +150,16 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 def _headings(path: Path) -> list[str]:
     if path.suffix.lower() == ".parquet":
-        from scissorcal.recording.parquetfile import require_pyarrow
+        from scissorcal.recording.parquetfile import parquet_headings
 
-        pa, pq = require_pyarrow()
-        try:
-            return list(pq.read_schema(path).names)
-        except (OSError, pa.ArrowException) as error:
-            raise InputError(f"{path} cannot be read as Parquet ({error}).") from error
+        return parquet_headings(path)
     import csv
 
-    with path.open(encoding="utf-8", errors="replace", newline="") as file:
-        return [cell.strip() for cell in next(csv.reader(file), [])]
+    with open_foreign(path, LOG) as file:
+        first = file.readline(_LONGEST_HEADING)
+    with reading(path, LOG):
+        row = next(csv.reader([first.decode("utf-8-sig", errors="replace")]), [])
+        return [cell.strip() for cell in row]
 
 
 def _refuse_endings(table: Path | None, plot: Path | None) -> None:

@@ -6,7 +6,10 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
+from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_json, reading
+from scissorcal.foreign.formats import STATE
 from scissorcal.verdicts import failed
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.workspace import Workspace
@@ -136,8 +139,9 @@ def _kept(workspace: Workspace) -> "ProbeResult | str":
     from scissorcal.device.probe.result import probe_from_dict
 
     try:
-        return probe_from_dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as error:
+        with reading(path, STATE):
+            return probe_from_dict(read_json(path, STATE))
+    except InputError as error:
         return f"{path.name} cannot be read ({error}) and is replaced"
 
 

@@ -15,7 +15,7 @@ from scissorcal.recipe.plate_tracking import LONGEST_DELAY_MS
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.live import frames_of, timed
+from scissorcal.vision.live import camera_number, frames_of, timed
 from scissorcal.vision.track import STATES, State
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM, line_of, open_rig
@@ -151,7 +151,7 @@ def _opened(
             feeds.refuse_without_sledge(link)
             on = stack.enter_context(feeds.idle_rig(link, recipe))
         frames = frames_of(camera) if camera != NONE else None
-        if eye is not None and frames is not None and not camera.isdigit():
+        if eye is not None and frames is not None and camera_number(camera) is None:
             yield _Opened(feeds.video_feed(timed(frames, camera), eye), eye, None, None)
             return
         yield _Opened(feeds.live_feed(stack, eye, frames, on), eye, link, None)

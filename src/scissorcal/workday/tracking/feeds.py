@@ -99,7 +99,9 @@ def refuse_strange_pairs(camera: str, device: str) -> None:
             f"--camera {camera} and --device {device} do not show the same plate: the simulated "
             "camera goes with the simulated rig. Give both as sim, or one of them as none."
         )
-    if device != "none" and camera not in ("none", "sim") and not camera.isdigit():
+    from scissorcal.vision.live import camera_number
+
+    if device != "none" and camera not in ("none", "sim") and camera_number(camera) is None:
         raise InputError(
             f"{camera} was recorded at another time than the rig on {device} is: its pictures "
             "cannot be put at the rig's time. Give a camera's number, or --device none."

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.foreign import parse_json, reading
+from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
 from scissorcal.recording.plate_channels import (
     FRAME,
@@ -181,9 +183,10 @@ def read_track(path: Path) -> RecordedTrack:
     rows = read_telemetry(path, PICTURE)
     if not stated:
         raise InputError(f"{path} ended before the track had a pose: name another track.")
-    facts = json.loads(stated[-1])
-    shared = facts["shared"]
-    about = TrackAbout(**{**facts, "shared": tuple(map(tuple, shared)) if shared else None})
+    with reading(path, RECORDING):
+        facts = parse_json(stated[-1], str(path), RECORDING.remedy)
+        shared = facts["shared"]
+        about = TrackAbout(**{**facts, "shared": tuple(map(tuple, shared)) if shared else None})
     times = [*rows["host_time_ns"][:1].tolist(), *recording.samples["host_time_ns"][:1].tolist()]
     base = min(times, default=0)
     common = np.zeros((6, 6)) if about.shared is None else np.array(about.shared)

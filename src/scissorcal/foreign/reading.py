@@ -1,0 +1,170 @@
+"""Open a file of others, and turn what its parser raises into one sentence that names it."""
+
+import contextlib
+import json
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from scissorcal.errors import InputError, ScissorcalError, file_error
+from scissorcal.foreign.formats import Format
+
+LONGEST_NUMBER = 300
+"""Digits of a whole number in JSON; more would not be a float of any size."""
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a named pipe (fifo)",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+_OPEN_FLAGS = (
+    os.O_RDONLY
+    | getattr(os, "O_NONBLOCK", 0)
+    | getattr(os, "O_NOCTTY", 0)
+    | getattr(os, "O_CLOEXEC", 0)
+    | getattr(os, "O_BINARY", 0)
+)
+
+
+@contextlib.contextmanager
+def open_foreign(path: Path, kind: Format) -> Iterator[IO[bytes]]:
+    """Open a regular file of at most the format's size; it is closed at the end of the block.
+
+    A pipe, device, socket or folder is refused without being opened, and again by what the open
+    file is, so that none can take the place of a file in between. Raises InputError, in one
+    sentence, also where there is no such file or it may not be read.
+    """
+    file = _opened(path)
+    try:
+        facts = os.fstat(file.fileno())
+        _refuse_kind(path, facts)
+        if facts.st_size > kind.most_bytes:
+            raise InputError(too_large(path, kind))
+        yield file
+    finally:
+        file.close()
+
+
+def read_foreign(path: Path, kind: Format) -> bytes:
+    """All bytes of a regular file that is not empty; raises InputError as `open_foreign` does."""
+    with reading(path, kind), open_foreign(path, kind) as file:
+        data = file.read(os.fstat(file.fileno()).st_size)  # what is asked for is reserved at once
+    if not data:
+        raise InputError(f"{path} is empty (0 bytes). {kind.remedy}")
+    return data
+
+
+def read_foreign_text(path: Path, kind: Format) -> str:
+    """The text of a UTF-8 file, without a byte order mark; raises InputError as `read_foreign`."""
+    return decode_text(read_foreign(path, kind), path)
+
+
+def decode_text(data: bytes, path: Path) -> str:
+    """Bytes as UTF-8 text; InputError with the place of the first byte that is none."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}, byte {error.start}: this is not UTF-8 text; save the file as UTF-8."
+        ) from None
+
+
+def read_json(path: Path, kind: Format) -> Any:
+    """The content of a JSON file; raises InputError as `read_foreign` and `parse_json` do."""
+    return parse_json(read_foreign(path, kind), str(path), kind.remedy)
+
+
+def parse_json(data: bytes | str, where: str, remedy: str) -> Any:
+    """Parse JSON of bounded levels and digits; InputError that begins with ``where``.
+
+    >>> parse_json('{"a": [1.5]}', "a.json", "Write it again.")
+    {'a': [1.5]}
+    """
+    try:
+        text = data if isinstance(data, str) else data.decode("utf-8-sig")
+        return json.loads(text, parse_int=_whole_number)
+    except ValueError as error:
+        raise InputError(f"{where} is not valid JSON ({_first_line(error)}). {remedy}") from None
+    except RecursionError:
+        raise InputError(f"{where} is nested too deeply for JSON. {remedy}") from None
+
+
+@contextlib.contextmanager
+def reading(path: Path | str, kind: Format, remedy: str = "") -> Iterator[None]:
+    """Turn whatever is raised while a file is parsed into an InputError that names it.
+
+    For code that parses and nothing else: an error in it is one of the file. The original error is
+    kept as the cause. Errors of scissorcal pass through.
+    """
+    try:
+        yield
+    except ScissorcalError:
+        raise
+    except Exception as error:
+        raise foreign_error(error, path, kind, remedy) from error
+
+
+def foreign_error(
+    error: Exception, path: Path | str, kind: Format, remedy: str = ""
+) -> ScissorcalError:
+    """The sentence on what a parser raised."""
+    remedy = remedy or kind.remedy
+    if isinstance(error, OSError) and error.errno is not None:
+        known = file_error(error, Path(path))
+        return known or InputError(f"{path} cannot be read: {error.strerror}. {remedy}")
+    if isinstance(error, MemoryError):
+        return InputError(f"{path} needs more memory than there is. {remedy}")
+    if isinstance(error, RecursionError):
+        return InputError(f"{path} is nested too deeply for {kind.name}. {remedy}")
+    return InputError(
+        f"{path} is not {kind.name}, or it is damaged ({_first_line(error)}). {remedy}"
+    )
+
+
+def refuse_unless_regular(path: Path, kind: Format) -> None:
+    """Raise InputError as `open_foreign` does, for a library that opens the file by its name."""
+    with open_foreign(path, kind):
+        return
+
+
+def too_large(path: Path | str, kind: Format) -> str:
+    """The sentence on a file of more bytes than its format has."""
+    return (
+        f"{path} has more than {kind.most_bytes / 1e6:g} MB, too much for {kind.name}: is it "
+        "another file?"
+    )
+
+
+def _opened(path: Path) -> IO[bytes]:
+    try:
+        _refuse_kind(path, path.stat())
+        return os.fdopen(os.open(path, _OPEN_FLAGS), "rb")
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist. Check the name and the folder.") from None
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be read: {error.strerror}. Name a file that you may read."
+        ) from None
+    except ValueError:
+        raise InputError(f"{str(path)!r} cannot be the name of a file. Check it.") from None
+
+
+def _refuse_kind(path: Path, facts: os.stat_result) -> None:
+    if not stat.S_ISREG(facts.st_mode):
+        what = _KINDS.get(stat.S_IFMT(facts.st_mode), "no regular file")
+        raise InputError(f"{path} cannot be read: it is {what}, not a file. Name a file.")
+
+
+def _whole_number(digits: str) -> int:
+    if len(digits) > LONGEST_NUMBER:
+        raise ValueError(f"a number of {len(digits)} digits")
+    return int(digits)
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[0][:200] if lines else type(error).__name__
