@@ -20,7 +20,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.identity import bytes_digest
 from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
-from scissorcal.package.review import REVIEW_FORMAT, Review
+from scissorcal.package.review import Review
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
 from scissorcal.recipe.plate_surface import probed_surface
@@ -201,13 +201,12 @@ def _read_report(path: Path) -> None:
 
 
 def _signature(path: Path) -> None:
-    review = Review(
-        format=REVIEW_FORMAT,
+    review = Review.of(
         name="A. Lovelace",
         decision="accept",
         note="",
         time_utc="2025-01-31T15:02:00Z",
-        report_sha256="0" * 64,
+        content={"report/report.json": "0" * 64},
         fit_hashes={"cut": "1f"},
     )
     path.write_text(review.model_dump_json())

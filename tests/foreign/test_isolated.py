@@ -98,6 +98,13 @@ def test_words_of_a_library_do_not_mix_with_the_answer(capfd: pytest.CaptureFixt
     assert capfd.readouterr() == ("", "")
 
 
+FINDS_TESTS = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, sys.path)]),
+}
+"""A child is given the folders that modules come from, but never the current one."""
+
+
 def test_a_fork_starts_a_child_of_its_own() -> None:
     program = (
         "import os\n"
@@ -111,7 +118,7 @@ def test_a_fork_starts_a_child_of_its_own() -> None:
         "assert os.waitpid(forked, 0)[1] == 0\n"
         "assert ask() == first\n"
     )
-    subprocess.run([sys.executable, "-c", program], check=True)
+    subprocess.run([sys.executable, "-c", program], check=True, env=FINDS_TESTS)
 
 
 def test_a_child_ends_with_its_parent() -> None:
@@ -122,7 +129,9 @@ def test_a_child_ends_with_its_parent() -> None:
         "print(parse_isolated(f'{HERE}:good', b'a', 'a.bin', KIND)['pid'], flush=True)\n"
         "os.kill(os.getpid(), 9)\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=FINDS_TESTS
+    )
     pid = int(done.stdout)
     for _ in range(200):
         if not _runs(pid):

@@ -91,7 +91,10 @@ REPORT = Format("a report", 50 * _MB, "Run 'scissorcal report' again.")
 """A page with its pictures has 5 MB, its twin less."""
 
 SIGNATURE = Format("a signature", _MB, "Sign the report again with 'scissorcal report sign'.")
-"""A few lines of JSON."""
+"""JSON with a line for each file that it covers, at most 5,000."""
+
+KEY = Format("a key", 100_000, "Make one with 'ssh-keygen -t ed25519 -f lab-key'.")
+"""A private key has 400 bytes, a file of trusted keys a line of 100 for each."""
 
 PHOTO_INDEX = Format("an index of photographs", 50 * _MB, "Capture its photographs again.")
 """60 photographs of 1,000 corners each have 3 MB."""

@@ -11,16 +11,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import KEY
 from scissorcal.package.review import KeySignature
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 MAKE_KEY = "ssh-keygen -t ed25519 -f lab-key"
-LARGEST_KEY_FILE = 100_000
-"""Bytes; a key has 400, and a file of trusted keys a line of 100 for each."""
-
 _SIGNED = b"scissorcal-signature/2\n"
 """Stands before the digest, so that a signature of anything else is none of a review."""
 
@@ -28,8 +27,8 @@ _SIGNED = b"scissorcal-signature/2\n"
 def sign_digest(path: Path, digest: str, passphrase: Callable[[], str]) -> KeySignature:
     """Sign a review's digest by the private key in a file.
 
-    ``passphrase`` is asked for where the key is encrypted. Raises MissingError where there is no
-    such file, InputError where it is no such key or where others may read it.
+    ``passphrase`` is asked for where the key is encrypted. Raises InputError where
+    it is no such key, is not there, or where others may read it.
     """
     from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
@@ -57,10 +56,11 @@ def holds(key: KeySignature, digest: str) -> bool:
 def read_public_keys(path: Path) -> tuple[str, ...]:
     """Public keys of a file, one a line as in ``lab-key.pub``; comments are left out.
 
-    Raises MissingError where there is no such file, InputError where a line is no Ed25519 key.
+    Raises InputError where it is not there or a line is no Ed25519 key.
     """
     found = []
-    for number, line in enumerate(_text(path).decode("utf-8", "replace").splitlines(), start=1):
+    lines = read_foreign(path, KEY).decode("utf-8", "replace").splitlines()
+    for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
@@ -83,7 +83,7 @@ def _private_key(path: Path, passphrase: Callable[[], str]) -> "Ed25519PrivateKe
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_ssh_private_key
 
-    data = _text(path)
+    data = read_foreign(path, KEY)
     if os.name == "posix" and path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise InputError(
             f"Others may read the private key {path}: run 'chmod 600 {path}', and make a new key "
@@ -106,11 +106,3 @@ def _private_key(path: Path, passphrase: Callable[[], str]) -> "Ed25519PrivateKe
     if not isinstance(key, Ed25519PrivateKey):
         raise InputError(wrong)
     return key
-
-
-def _text(path: Path) -> bytes:
-    if not path.exists():
-        raise MissingError(f"{path} does not exist: '{MAKE_KEY}' makes a pair of keys.")
-    if not path.is_file() or path.stat().st_size > LARGEST_KEY_FILE:
-        raise InputError(f"{path} is no key: '{MAKE_KEY}' makes a pair.")
-    return path.read_bytes()

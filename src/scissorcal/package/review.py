@@ -18,6 +18,9 @@ REPORT_PAGE, REPORT_TWIN = "report/report.html", "report/report.json"
 """What a review's ``content`` calls the page and its JSON twin."""
 
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+MOST_FILES = 5_000
+"""Files that a review covers; with their digests 0.7 MB, which a package's manifest can hold."""
+
 _FILE_NAME = Field(min_length=1, max_length=500)
 
 
@@ -55,7 +58,7 @@ class Review(BaseModel):
     note: Annotated[str, Field(max_length=10_000)]
     time_utc: Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")]
     content: Annotated[
-        dict[Annotated[str, _FILE_NAME], Digest], Field(min_length=1, max_length=20_000)
+        dict[Annotated[str, _FILE_NAME], Digest], Field(min_length=1, max_length=MOST_FILES)
     ]
     fit_hashes: Annotated[dict[str, str], Field(min_length=1, max_length=8)]
     digest: Digest
