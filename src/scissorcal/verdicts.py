@@ -115,6 +115,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         f"{_INTERVALS} of the edge: mean residual of an eighth of the edge in sds that are claimed "
         "there",
     ),
+    "fit camera": (
+        "at most",
+        f"{_EDGE}: standard error of the camera where the blade was, px",
+    ),
     "fit blade lengths": (
         "at most",
         f"{_EDGE}: difference of a pair's blades in length, in sds of equally long ones",

@@ -110,4 +110,4 @@ def test_a_pair_has_verdicts_on_its_lengths_and_its_lamps(tmp_path):
     assert {"residual against claimed sd", "blade lengths", "lamps apart"} <= checks
     again = load(Engine.of(lab).file("fit blade"), BladeResult)
     assert again.openings == outcome.result.openings
-    assert again.pair_verdicts == outcome.result.pair_verdicts
+    assert again.shared_verdicts == outcome.result.shared_verdicts

@@ -138,7 +138,7 @@ class BladeResult(Result):
     inputs_hash: str
     sources: tuple[str, ...]
     pictures: tuple[str, ...] = ()
-    pair_verdicts: tuple[Verdict, ...] = ()
+    shared_verdicts: tuple[Verdict, ...] = ()
 
     @property
     def belief(self) -> EdgeBelief:
@@ -161,9 +161,9 @@ class BladeResult(Result):
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """The verdicts on all blades, and on both together."""
+        """The verdicts on each blade, then those on all together and on the camera."""
         own = (verdict for blade in self.blades for verdict in blade.verdicts)
-        return (*own, *self.pair_verdicts)
+        return (*own, *self.shared_verdicts)
 
 
 def blade_facts(fit: BladeFit) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
+from scissorcal.verdicts import Verdict
 from scissorcal.vision.targets.boards import BLADE_MAT
 from scissorcal.workday.photographs import (
     BladeSetup,
@@ -18,6 +19,7 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.calibration.edge.result import BladeFit, SeenPair
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
@@ -71,9 +73,8 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     fits = _fits(seen, captures, engine, request)
     openings = tuple(_pair(one) for one in seen if one.scissors is not None)
     sources = tuple(one.photo.source for one in seen)
-    result = BladeResult(
-        fits, openings, request.inputs_hash, sources, pair_verdicts=pair_verdicts(openings)
-    )
+    shared = (*pair_verdicts(openings), *_camera_verdicts(engine, seen))
+    result = BladeResult(fits, openings, request.inputs_hash, sources, shared_verdicts=shared)
     return Made(result, lambda folder: _draw(seen, fits, folder))
 
 
@@ -100,12 +101,37 @@ def _measured(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "BladePhot
 
 def _camera(engine: "Engine") -> "Camera | None":
     """The workspace's camera, where it has one."""
+    fitted = _camera_fit(engine)
+    return None if fitted is None else fitted.camera
+
+
+def _camera_fit(engine: "Engine") -> "CameraFit | None":
     from scissorcal.workday.runs.fit import load_result
 
     if not engine.file("fit camera").is_file():
         return None
-    camera: Camera = load_result(engine, "camera").camera
-    return camera
+    fitted: CameraFit = load_result(engine, "camera")
+    return fitted
+
+
+def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Verdict, ...]:
+    """How well the camera is known where the edges were; none where no fitted camera was used."""
+    import numpy as np
+
+    from scissorcal.calibration.camera.there import CameraThere
+    from scissorcal.calibration.edge.checks import SCOPE
+
+    fitted = _camera_fit(engine)
+    edges = [(one.photo, own) for one in seen for own in one.measured if own.metric]
+    mats = any(capture.index.board for capture in photo_captures(engine.workspace, "blade"))
+    if fitted is None or fitted.pixel_map is None or not mats or not edges:
+        return ()
+    pixels = np.concatenate([photo.whole(own.edge.pixels) for photo, own in edges])
+    scale = min(
+        float(np.linalg.norm(np.ptp(photo.whole(own.edge.pixels), axis=0)) / np.ptp(own.station))
+        for photo, own in edges
+    )
+    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(SCOPE),)
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:
