@@ -72,7 +72,20 @@ class FileIndex:
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             return {}
         entries = found.get("files")
-        return entries if isinstance(entries, dict) else {}
+        if not isinstance(entries, dict):
+            return {}
+        return {key: entry for key, entry in entries.items() if _is_entry(entry)}
+
+
+def _is_entry(entry: Any) -> bool:
+    """Whether an entry has the form that :meth:`FileIndex.facts` keeps; others are dropped."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("facts"), dict):
+        return False
+    facts = entry["facts"].values()
+    return "stamp" in entry and all(
+        isinstance(one, dict) and "given" in one and isinstance(one.get("facts"), dict)
+        for one in facts
+    )
 
 
 def _stamp(path: Path) -> list[int]:
