@@ -109,7 +109,7 @@ def test_a_damaged_fit_is_said_to_be_and_is_fitted_again(copied: Workspace) -> N
     step = next(step for step in plan.steps if step.name == "fit friction")
     assert step.state == "damaged"
     assert step.found.endswith("is damaged: fit again with 'scissorcal fit friction'")
-    assert step.command == plan.next_command == "scissorcal fit friction"
+    assert step.command == "scissorcal fit friction"
     with pytest.raises(InputError, match="damaged: fit again with 'scissorcal fit friction'"):
         write_workspace_report(copied)
     (outcome,) = fit_workspace(copied, ("friction",))
