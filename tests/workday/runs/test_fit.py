@@ -111,7 +111,7 @@ def test_a_damaged_fit_is_said_to_be_and_is_fitted_again(copied: Workspace) -> N
     assert step.found.endswith("is damaged: fit again with 'scissorcal fit friction'")
     assert step.command == "scissorcal fit friction"
     with pytest.raises(InputError, match="damaged: fit again with 'scissorcal fit friction'"):
-        write_workspace_report(copied)
+        write_workspace_report(Engine.of(copied))
     (outcome,) = fit_workspace(copied, ("friction",))
     assert outcome.path.is_file()
     assert states(make_plan(copied))["fit friction"] == "unverified"
