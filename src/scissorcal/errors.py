@@ -52,6 +52,9 @@ _ELSEWHERE = "choose a folder that you may write to"
 _FILE_ERRORS = {
     errno.ENOSPC: f"The disk is full: {{}} could not be written. Free some space, or {_ELSEWHERE}.",
     errno.EDQUOT: "Your disk quota is used up: {} could not be written. Free some space.",
+    errno.EIO: "The disk reported a fault (input/output error) at {}: copy what you need to "
+    "another disk, and check this one.",
+    errno.ESTALE: "{} is on a network folder that was taken away: connect it again.",
     errno.EFBIG: f"{{}} is too large for this file system: {_ELSEWHERE}.",
     errno.EROFS: f"{{}} is on a read-only file system: {_ELSEWHERE}.",
     errno.EACCES: "{} may not be read or written by you (permission denied): change its "

@@ -1,33 +1,88 @@
 """Files that are written whole or not at all."""
 
 import contextlib
+import errno
 import os
+import re
+import secrets
+import socket
 from collections.abc import Iterator
 from pathlib import Path
+
+_PART = re.compile(r"\.(?P<host>[A-Za-z0-9_-]+)\.(?P<pid>\d+)\.[0-9a-f]{8}\.part$")
+_LONGEST_NAME = 40
+"""Characters of a file's name that its part repeats: a part's name fits where the file's fits."""
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a name to write to; the file takes the place of ``path`` once the block has ended.
 
-    Its bytes are on the disk before that, so that neither an error nor a power failure leaves half
-    a file; what was there stays until then, and after an error. An OSError names ``path``. Two
-    processes that write the same file do not mix: the last one wins.
+    Its bytes are on the disk before that, and its name after it, so that neither an error nor a
+    power failure leaves half a file; what was there stays until then, and after an error. An
+    OSError names ``path``. Two processes that write the same file do not mix, on one computer or
+    on several that share a folder: the last one wins.
 
     >>> with replacing(Path("a.txt")) as part:
     ...     _ = part.write_text("whole")
     >>> Path("a.txt").read_text()
     'whole'
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part = path.with_name(
+        f"{path.name[:_LONGEST_NAME]}.{_host()}.{os.getpid()}.{secrets.token_hex(4)}.part"
+    )
     try:
         yield part
         with part.open("rb") as file:
             os.fsync(file.fileno())
         part.replace(path)
+        _keep_name(path.parent)
     except BaseException as error:
         with contextlib.suppress(OSError):
             part.unlink()
-        if isinstance(error, OSError) and error.filename == str(part):
+        if isinstance(error, OSError) and error.filename in (None, str(part)):
             error.filename, error.filename2 = str(path), None
         raise
+
+
+def remove_left_over(folder: Path) -> tuple[Path, ...]:
+    """Remove the parts in ``folder`` whose writer was killed; returns which.
+
+    Only parts of this computer are judged, as the processes of another cannot be seen from here. A
+    folder that cannot be written keeps them.
+    """
+    removed = []
+    for part in sorted(folder.glob("*.part")):
+        found = _PART.search(part.name)
+        if found and found["host"] == _host() and not is_running(int(found["pid"])):
+            with contextlib.suppress(OSError):
+                part.unlink()
+                removed.append(part)
+    return tuple(removed)
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process of this computer has the number ``pid``."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # it runs, as another user
+        return True
+    return True
+
+
+def _host() -> str:
+    return re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:_LONGEST_NAME] or "unnamed"
+
+
+def _keep_name(folder: Path) -> None:
+    """Have the folder's list of names on the disk; some file systems cannot be asked for it."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES):
+            raise
+    finally:
+        os.close(handle)

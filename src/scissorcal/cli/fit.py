@@ -166,24 +166,27 @@ def _run(
     seed: int,
 ) -> Answer:
     from scissorcal.workday.engine import Engine
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.fit import fit_step, steps_to_fit
 
-    engine = Engine.of(open_workspace(folder))
+    workspace = open_workspace(folder)
     limit_s = 60.0 * max_minutes
     outcomes = []
-    for step in steps_to_fit(engine, wanted):
-        ends_s = time.monotonic() + limit_s
-        with progress(limit_s, grace_s=GRACE_S) as tell:
-            outcome = fit_step(
-                engine,
-                step,
-                effort=effort,
-                seed=seed,
-                force=force and (not wanted or step.what in wanted),
-                progress=tell,
-                stop=lambda ends_s=ends_s: time.monotonic() > ends_s,  # type: ignore[misc]
-            )
-        outcomes.append(outcome)
+    with writing(workspace, "scissorcal fit"):
+        engine = Engine.of(workspace)
+        for step in steps_to_fit(engine, wanted):
+            ends_s = time.monotonic() + limit_s
+            with progress(limit_s, grace_s=GRACE_S) as tell:
+                outcome = fit_step(
+                    engine,
+                    step,
+                    effort=effort,
+                    seed=seed,
+                    force=force and (not wanted or step.what in wanted),
+                    progress=tell,
+                    stop=lambda ends_s=ends_s: time.monotonic() > ends_s,  # type: ignore[misc]
+                )
+            outcomes.append(outcome)
     return _answer(outcomes)
 
 

@@ -56,11 +56,13 @@ def restore(
     """
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.history import restore as restore_version
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.plan import make_plan
 
     workspace = open_workspace(folder)
-    engine = Engine.of(workspace)
-    found, before = restore_version(engine, version)
+    with writing(workspace, "scissorcal fit restore"):
+        engine = Engine.of(workspace)
+        found, before = restore_version(engine, version)
     path = engine.file(f"fit {found.what}")
     lines = [f"{workspace.relative(path)}: {found.name} is in use again"]
     lines += [f"kept: {workspace.relative(before)}"] if before else []

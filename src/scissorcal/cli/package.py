@@ -57,12 +57,14 @@ def build(
       ...
     """
     from scissorcal.workday.engine import Engine
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.package import build_workspace_package
 
     workspace = open_workspace(folder)
-    built = build_workspace_package(
-        Engine.of(workspace), seed=seed, force=force, allow_failed=allow_failed
-    )
+    with writing(workspace, "scissorcal package build"):
+        built = build_workspace_package(
+            Engine.of(workspace), seed=seed, force=force, allow_failed=allow_failed
+        )
     head = f"{workspace.relative(built.path)}: {_contents(built.manifest)}"
     if built.cached:
         head += "\nnothing changed since it was built, so it is as it was"

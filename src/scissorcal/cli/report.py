@@ -38,12 +38,14 @@ def report(
       ...
     """
     from scissorcal.workday.engine import Engine
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.report import write_workspace_report
     from scissorcal.workday.runs.sign import standing_review
 
     workspace = open_workspace(folder)
-    engine = Engine.of(workspace)
-    written = write_workspace_report(engine, anew=anew)
+    with writing(workspace, "scissorcal report"):
+        engine = Engine.of(workspace)
+        written = write_workspace_report(engine, anew=anew)
     review = standing_review(engine)
     shown = written.fits
     names = [workspace.relative(path) for path in (written.html, written.json)]

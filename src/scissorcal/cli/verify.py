@@ -97,6 +97,7 @@ def verify(
     width: factor by which intervals are too narrow (above 1) or too wide; shift: their offset from
     the truth; p: probability of such ranks if the intervals are right.
     """
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 
     if workers is not None and cluster is not None:
@@ -111,7 +112,7 @@ def verify(
     settings = VerifySettings(
         checks=_checks(checks), fits=fits, prior=prior, spread=spread, seed=seed
     )
-    with progress() as tell:
+    with writing(workspace, "scissorcal verify"), progress() as tell:
         outcomes = verify_workspace(
             workspace, wanted, settings, workers=workers, cluster=cluster, progress=tell
         )

@@ -294,10 +294,9 @@ class Engine:
         try:
             facts = self.facts(step.name)
         except InputError as error:
-            force = " --force" if step.kind in ("fit", "package") else ""
-            why_not = (str(error),)
-            again = f"{step.command}{force}"
-            return made("failed", f"{name} cannot be read", again, notes=why_not)
+            why_not, again = (str(error),), step.command
+            found = f"damaged: {_AGAIN.get(step.kind, 'make it again')} with '{again}'"
+            return made("damaged", f"{name} is {found}", again, notes=why_not)
         failed = tuple(facts["failed"])
         kept: dict[str, Any] = {"content": content, "files": (name,), "failed": failed}
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
@@ -398,6 +397,10 @@ class Engine:
         if self.state("package build").state in WAITING:
             return made("stale", f"package build is {self.state('package build').state}")
         return made("done", _count(len(recordings), "recording"), "")
+
+
+_AGAIN = {"fit": "fit again", "verify": "check again", "package": "build again"}
+"""How a damaged result of a kind comes back, in two words."""
 
 
 def _captured(step: Step) -> CaptureKind:

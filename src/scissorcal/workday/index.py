@@ -75,20 +75,19 @@ class FileIndex:
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             return {}
         entries = found.get("files")
-        return entries if isinstance(entries, dict) and _is_whole(entries) else {}
+        if not isinstance(entries, dict):
+            return {}
+        return {key: entry for key, entry in entries.items() if _is_entry(entry)}
 
 
-def _is_whole(entries: dict[str, Any]) -> bool:
-    """Whether entries have the form that `FileIndex.facts` gives them."""
-    return all(
-        isinstance(entry, dict)
-        and "stamp" in entry
-        and isinstance(entry.get("facts"), dict)
-        and all(
-            isinstance(known, dict) and "given" in known and isinstance(known.get("facts"), dict)
-            for known in entry["facts"].values()
-        )
-        for entry in entries.values()
+def _is_entry(entry: Any) -> bool:
+    """Whether an entry has the form that :meth:`FileIndex.facts` keeps; others are dropped."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("facts"), dict):
+        return False
+    facts = entry["facts"].values()
+    return "stamp" in entry and all(
+        isinstance(one, dict) and "given" in one and isinstance(one.get("facts"), dict)
+        for one in facts
     )
 
 

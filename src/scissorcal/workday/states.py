@@ -3,17 +3,20 @@
 from dataclasses import dataclass
 from typing import Literal
 
-State = Literal["missing", "stale", "incomplete", "failed", "unverified", "done", "excluded"]
+State = Literal[
+    "missing", "damaged", "stale", "incomplete", "failed", "unverified", "done", "excluded"
+]
 """What a step may be in, in the order in which it is decided.
 
-missing: there is no result. stale: it was made from other inputs than there are now, or an input is
-missing or stale. incomplete: a capture lacks what the recipe plans, a fit ran out of time, or a
-trust check counted no coverage. failed: a check of it or of a fit below it failed, it cannot be
-read, or a person rejected it. unverified: no complete trust check of this very fit is there. done:
-none of these. excluded: the scene does not need it.
+missing: there is no result. damaged: its file cannot be read; its command makes it again. stale: it
+was made from other inputs than there are now, or an input is missing, damaged or stale. incomplete:
+a capture lacks what the recipe plans, a fit ran out of time, or a trust check counted no coverage.
+failed: a check of it or of a fit below it failed, a recording cannot be read, or a person rejected
+it. unverified: no complete trust check of this very fit is there. done: none of these. excluded:
+the scene does not need it.
 """
 
-WAITING: frozenset[State] = frozenset({"missing", "stale"})
+WAITING: frozenset[State] = frozenset({"missing", "damaged", "stale"})
 """States of an input in which what builds on it is stale."""
 
 CHANGED = {

@@ -1,5 +1,6 @@
 """A workspace: a folder with a recipe.toml, and where everything in it lies."""
 
+import contextlib
 import shutil
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -161,9 +162,16 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     text = read_text(source)
     parse_recipe(text, str(source))
     try:
-        workspace.root.mkdir(parents=True, exist_ok=True)
-        with replacing(workspace.recipe_path) as part:
-            part.write_text(text, encoding="utf-8")
+        made = [one for one in (workspace.root, *workspace.root.parents) if not one.exists()]
+        try:
+            workspace.root.mkdir(parents=True, exist_ok=True)
+            with replacing(workspace.recipe_path) as part:
+                part.write_text(text, encoding="utf-8")
+        except BaseException:
+            with contextlib.suppress(OSError):  # a folder that is not empty stays
+                for folder in made:
+                    folder.rmdir()
+            raise
     except OSError as error:
         raise file_error(error, workspace.root) or error from None
     return workspace

@@ -10,6 +10,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import Plan, make_plan
 from scissorcal.workday.runs.fit import fit_workspace, load_result
+from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_friction
 
@@ -102,16 +103,16 @@ def test_another_material_leaves_friction_alone(copied: Workspace) -> None:
     assert states(make_plan(copied))["capture friction"] == "done"
 
 
-def test_a_damaged_fit_is_said_to_be_and_can_be_forced(copied: Workspace) -> None:
+def test_a_damaged_fit_is_said_to_be_and_is_fitted_again(copied: Workspace) -> None:
     copied.fit_path("friction").write_bytes(b"no fit")
     plan = make_plan(copied)
     step = next(step for step in plan.steps if step.name == "fit friction")
-    assert step.state == "failed"
-    assert "cannot be read" in step.found
-    assert step.command == "scissorcal fit friction --force"
-    with pytest.raises(InputError, match="scissorcal fit"):
-        fit_workspace(copied, ("friction",))
-    (outcome,) = fit_workspace(copied, ("friction",), force=True)
+    assert step.state == "damaged"
+    assert step.found.endswith("is damaged: fit again with 'scissorcal fit friction'")
+    assert step.command == "scissorcal fit friction"
+    with pytest.raises(InputError, match="damaged: fit again with 'scissorcal fit friction'"):
+        write_workspace_report(Engine.of(copied))
+    (outcome,) = fit_workspace(copied, ("friction",))
     assert outcome.path.is_file()
     assert states(make_plan(copied))["fit friction"] == "unverified"
 

@@ -10,7 +10,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import save_version
-from scissorcal.workday.states import StepState
+from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
 
@@ -141,7 +141,7 @@ def fit_step(
     chosen: Effort = effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
     path = engine.file(step.name)
-    stored = _stored(engine, step, force)
+    stored = _stored(engine, step)
     current = stored.get("inputs") == identity or stored.get("imported")
     if stored and current and not force and engine.state(step.name).state != "stale":
         state = engine.state(step.name)
@@ -218,20 +218,18 @@ def _must_run_first(engine: Engine, item: str) -> bool:
         step.kind == "fit"
         and not item.endswith("?")
         and engine.shown(step.name)
-        and engine.state(step.name).state in ("missing", "stale")
+        and engine.state(step.name).state in WAITING
     )
 
 
-def _stored(engine: Engine, step: Step, force: bool) -> dict[str, Any]:
-    """Facts of the stored result; one that cannot be read counts as none where it is made again."""
+def _stored(engine: Engine, step: Step) -> dict[str, Any]:
+    """Facts of the stored result; one that cannot be read counts as none, and is made again."""
     if not engine.file(step.name).is_file():
         return {}
     try:
         return engine.facts(step.name)
     except InputError:
-        if force:
-            return {}
-        raise
+        return {}
 
 
 def _refuse_without_data(engine: Engine, capture: Step) -> None:

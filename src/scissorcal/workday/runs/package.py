@@ -107,6 +107,8 @@ def _fits(engine: Engine) -> dict[str, Any]:
 def _refuse_failed(engine: Engine) -> None:
     for item in BY_NAME["package build"].inputs:
         state = engine.state(item)
+        if state.state == "damaged":
+            raise InputError(f"No package was built: {state.found}.")
         if state.state == "failed":
             raise VerdictError(
                 f"No package was built: the {item.replace('fit', 'fit of')} failed "

@@ -88,8 +88,8 @@ def _refuse_stale(engine: Engine) -> None:
                 f"The {step.name.replace('fit', 'fit of')} is stale ({state.found}): run "
                 f"'{engine.leads_to(step.name)}' first."
             )
-        if state.state == "failed" and not state.content:
-            raise InputError(f"{state.found}: run '{state.command}' first.")
+        if state.state == "damaged":
+            raise InputError(f"{state.found}.")
 
 
 def _rig_fits(engine: Engine) -> "dict[str, FitResult]":
