@@ -4,8 +4,6 @@ import contextlib
 import errno
 import os
 import re
-import secrets
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,7 +27,7 @@ def replacing(path: Path) -> Iterator[Path]:
     'whole'
     """
     part = path.with_name(
-        f"{path.name[:_LONGEST_NAME]}.{_host()}.{os.getpid()}.{secrets.token_hex(4)}.part"
+        f"{path.name[:_LONGEST_NAME]}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
     )
     try:
         yield part
@@ -73,7 +71,7 @@ def is_running(pid: int) -> bool:
 
 
 def _host() -> str:
-    return re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:_LONGEST_NAME] or "unnamed"
+    return re.sub(r"[^A-Za-z0-9_-]", "-", os.uname().nodename)[:_LONGEST_NAME] or "unnamed"
 
 
 def _keep_name(folder: Path) -> None:

@@ -147,8 +147,8 @@ def test_damage_is_a_state_with_a_command(workspace: Workspace) -> None:
     steps = {step.name: step for step in make_plan(workspace).steps}
     assert steps["capture plate"].state == "failed"
     assert folder.name in steps["capture plate"].found
-    assert steps["fit blade"].state == "failed"
-    assert steps["fit blade"].command == "scissorcal fit blade --force"
+    assert steps["fit blade"].state == "damaged"
+    assert steps["fit blade"].command == "scissorcal fit blade"
 
 
 def test_a_scene_without_photographs_needs_none_of_their_steps(workspace: Workspace) -> None:

@@ -144,11 +144,13 @@ def sign(
       next: scissorcal package build
     """
     from scissorcal.workday.engine import Engine
+    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.sign import sign_report
 
     workspace = open_workspace(folder)
-    engine = Engine.of(workspace)
-    review = sign_report(engine, name, decision, note, key=key, passphrase=_passphrase)
+    with writing(workspace, "scissorcal report sign"):
+        engine = Engine.of(workspace)
+        review = sign_report(engine, name, decision, note, key=key, passphrase=_passphrase)
     path = workspace.signature_path
     text = (
         f"{workspace.relative(path)}: {review.words}\n"

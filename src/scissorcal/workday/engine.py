@@ -15,8 +15,9 @@ from scissorcal.errors import InputError
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.facts import UNFINISHED, photographs, refuse_changed, rendering
+from scissorcal.workday.facts import UNFINISHED, rendering
 from scissorcal.workday.index import FileIndex
+from scissorcal.workday.photograph_state import photograph_indexes, photographs_state
 from scissorcal.workday.recordings import (
     RecordingRow,
     counts_of,
@@ -27,7 +28,7 @@ from scissorcal.workday.recordings import (
     why_unused,
 )
 from scissorcal.workday.remedies import remedy
-from scissorcal.workday.states import CHANGED, WAITING, State, StepState
+from scissorcal.workday.states import CHANGED, WAITING, State, StepState, counted
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
 
@@ -152,7 +153,7 @@ class Engine:
             return StepState(step.name, "excluded", "the scene does not need it")
         find: Callable[[Step, str], StepState] = {
             "recordings": self._of_recordings,
-            "photographs": self._of_photographs,
+            "photographs": lambda step, why: photographs_state(self, step, why),
             "render": self._of_render,
         }.get(step.kind, self._of_result)
         unasked = (
@@ -169,10 +170,12 @@ class Engine:
         if step.on_request:
             return self.file(step.name).is_file() or self._is_there(BY_NAME[step.inputs[0]])
         if step.kind == "photographs":
-            return bool(self._photographs(step))
+            return bool(photograph_indexes(self.workspace, step))
         if step.kind != "fit" or BY_NAME[step.inputs[0]].kind != "photographs":
             return False
-        return self.file(step.name).is_file() or bool(self._photographs(BY_NAME[step.inputs[0]]))
+        return self.file(step.name).is_file() or bool(
+            photograph_indexes(self.workspace, BY_NAME[step.inputs[0]])
+        )
 
     def _of_recordings(self, step: Step, why: str) -> StepState:
         kind = _captured(step)
@@ -202,7 +205,7 @@ class Engine:
         notes = (*notes, *notes_of(self.workspace, self.recipe, used))
         content = digest(sorted(str(row.facts["content"]) for row in used))
         files = tuple(self.workspace.relative(row.path) for row in used)
-        found = f"{_count(len(used), 'recording')}, {sum(row.seconds for row in used):.0f} s"
+        found = f"{counted(len(used), 'recording')}, {sum(row.seconds for row in used):.0f} s"
         missing = self._completeness(kind, None).missing
         if missing:
             sentence = "; ".join(missing)
@@ -233,50 +236,6 @@ class Engine:
                 for row, count in zip(rows, counts, strict=True)
             ]
         return completeness(counts, self.recipe, kind, used)
-
-    def _of_photographs(self, step: Step, why: str) -> StepState:
-        paths = self._photographs(step)
-        try:
-            read = [self.index.facts(path, "photographs", photographs) for path in paths]
-            for path, facts in zip(paths, read, strict=True):
-                refuse_changed(path.parent, facts["sha256"], self.index.digest)
-        except InputError as error:
-            return StepState(step.name, "failed", str(error), why, step.command)
-        first = [path for path in paths if path.parent.name.startswith(f"{step.photographs[0]}-")]
-        if not first:
-            return self._without_photographs(step, why)
-        count = sum(int(facts["photographs"]) for facts in read)
-        return StepState(
-            step.name,
-            "done",
-            _count(count, "photograph"),
-            why,
-            files=tuple(self.workspace.relative(path.parent) for path in paths),
-            content=digest([facts["content"] for facts in read]),
-        )
-
-    def _photographs(self, step: Step) -> list[Path]:
-        """Index files of the folders of photographs that count for a step."""
-        paths: list[Path] = []
-        for kind in step.photographs:
-            own = sorted(self.workspace.captures_dir.glob(f"{kind}-*/capture.json"))
-            own = [path for path in own if not path.parent.name.endswith(".part")]
-            paths += own[-1:] if step.newest_only else own
-        return paths
-
-    def _without_photographs(self, step: Step, why: str) -> StepState:
-        """A camera may come from a file, which then takes the place of photographs."""
-        fit = f"fit {step.what}"
-        path = self.file(fit)
-        if step.what == "camera" and path.is_file():
-            try:
-                imported = self.facts(fit)["imported"]
-            except InputError:
-                imported = False
-            if imported:
-                files = (self.workspace.relative(path),)
-                return StepState(step.name, "done", "imported from a file", why, files=files)
-        return StepState(step.name, "missing", "no photographs yet", why, step.command)
 
     def _of_result(self, step: Step, why: str) -> StepState:
         """The state of a step that has one file as its result."""
@@ -396,7 +355,7 @@ class Engine:
             return made("stale", "of another package")
         if self.state("package build").state in WAITING:
             return made("stale", f"package build is {self.state('package build').state}")
-        return made("done", _count(len(recordings), "recording"), "")
+        return made("done", counted(len(recordings), "recording"), "")
 
 
 _AGAIN = {"fit": "fit again", "verify": "check again", "package": "build again"}
@@ -410,7 +369,3 @@ def _captured(step: Step) -> CaptureKind:
 
 def _plain(item: str) -> str:
     return item.rstrip("?")
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}{'' if number == 1 else 's'}"

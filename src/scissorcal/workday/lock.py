@@ -5,7 +5,6 @@ import errno
 import fcntl
 import json
 import os
-import socket
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -46,7 +45,7 @@ def writing(workspace: "Workspace", command: str) -> Iterator[None]:
             raise InputError(_refusal(workspace, file.read())) from None
         holder = {
             "command": command,
-            "host": socket.gethostname(),
+            "host": os.uname().nodename,
             "pid": os.getpid(),
             "start_s": time.time(),
         }

@@ -45,3 +45,12 @@ class StepState:
     content: str = ""
     failed: tuple[str, ...] = ()
     optional: bool = False
+
+
+def counted(number: int, thing: str) -> str:
+    """A number of things in words.
+
+    >>> counted(1, "photograph"), counted(2, "photograph")
+    ('1 photograph', '2 photographs')
+    """
+    return f"{number} {thing}{'' if number == 1 else 's'}"
