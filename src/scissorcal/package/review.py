@@ -1,6 +1,5 @@
 """The review: who signed a report, the decision, and every file that it covers."""
 
-import base64
 import hashlib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -35,6 +34,8 @@ class KeySignature(BaseModel):
     @property
     def fingerprint(self) -> str:
         """The public key's fingerprint, as 'ssh-keygen -l' prints it."""
+        import base64
+
         blob = base64.b64decode(self.public_key.split()[1])
         return "SHA256:" + base64.b64encode(hashlib.sha256(blob).digest()).decode().rstrip("=")
 
