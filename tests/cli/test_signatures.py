@@ -105,6 +105,8 @@ def test_a_forgery_voids_the_signature(day: Workspace, cli: Cli, forged: str) ->
     steps = steps_of(cli)
     assert steps["report sign"]["state"] in ("stale", "failed")
     assert named in steps["report sign"]["found"]
+    if "report/report." in named:
+        assert steps["report sign"]["command"] == "scissorcal report"
     built = cli("package", "build")
     if built.code == 0:
         assert open_package(day.package_path(day.recipe()), warn=False).manifest.review is None
@@ -207,3 +209,14 @@ def test_a_key_that_cannot_be_used_is_a_sentence(day: Workspace, cli: Cli, tmp_p
     assert (said.code, "not an Ed25519" in said.err) == (2, True)
     said = cli("package", "check", "--trusted-key", tmp_path / "rsa.pub")
     assert (said.code, "line 1 is not an Ed25519" in said.err) == (2, True)
+
+
+def test_results_tell_nothing_of_the_disk(day: Workspace, signed_day: Path) -> None:
+    """Packages and reports go to others: no folder of the workspace stands in them."""
+    folder = str(signed_day).encode()
+    with zipfile.ZipFile(day.package_path(day.recipe())) as archive:
+        assert not any(folder in archive.read(name) for name in archive.namelist())
+    assert folder not in day.report_html.read_bytes()
+    assert folder not in day.report_json.read_bytes()
+    manifest = open_package(day.package_path(day.recipe()), warn=False).manifest
+    assert all(one.startswith("captures/cut-") for one in manifest.provenance.cut.sources)

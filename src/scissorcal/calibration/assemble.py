@@ -1,6 +1,7 @@
 """Put a posterior and the compared candidates into the result that people read."""
 
 from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any, Literal
 
 import numpy as np
@@ -88,7 +89,7 @@ def assemble(
         effort_unit=joint.effort_unit,
         position_unit=joint.position_unit,
         inputs_hash="",
-        sources=tuple(f"{r.source} sha256:{r.content_hash}" for r in recordings),
+        sources=tuple(f"{_name(r.source)} sha256:{r.content_hash}" for r in recordings),
         used=usage.spans,
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
         selection=comparison_text(compared, chosen, bins, contact, joint),
@@ -104,6 +105,12 @@ def assemble(
         predictive=predictive_of(compared, chosen, predictions, thin, effort, rng.spawn(1)[0]),
         **tables,
     )
+
+
+def _name(source: str) -> str:
+    """A recording's file as it is named in the results: without the folders of somebody's disk."""
+    path = PurePath(source)
+    return path.name if path.is_absolute() else source
 
 
 def _parameters(

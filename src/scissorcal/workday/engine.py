@@ -261,7 +261,10 @@ class Engine:
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
         if behind:
-            return made("stale", behind, **kept)
+            # a page or twin that was changed is written anew before it is read and signed
+            rewritten = step.kind == "sign" and "report/report." in behind
+            again = "scissorcal report" if rewritten else step.command
+            return made("stale", behind, again, **kept)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -93,6 +93,7 @@ def used_recordings(
 ) -> "tuple[Recording, ...]":
     """Read the recordings of one kind that fits use, oldest first.
 
+    Their ``source`` is their name in the workspace, so that results tell nothing of this disk.
     Raises InputError where a file cannot be read or rotary and linear joints are mixed.
     """
     rows = list_recordings(workspace, recipe, kind, index or FileIndex(workspace.root))
@@ -100,7 +101,13 @@ def used_recordings(
         if row.use == "unreadable":
             raise InputError(f"{row.why} {exclude_hint(row.path)}")
     used = [row.path for row in rows if row.use == "used"]
-    found = tuple(_read(path, path.stat().st_mtime_ns, path.stat().st_size) for path in used)
+    found = tuple(
+        replace(
+            _read(path, path.stat().st_mtime_ns, path.stat().st_size),
+            source=workspace.relative(path),
+        )
+        for path in used
+    )
     refuse_mixed_joints(rows)
     return found
 
