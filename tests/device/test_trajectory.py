@@ -11,7 +11,6 @@ from scissorcal.device.crossing import Blade
 from scissorcal.device.cut_trajectory import cut_plan, hand_requests
 from scissorcal.device.paths import PathBuilder, SwingLimits, glide, multisine
 from scissorcal.device.trajectory import (
-    TURN_ACCELERATION,
     Plan,
     approach,
     check_reference,
@@ -20,6 +19,7 @@ from scissorcal.device.trajectory import (
 )
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.pace import TURN_ACCELERATION
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 

@@ -90,6 +90,14 @@ MaxMinutes = Annotated[
 ]
 
 
+YesLong = Annotated[
+    bool,
+    typer.Option(
+        "--yes-long", help="A capture of more than 4 hours is meant; at most 24 are possible."
+    ),
+]
+
+
 @command
 def friction(
     device: Device,
@@ -100,6 +108,7 @@ def friction(
     max_minutes: MaxMinutes = None,
     realtime: Realtime = False,
     yes: Yes = False,
+    yes_long: YesLong = False,
     seed: Seed = 0,
     baud: Baud = None,
     folder: Folder = None,
@@ -129,9 +138,11 @@ def friction(
                 "The sledge's capture takes the speeds that capture.friction_advance lists: leave "
                 "out --designed, --as-in-recipe, --until-tolerance and its options."
             )
-        return _capture("friction-advance", rig, _How(False, None, None), yes=yes, folder=folder)
+        return _capture(
+            "friction-advance", rig, _How(False, None, None), yes=yes, long=yes_long, folder=folder
+        )
     how = _How(False, designed, _until(until_tolerance, at_least, max_minutes, designed))
-    return _capture("friction", rig, how, yes=yes, folder=folder)
+    return _capture("friction", rig, how, yes=yes, long=yes_long, folder=folder)
 
 
 @command
@@ -146,6 +157,7 @@ def cut(
     max_minutes: MaxMinutes = None,
     realtime: Realtime = False,
     yes: Yes = False,
+    yes_long: YesLong = False,
     seed: Seed = 0,
     baud: Baud = None,
     folder: Folder = None,
@@ -169,7 +181,7 @@ def cut(
     """
     rig = _Rig(device, seed, realtime, baud)
     how = _How(hand, designed, _until(until_tolerance, at_least, max_minutes, designed))
-    return _capture("cut", rig, how, yes=yes, folder=folder)
+    return _capture("cut", rig, how, yes=yes, long=yes_long, folder=folder)
 
 
 @dataclass(frozen=True)
@@ -214,6 +226,7 @@ def _capture(
     how: _How,
     *,
     yes: bool,
+    long: bool,
     folder: Path | None,
 ) -> Answer:
     from scissorcal.cli.live_view import LiveView
@@ -230,6 +243,7 @@ def _capture(
                     seed=rig.seed,
                     baud=rig.baud,
                     realtime=rig.realtime,
+                    long=long,
                     progress=view.show,
                     confirm=view.confirm,
                     say=note,
@@ -245,6 +259,7 @@ def _capture(
                     seed=rig.seed,
                     baud=rig.baud,
                     realtime=rig.realtime,
+                    long=long,
                     progress=view.show,
                     confirm=view.confirm,
                     say=note,

@@ -58,6 +58,7 @@ def plan(explain: Explain = False, folder: Folder = None) -> Answer:
         "scene_choice": found.choice.model_dump() if found.choice else None,
         "notes": found.notes,
         "probe": found.probe,
+        "costs": found.costs,
         "next_command": found.next_command,
         "design": design or found.design,
     }
@@ -79,6 +80,7 @@ def _text(found: "Plan", design: "CaptureDesign | None") -> str:
         lines.append("tables to build: " + ", ".join(item.name for item in found.tables))
     lines += [f"left out: {item.name}, as {item.why}" for item in found.left_out]
     lines += found.choice.sentences if found.choice else ()
+    lines += [f"capture {cost.kind} takes {cost.sentence}" for cost in found.costs]
     lines += [f"note: {note}" for note in found.notes]
     if design:
         lines += ["", *_explained(design)]

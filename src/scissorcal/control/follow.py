@@ -33,10 +33,10 @@ from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
-from scissorcal.device.trajectory import APPROACH_SPEED, TURN_ACCELERATION
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface
+from scissorcal.recipe.pace import APPROACH_SPEED, TURN_ACCELERATION
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import RecordingWriter
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult

@@ -1,19 +1,10 @@
 """The plan of a capture of the sledge's friction: sweeps and an excitation of the advance."""
 
 from scissorcal.device.paths import PathBuilder, SwingLimits, multisine
-from scissorcal.device.trajectory import (
-    ADVANCE_ACCELERATION,
-    ADVANCE_SPEED,
-    DWELL_S,
-    SETTLE_S,
-    Plan,
-    Segment,
-    StrokeList,
-    opening_range,
-    refuse_linear,
-)
+from scissorcal.device.trajectory import Plan, Segment, StrokeList, opening_range, refuse_linear
 from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, Identity
+from scissorcal.recipe.pace import ADVANCE_ACCELERATION, ADVANCE_SPEED, DWELL_S, SETTLE_S
 from scissorcal.recipe.schema import Recipe
 
 ADVANCE_MARGIN_M = 5e-3

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from scissorcal.device.advance_trajectory import largest_acceleration, sliding_speeds
 from scissorcal.device.control import Axis, Gains, Margins, PHASE_MARGIN_deg, loop_margins
 from scissorcal.device.control_design import Demand, Design, design_gains
-from scissorcal.device.trajectory import (
-    ADVANCE_ACCELERATION,
-    ADVANCE_SPEED,
-    APPROACH_SPEED,
-    SWING_ACCELERATION,
-    TURN_ACCELERATION,
-)
+from scissorcal.device.trajectory import SWING_ACCELERATION
 from scissorcal.device.watching import STILL_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
+from scissorcal.recipe.pace import (
+    ADVANCE_ACCELERATION,
+    ADVANCE_SPEED,
+    APPROACH_SPEED,
+    TURN_ACCELERATION,
+)
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Kind
 from scissorcal.recording.probe import ProbeResult

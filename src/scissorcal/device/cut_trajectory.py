@@ -7,24 +7,18 @@ import numpy as np
 
 from scissorcal.device.crossing import TIP_SHARE, Blade
 from scissorcal.device.paths import PathBuilder
-from scissorcal.device.trajectory import (
+from scissorcal.device.trajectory import Plan, Segment, StrokeList, opening_range, refuse_linear
+from scissorcal.errors import DeviceError, InputError
+from scissorcal.kernel import Capability, Identity
+from scissorcal.recipe.pace import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
     DWELL_S,
+    OPENING_SPEED,
     SETTLE_S,
     TURN_ACCELERATION,
-    Plan,
-    Segment,
-    StrokeList,
-    opening_range,
-    refuse_linear,
 )
-from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.schema import Recipe
-
-OPENING_SPEED = 1.0
-"""Speed at which the blades open again, rad/s; at most the scene's."""
 
 FIRST_LEAD_M = 1e-3
 LEAD_M = 4e-3

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.errors import InputError
+from scissorcal.recipe.capture_cost import MOST_MIN
+from scissorcal.recipe.pace import glide_speed, glide_time, ramp_time
 
-LEAST_RAMP_S = 0.03
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,11 @@ class PathBuilder:
         self.advance = advance
         self._tick_s = tick_s
         self._parts: list[Reference] = []
+        self._seconds = 0.0
 
     def open_to(self, opening: float, speed: float, acceleration: float, stroke: int = -1) -> None:
         """Turn the blades to ``opening`` at a cruising ``speed`` (rad/s), ramps included."""
+        self._refuse_endless(glide_time(abs(opening - self.opening), speed, acceleration))
         way, rate = glide(opening - self.opening, speed, acceleration, self._tick_s)
         self._append(self.opening + way, rate, np.full(len(way), self.advance), stroke)
         self.opening = opening
@@ -69,6 +73,7 @@ class PathBuilder:
         self, advance: float, speed: float, acceleration: float, stroke: int = -1
     ) -> None:
         """Move the pivot to ``advance`` at a cruising ``speed`` (m/s), the blades at rest."""
+        self._refuse_endless(glide_time(abs(advance - self.advance), speed, acceleration))
         way, _ = glide(advance - self.advance, speed, acceleration, self._tick_s)
         self.slide(way, stroke)
         self.advance = advance
@@ -94,6 +99,16 @@ class PathBuilder:
             self.rest(self._tick_s)
         return Reference.joined(self._parts)
 
+    def _refuse_endless(self, seconds: float) -> None:
+        """Raise InputError where the path becomes too long to be held in memory."""
+        self._seconds += seconds
+        if self._seconds > 60.0 * MOST_MIN:
+            raise InputError(
+                f"The planned motion takes {self._seconds / 3600.0:,.3g} hours and more, beyond "
+                f"the {MOST_MIN / 60.0:g} that a capture may take: correct the speeds and numbers "
+                "in the recipe's [capture] sections."
+            )
+
     def _append(self, opening: Array, rate: Array, advance: Array, stroke: int) -> None:
         labels = np.full(len(opening), stroke, dtype=np.int32)
         self._parts.append(Reference(opening, rate, advance, labels))
@@ -109,9 +124,9 @@ def glide(distance: float, speed: float, acceleration: float, tick_s: float) -> 
     length = abs(distance)
     if length == 0.0:
         return np.zeros(0), np.zeros(0)
-    speed = min(speed, length / LEAST_RAMP_S, np.sqrt(2.0 * acceleration * length / np.pi))
+    total = glide_time(length, speed, acceleration)
+    speed = glide_speed(length, speed, acceleration)
     ramp = ramp_time(speed, acceleration)
-    total = ramp + length / speed
     time = np.minimum(np.arange(1, int(np.ceil(total / tick_s - 1e-9)) + 1) * tick_s, total)
     rising, falling = time < ramp, time > total - ramp
     way = speed * (time - 0.5 * ramp)
@@ -122,16 +137,6 @@ def glide(distance: float, speed: float, acceleration: float, tick_s: float) -> 
     rate[falling] = 0.5 * speed * (1.0 - np.cos(np.pi * (total - time[falling]) / ramp))
     way[-1], rate[-1] = length, 0.0
     return np.sign(distance) * way, np.sign(distance) * rate
-
-
-def ramp_time(speed: float, acceleration: float) -> float:
-    """Seconds of one ramp from rest to ``speed`` with a peak of ``acceleration``."""
-    return float(max(LEAST_RAMP_S, np.pi * speed / (2.0 * acceleration)))
-
-
-def ramp_way(speed: float, acceleration: float) -> float:
-    """Displacement of one ramp from rest to ``speed``."""
-    return 0.5 * speed * ramp_time(speed, acceleration)
 
 
 @dataclass(frozen=True)

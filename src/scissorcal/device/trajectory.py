@@ -9,9 +9,18 @@ from typing import Literal
 
 import numpy as np
 
-from scissorcal.device.paths import PathBuilder, Reference, SwingLimits, multisine, ramp_way
+from scissorcal.device.paths import PathBuilder, Reference, SwingLimits, multisine
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
+from scissorcal.recipe.pace import (
+    ADVANCE_ACCELERATION,
+    ADVANCE_SPEED,
+    APPROACH_SPEED,
+    DWELL_S,
+    SETTLE_S,
+    TURN_ACCELERATION,
+    ramp_way,
+)
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Stroke, StrokeKind
 
@@ -19,15 +28,6 @@ Load = Literal["nothing", "sheet"]
 
 OPENING_MARGIN_RAD = np.radians(1.0)
 LEAST_RANGE_RAD = np.radians(3.0)
-
-TURN_ACCELERATION = 20.0
-"""Peak acceleration of a stroke's ramps, rad/s^2."""
-
-APPROACH_SPEED = 0.3
-ADVANCE_SPEED = 0.08
-ADVANCE_ACCELERATION = 0.8
-DWELL_S = 0.1
-SETTLE_S = 0.3
 
 SWING_BAND_HZ = (1.0, 15.0)
 SWING_ACCELERATION = 80.0

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from scissorcal.recipe.capture_cost import CaptureCost, CaptureKind, capture_cost
 from scissorcal.recipe.requirements import Requirement, requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.probe import probe_state
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
 class Plan:
     """All steps in the order of the day, and what the scene does without.
 
-    ``probe`` is what is known of the rig's probe. ``choice`` says what of the fitted laws the scene
-    needs; None until the fits are there and a report or a package was made of them. ``design`` is
-    the list of captures that was designed last, if it is for what there is now.
+    ``probe`` is what is known of the rig's probe, ``costs`` what each capture of the rig takes that
+    is still to be made. ``choice`` says what of the fitted laws the scene needs; None until the
+    fits are there and a report or a package was made of them. ``design`` is the list of captures
+    that was designed last, if it is for what there is now.
     """
 
     recipe: str
@@ -28,6 +30,7 @@ class Plan:
     tables: tuple[Requirement, ...]
     left_out: tuple[Requirement, ...]
     probe: str
+    costs: tuple[CaptureCost, ...] = ()
     choice: "SceneChoice | None" = None
     design: "CaptureDesign | None" = None
 
@@ -63,8 +66,19 @@ def make_plan(workspace: Workspace) -> Plan:
         needs.tables,
         needs.left_out,
         probe_state(workspace, engine.recipe),
+        _costs(engine),
         _choice(engine),
         _design(engine),
+    )
+
+
+def _costs(engine: Engine) -> tuple[CaptureCost, ...]:
+    kinds: tuple[CaptureKind, ...] = ("friction", "friction-advance", "cut")
+    open_states = ("missing", "stale", "incomplete")
+    return tuple(
+        capture_cost(engine.recipe, kind)
+        for kind in kinds
+        if engine.shown(f"capture {kind}") and engine.state(f"capture {kind}").state in open_states
     )
 
 

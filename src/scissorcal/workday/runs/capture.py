@@ -1,11 +1,13 @@
 """Take a capture into a workspace: rig, recording, and what is kept when something goes wrong."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.capture_cost import CaptureKind, capture_cost, refuse_long
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.requirements import DesignedKind, requirements
 from scissorcal.recipe.show import with_designed_captures
@@ -74,6 +76,7 @@ def capture_into(
     seed: int = 0,
     baud: int | None = None,
     realtime: bool = False,
+    long: bool = False,
     progress: "CaptureProgress | None" = None,
     confirm: "Confirm | None" = None,
     say: "Say | None" = None,
@@ -91,7 +94,8 @@ def capture_into(
     capture needs none. Whatever was recorded
     before an error stays in the file.
 
-    Raises InputError where the scene needs no such capture, MissingError where one until the
+    Raises InputError where the scene needs no such capture or it would take longer than 4 hours (24
+    where ``long`` says that this is meant), MissingError where one until the
     tolerance lacks a fit that it builds on, and what the capture itself raises.
     """
     from scissorcal.device.capture import capture_cut, capture_friction, open_writer
@@ -106,6 +110,8 @@ def capture_into(
             "Leave out --hand."
         )
     earlier = _earlier(Engine.of(workspace), kind) if until is not None else None
+    if not hand:
+        _refuse_long(workspace, recipe, kind, long)
     text = read_text(workspace.recipe_path)
     design = not hand and (recipe.capture.designed(kind) if designed is None else designed)
     line = line_of(recipe, baud)
@@ -157,6 +163,7 @@ def capture_advance_into(
     seed: int = 0,
     baud: int | None = None,
     realtime: bool = False,
+    long: bool = False,
     progress: "CaptureProgress | None" = None,
     confirm: "Confirm | None" = None,
     say: "Say | None" = None,
@@ -170,6 +177,7 @@ def capture_advance_into(
     from scissorcal.device.capture import capture_friction_advance, open_writer
 
     recipe = workspace.recipe()
+    _refuse_long(workspace, recipe, ADVANCE, long)
     text = read_text(workspace.recipe_path)
     line = line_of(recipe, baud)
     run = len(workspace.recordings(ADVANCE))
@@ -193,6 +201,11 @@ def capture_advance_into(
                 cleared=once is not None and once.asked,
             )
     return Captured(path, report, f"{link.identity.name} {link.identity.serial}")
+
+
+def _refuse_long(workspace: Workspace, recipe: "Recipe", kind: CaptureKind, meant: bool) -> None:
+    """Raise InputError before anything moves where a capture costs more than anybody means."""
+    refuse_long(capture_cost(recipe, kind), shutil.disk_usage(workspace.root).free, meant=meant)
 
 
 def _capture_until(
