@@ -52,7 +52,8 @@ Cluster = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786.",
+        help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786; it can "
+        "run programs as you (docs/cluster.md).",
     ),
 ]
 

@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
 from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.workday.answers import answering, read_answer
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -26,33 +27,44 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor, how many jobs it does at a time, and how many it is handed at once."""
+    """An executor, how many jobs it does at a time, and how many it is handed at once.
+
+    Where it is ``remote``, jobs answer in JSON text (`workday.answers`).
+    """
 
     executor: Executor
     workers: int
     ahead: int = AHEAD
+    remote: bool = False
 
     def work(
-        self, job: Callable[[T], R], items: Iterable[T], finished: Callable[[R], None]
+        self,
+        job: Callable[[T], R],
+        items: Iterable[T],
+        finished: Callable[[R], None],
+        kind: Any,
     ) -> None:
         """Do ``job`` for every item and call ``finished`` here with each result, as they come.
 
+        ``kind`` is the type of a result, to which a cluster's answers are held.
         Raises what a job raised, and ScissorcalError where a worker died.
         """
         todo = iter(items)
-        running: set[Future[R]] = set()
+        running: set[Future[Any]] = set()
+        asked: Callable[[T], Any] = answering(job) if self.remote else job
         try:
             while True:
                 while len(running) < self.workers * self.ahead:
                     item = next(todo, _END)
                     if item is _END:
                         break
-                    running.add(self.executor.submit(job, item))  # type: ignore[arg-type]
+                    running.add(self.executor.submit(asked, item))  # type: ignore[arg-type]
                 if not running:
                     return
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
-                    finished(future.result())
+                    found = future.result()
+                    finished(read_answer(found, kind) if self.remote else found)
         except BrokenProcessPool as error:
             raise ScissorcalError(
                 "A worker process was killed, most likely for want of memory. What was done is "
@@ -119,6 +131,11 @@ def _cluster(address: str) -> Iterator[Pool]:
             "--cluster needs dask.distributed, which is not installed: pip install "
             "'scissorcal[cluster]'."
         ) from error
+    if address.startswith("tls:") and not distributed.Security().tls_ca_file:
+        raise InputError(
+            f"{address} asks for TLS, and dask knows no certificates: name them in its "
+            "configuration, as docs/cluster.md shows."
+        )
     try:
         client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
@@ -135,7 +152,7 @@ def _cluster(address: str) -> Iterator[Pool]:
                 "--nthreads 1', where scissorcal is installed."
             )
         with client.get_executor(pure=False) as executor:
-            yield Pool(executor, threads)
+            yield Pool(executor, threads, remote=True)
     finally:
         client.close()
 

@@ -235,7 +235,7 @@ class MadePool:
     job_s: float
     ahead: int = 2
 
-    def work(self, job, items, finished):
+    def work(self, job, items, finished, kind):
         todo, free, ends = iter(items), [0.0] * self.workers, []
         while True:
             while len(ends) < self.workers * self.ahead and next(todo, None):

@@ -213,6 +213,11 @@ def test_an_unreachable_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
         open_pool(cluster="nonsense://1"),
     ):
         pass
+    with (
+        pytest.raises(InputError, match=r"tls://127.0.0.1:1 asks for TLS, and dask knows no"),
+        open_pool(cluster="tls://127.0.0.1:1"),
+    ):
+        pass
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     with (
         pytest.raises(InputError, match=r"pip install 'scissorcal\[cluster\]'"),
@@ -293,12 +298,12 @@ def test_what_a_worker_raises_comes_through_and_a_dead_one_is_told() -> None:
 
     with open_pool(2) as pool:
         found: list[int] = []
-        pool.work(abs, [-3, 2, -1, 0, 5, -6], found.append)
+        pool.work(abs, [-3, 2, -1, 0, 5, -6], found.append, int)
         assert sorted(found) == [0, 1, 2, 3, 5, 6]
         with pytest.raises(ZeroDivisionError):
-            pool.work(_divide, [1, 0, 2], found.append)
+            pool.work(_divide, [1, 0, 2], found.append, float)
     with pytest.raises(ScissorcalError, match="fewer --workers"), open_pool(2) as pool:
-        pool.work(os._exit, [1], found.append)  # type: ignore[arg-type]
+        pool.work(os._exit, [1], found.append, int)  # type: ignore[arg-type]
 
 
 def _divide(by: int) -> float:

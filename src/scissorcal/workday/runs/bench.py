@@ -362,7 +362,7 @@ class _Run:
 
         handed = pool if self._deadline is None else replace(pool, ahead=1)
         try:
-            handed.work(_do, jobs, keep)
+            handed.work(_do, jobs, keep, dict[str, Any] | None)
         except ModuleNotFoundError as error:
             raise InputError(
                 f"The cluster's workers lack {error.name}: install this version of scissorcal "

@@ -10,7 +10,7 @@ from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
     from scissorcal.bench.control.result import ControlBench
-    from scissorcal.bench.control.study import Done, Extent
+    from scissorcal.bench.control.study import Extent
 
 Progress = Callable[[float, str], None]
 
@@ -38,7 +38,7 @@ def run_bench_control(
     The same extent and seed draw the same worlds. Needs no workspace.
     """
     from scissorcal.bench.control.result import control_text, summarise
-    from scissorcal.bench.control.study import do, jobs
+    from scissorcal.bench.control.study import Done, do, jobs
     from scissorcal.report.bench_control import control_page
     from scissorcal.workday.runs.bench_files import run_facts, write_page_and_twin
 
@@ -47,12 +47,12 @@ def run_bench_control(
     every = list(jobs(extent, seed))
     done: list[Done] = []
 
-    def keep(one: "Done") -> None:
+    def keep(one: Done) -> None:
         done.append(one)
         tell(len(done) / len(every), f"{len(done)} of {len(every)} jobs")
 
     with open_pool(workers, cluster) as pool:
-        pool.work(do, every, keep)
+        pool.work(do, every, keep, Done)
         count = pool.workers
     result = summarise(run_facts(began, workers=count, seed=seed, planned=len(every)), done)
     twin = control_text(result)

@@ -62,7 +62,7 @@ def run_extremes(
     with open_pool(workers, cluster) as pool:
         # within a budget no worker is handed a second job: each begins when it is handed out
         handed = pool if deadline is None else replace(pool, ahead=1)
-        handed.work(do, _in_time(every, done, deadline), keep)
+        handed.work(do, _in_time(every, done, deadline), keep, Done)
         count = pool.workers
     run = run_facts(began, workers=count, seed=seed, planned=planned, budget_s=budget_s)
     result = summarise(run, done, all_cells())

@@ -193,7 +193,7 @@ def _run(
         )
 
     try:
-        pool.work(_do, [(blob, task) for task in left], keep)
+        pool.work(_do, [(blob, task) for task in left], keep, dict[str, Any])
     except ModuleNotFoundError as error:
         raise InputError(
             f"The cluster's workers lack {error.name}: install this version of scissorcal where "
