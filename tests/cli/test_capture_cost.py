@@ -91,7 +91,9 @@ def test_a_capture_that_nobody_means_is_refused_before_anything_moves(
     assert "capture.friction" in said.err
     assert named in said.err
     assert not list((workspace / "captures").glob("*.mcap*"))
-    slow = parse_recipe(text.replace("rad_per_s = [0.05", "rad_per_s = [1e-6", 1), "recipe.toml")
+    slow = parse_recipe(
+        text.replace("\nspeeds_rad_per_s = [0.05", "\nspeeds_rad_per_s = [1e-6", 1), "recipe.toml"
+    )
     with pytest.raises(InputError, match="correct the speeds"):
         planned(slow, "friction")
 
