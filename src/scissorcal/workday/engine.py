@@ -261,10 +261,7 @@ class Engine:
         imported = facts.get("imported") and not self.state(step.inputs[0]).content
         behind = "" if imported else self._behind(step, facts)
         if behind:
-            # a page or twin that was changed is written anew before it is read and signed
-            rewritten = step.kind == "sign" and "report/report." in behind
-            again = "scissorcal report" if rewritten else step.command
-            return made("stale", behind, again, **kept)
+            return made("stale", behind, **kept)
         if str(facts["inputs"]).startswith(UNFINISHED):
             longer = f"{step.command} --max-minutes 60"
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
@@ -336,7 +333,10 @@ class Engine:
         if not changed:
             return ""
         more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
-        return f"{', '.join(changed[:3])}{more} since it was signed"
+        found = f"{', '.join(changed[:3])}{more} since it was signed"
+        if any(one.startswith("report/") for one in changed):
+            found += "; 'scissorcal report' writes it anew"
+        return found
 
     def _of_render(self, step: Step, why: str) -> StepState:
         """A rendering is done where the newest one is of the package that is there."""
