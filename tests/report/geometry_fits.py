@@ -55,7 +55,7 @@ def camera_fit() -> CameraFit:
         pixel_map=PixelMap(x, y, 0.02 + off**2, inside, np.where(off < 1.0, off, np.nan)),
         cross=CrossValidation(0.2, 0.17, 0.31),
         verdicts=(
-            Verdict("fit.camera", "corners", "fail", 190, 200, "190 corners; 200 are wanted."),
+            Verdict("fit.camera", "corners", "fail", 190.0, 200.0, "190 corners; 200 are wanted."),
         ),
         inputs_hash="c0ffee",
         sources=("board-1.jpg", "board-2.jpg", "board-3.jpg"),
