@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -101,10 +102,15 @@ def test_a_place_that_cannot_be_written_is_named_and_old_files_stay(tmp_path: Pa
     assert taken.read_text() == "a file of mine"
 
 
-def test_a_failure_half_way_leaves_the_old_report_whole(tmp_path: Path) -> None:
+def test_a_failure_half_way_leaves_the_old_report_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     old = tmp_path / "report.html"
     old.write_text("the old page")
-    (tmp_path / f"report.json.{os.getpid()}.part").mkdir()
+    monkeypatch.setattr("scissorcal.files.os.urandom", bytes)
+    host = re.sub(r"[^A-Za-z0-9_-]", "-", os.uname().nodename)[:40]
+    in_the_way = tmp_path / f"report.json.{host}.{os.getpid()}.00000000.part"
+    in_the_way.mkdir()
     with pytest.raises(InputError):
         build_report(paper(), [linear_fit()], [], tmp_path, created=CREATED)
     assert old.read_text() == "the old page"
