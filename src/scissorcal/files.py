@@ -4,6 +4,7 @@ import contextlib
 import errno
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,9 +27,7 @@ def replacing(path: Path) -> Iterator[Path]:
     >>> Path("a.txt").read_text()
     'whole'
     """
-    part = path.with_name(
-        f"{path.name[:_LONGEST_NAME]}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
-    )
+    part = part_of(path)
     try:
         yield part
         with part.open("rb") as file:
@@ -43,19 +42,71 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
 
 
-def remove_left_over(folder: Path) -> tuple[Path, ...]:
-    """Remove the parts in ``folder`` whose writer was killed; returns which.
+def part_of(path: Path) -> Path:
+    """A name beside ``path`` that no other process and no other call uses, to write to first."""
+    return path.with_name(
+        f"{path.name[:_LONGEST_NAME]}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
+    )
 
-    Only parts of this computer are judged, as the processes of another cannot be seen from here. A
-    folder that cannot be written keeps them.
+
+def rename_folder(part: Path, folder: Path) -> None:
+    """Give a folder its final name once all files in it are on the disk."""
+    for path in part.rglob("*"):
+        if path.is_file():
+            with path.open("rb") as file:
+                os.fsync(file.fileno())
+    part.rename(folder)
+    _keep_name(folder.parent)
+
+
+def put_beside(source: Path, target: Path) -> None:
+    """Have the file ``source`` under the name ``target`` too, in place of what was there.
+
+    Neither name is ever without a whole file. No bytes are copied where the file system has hard
+    links; both names are then one file, so that it is replaced and never written to.
     """
+    if target.exists() and target.samefile(source):
+        return
+    part = part_of(target)
+    try:
+        try:
+            os.link(source, part)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES):
+                raise
+            shutil.copy2(source, part)
+        part.replace(target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise
+    _keep_name(target.parent)
+
+
+def left_over(folder: Path) -> tuple[Path, ...]:
+    """Parts in ``folder``, files and folders, whose writer was killed.
+
+    Only parts of this computer are judged, as the processes of another cannot be seen from here.
+    """
+    return tuple(
+        part
+        for part in sorted(folder.glob("*.part"))
+        if (found := _PART.search(part.name))
+        and found["host"] == _host()
+        and not is_running(int(found["pid"]))
+    )
+
+
+def remove_left_over(folder: Path) -> tuple[Path, ...]:
+    """Remove what :func:`left_over` finds; returns which. A read-only folder keeps them."""
     removed = []
-    for part in sorted(folder.glob("*.part")):
-        found = _PART.search(part.name)
-        if found and found["host"] == _host() and not is_running(int(found["pid"])):
-            with contextlib.suppress(OSError):
+    for part in left_over(folder):
+        with contextlib.suppress(OSError):
+            if part.is_dir():
+                shutil.rmtree(part)
+            else:
                 part.unlink()
-                removed.append(part)
+            removed.append(part)
     return tuple(removed)
 
 

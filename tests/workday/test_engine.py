@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from scissorcal.calibration import store
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.device.capture import capture_friction, open_writer
@@ -133,12 +132,11 @@ def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(
 ) -> None:
     before = copied.fit_path("friction").read_bytes()
 
-    def full(result: object, path: Path) -> None:
-        path.write_bytes(b"half")
+    def full(part: Path, content: bytes) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(store, "save", full)
-    with pytest.raises(OSError, match="No space"):
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match="The disk is full"):
         fit_workspace(copied, ("friction",), seed=7, force=True)
     assert copied.fit_path("friction").read_bytes() == before
     assert state(copied, "fit friction") == "unverified"

@@ -11,11 +11,11 @@ from scissorcal.calibration.store import load, save
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.photographs import INDEX_FILE, PhotoIndex
+from scissorcal.workday.photographs import PhotoIndex
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.sign import sign_report, standing_review
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday.workspace import PHOTOGRAPH_INDEX, Workspace
 from tests.report.geometry_fits import blade_result, imported_camera, plate_fit
 from tests.workday.made import RECIPE, quick_workspace
 
@@ -28,7 +28,7 @@ def photographs(workspace: Workspace, kind: str) -> Path:
     folder = workspace.captures_dir / f"{kind}-20260101T000000Z"
     folder.mkdir(parents=True)
     index = PhotoIndex(kind=kind, photographs=())  # type: ignore[arg-type]
-    (folder / INDEX_FILE).write_text(index.model_dump_json(), encoding="utf-8")
+    (folder / PHOTOGRAPH_INDEX).write_text(index.model_dump_json(), encoding="utf-8")
     return folder
 
 
@@ -142,7 +142,7 @@ def test_an_imported_camera_gives_way_to_photographs_of_a_board(workspace: Works
 
 def test_damage_is_a_state_with_a_command(workspace: Workspace) -> None:
     folder = photographs(workspace, "rig")
-    (folder / INDEX_FILE).write_text("{", encoding="utf-8")
+    (folder / PHOTOGRAPH_INDEX).write_text("{", encoding="utf-8")
     Engine.of(workspace).file("fit blade").write_text("{", encoding="utf-8")
     steps = {step.name: step for step in make_plan(workspace).steps}
     assert steps["capture plate"].state == "failed"
@@ -168,7 +168,7 @@ def test_a_photograph_that_is_no_longer_what_was_captured_fails_its_capture(
     picture = folder / "001-blade.jpg"
     picture.write_bytes(b"as it was captured")
     listed = {"photographs": [{"file": picture.name, "sha256": file_digest(picture)}]}
-    (folder / INDEX_FILE).write_text(json.dumps(listed), encoding="utf-8")
+    (folder / PHOTOGRAPH_INDEX).write_text(json.dumps(listed), encoding="utf-8")
     assert Engine.of(workspace).state("capture blade").state == "done"
     if change == "gone":
         picture.unlink()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from scissorcal.cli.lazy import group
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import Axis, Folder, Seed, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
@@ -67,6 +67,14 @@ MaxMinutes = Annotated[
         help="Time after which each fit stops with the result it has; it is then unfinished.",
     ),
 ]
+SaveTo = Annotated[
+    Path | None,
+    typer.Option(
+        file_okay=False,
+        help="Where a fit is kept if the workspace cannot be written; a folder for temporary files "
+        "if not given. 'scissorcal fit restore FILE' puts it in place.",
+    ),
+]
 
 
 @group(_COMMANDS, runs_alone=True)
@@ -76,6 +84,7 @@ def fit(
     force: Force = False,
     max_minutes: MaxMinutes = 10.0,
     seed: Seed = 0,
+    save_to: SaveTo = None,
     folder: Folder = None,
 ) -> Answer:
     """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
@@ -96,7 +105,7 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
-    return _run((), folder, effort, force, max_minutes, seed)
+    return _run((), folder, effort, force, max_minutes, seed, save_to)
 
 
 def _command_of(*wanted: str) -> Callable[..., None]:
@@ -107,9 +116,10 @@ def _command_of(*wanted: str) -> Callable[..., None]:
         force: Force = False,
         max_minutes: MaxMinutes = 10.0,
         seed: Seed = 0,
+        save_to: SaveTo = None,
         folder: Folder = None,
     ) -> Answer:
-        return _run(wanted, folder, effort, force, max_minutes, seed)
+        return _run(wanted, folder, effort, force, max_minutes, seed, save_to)
 
     what = wanted[0] if wanted else "all"
     fit_one.__doc__ = f"""{_COMMANDS[what][1]} See 'scissorcal fit --help'.
@@ -130,6 +140,7 @@ def friction(
     force: Force = False,
     max_minutes: MaxMinutes = 10.0,
     seed: Seed = 0,
+    save_to: SaveTo = None,
     folder: Folder = None,
 ) -> Answer:
     """Friction, to recordings of empty motion. See 'scissorcal fit --help'.
@@ -147,7 +158,7 @@ def friction(
       ...
     """
     what = "friction" if axis == "opening" else "friction-advance"
-    return _run((what,), folder, effort, force, max_minutes, seed)
+    return _run((what,), folder, effort, force, max_minutes, seed, save_to)
 
 
 camera = _command_of("camera")
@@ -164,15 +175,14 @@ def _run(
     force: bool,
     max_minutes: float,
     seed: int,
+    save_to: Path | None,
 ) -> Answer:
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.fit import fit_step, steps_to_fit
 
-    workspace = open_workspace(folder)
     limit_s = 60.0 * max_minutes
     outcomes = []
-    with writing(workspace, "scissorcal fit"):
+    with writes_in(folder, "scissorcal fit") as workspace:
         engine = Engine.of(workspace)
         for step in steps_to_fit(engine, wanted):
             ends_s = time.monotonic() + limit_s
@@ -185,6 +195,7 @@ def _run(
                     force=force and (not wanted or step.what in wanted),
                     progress=tell,
                     stop=lambda ends_s=ends_s: time.monotonic() > ends_s,  # type: ignore[misc]
+                    save_to=save_to,
                 )
             outcomes.append(outcome)
     return _answer(outcomes)

@@ -1,12 +1,16 @@
 """``scissorcal fit log`` and ``scissorcal fit restore``."""
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
+
+if TYPE_CHECKING:
+    from scissorcal.workday.history import Version
 
 What = Literal["camera", "blade", "plate", "friction", "friction-advance", "cut"]
 
@@ -40,7 +44,13 @@ def log(
 
 @command
 def restore(
-    version: Annotated[str, typer.Argument(help="Name of a version, or how it begins.")],
+    version: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a version, or how it begins; or a file (.nc) in which a fit was kept "
+            "because the workspace could not be written."
+        ),
+    ],
     folder: Folder = None,
 ) -> Answer:
     """Put an earlier version of a fit back in use; the one in use is kept as a version.
@@ -54,19 +64,23 @@ def restore(
       kept: fits/history/friction-20261122T143201Z-1f2e3d4c
       next: scissorcal fit cut
     """
+    from scissorcal.workday.elsewhere import put_in_place
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.history import restore as restore_version
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.plan import make_plan
 
-    workspace = open_workspace(folder)
-    with writing(workspace, "scissorcal fit restore"):
+    found: Version | None = None
+    with writes_in(folder, "scissorcal fit restore") as workspace:
         engine = Engine.of(workspace)
-        found, before = restore_version(engine, version)
-    path = engine.file(f"fit {found.what}")
-    lines = [f"{workspace.relative(path)}: {found.name} is in use again"]
+        if version.endswith(".nc"):
+            step, before = put_in_place(engine, Path(version))
+            path, said = engine.file(step.name), f"{Path(version).name} is in use"
+        else:
+            found, before = restore_version(engine, version)
+            path, said = engine.file(f"fit {found.what}"), f"{found.name} is in use again"
+    lines = [f"{workspace.relative(path)}: {said}"]
     lines += [f"kept: {workspace.relative(before)}"] if before else []
     next_command = make_plan(workspace).next_command
     lines += [f"next: {next_command}"] if next_command else []
-    result = {"version": found, "kept": before, "next_command": next_command}
+    result = {"version": found, "fit": path, "kept": before, "next_command": next_command}
     return Answer(result, "\n".join(lines), files=[path])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command
 from scissorcal.errors import InputError
@@ -144,8 +144,8 @@ def _import_camera(file: Path, folder: Path | None) -> Answer:
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.camera import import_camera
 
-    workspace = open_workspace(folder)
-    fit, read, path = import_camera(Engine.of(workspace), file)
+    with writes_in(folder, "scissorcal import") as workspace:
+        fit, read, path = import_camera(Engine.of(workspace), file)
     camera = fit.camera
     text = (
         f"{workspace.relative(path)}: camera of {camera.width} x {camera.height} from {file.name} "

@@ -1,5 +1,7 @@
 """Open a workspace for a command; interrupted captures are recovered first."""
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,3 +25,16 @@ def open_workspace(folder: Path | None) -> "Workspace":
     for sentence in recover_recordings(workspace):
         note(sentence)
     return workspace
+
+
+@contextlib.contextmanager
+def writes_in(folder: Path | None, command: str) -> "Iterator[Workspace]":
+    """Open a workspace and hold it for ``command``, which writes results.
+
+    Raises InputError where another command holds it.
+    """
+    from scissorcal.workday.lock import writing
+
+    workspace = open_workspace(folder)
+    with writing(workspace, command, note):
+        yield workspace

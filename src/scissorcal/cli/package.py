@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scissorcal.cli.lazy import group
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
 
@@ -57,11 +57,9 @@ def build(
       ...
     """
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.package import build_workspace_package
 
-    workspace = open_workspace(folder)
-    with writing(workspace, "scissorcal package build"):
+    with writes_in(folder, "scissorcal package build") as workspace:
         built = build_workspace_package(
             Engine.of(workspace), seed=seed, force=force, allow_failed=allow_failed
         )

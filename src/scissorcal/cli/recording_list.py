@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, table
 
@@ -89,8 +89,8 @@ def exclude(
     """
     from scissorcal.workday.recordings import exclude_recording
 
-    workspace = open_workspace(folder)
-    path = exclude_recording(workspace, name, why)
+    with writes_in(folder, "scissorcal recording exclude") as workspace:
+        path = exclude_recording(workspace, name, why)
     text = f"{workspace.relative(path)} is excluded: {why.strip()}"
     return Answer({"recording": path, "why": why}, text, files=[workspace.exclusions_path])
 
@@ -106,7 +106,7 @@ def include(name: Name, folder: Folder = None) -> Answer:
     """
     from scissorcal.workday.recordings import include_recording
 
-    workspace = open_workspace(folder)
-    path = include_recording(workspace, name)
+    with writes_in(folder, "scissorcal recording include") as workspace:
+        path = include_recording(workspace, name)
     text = f"{workspace.relative(path)} is used again"
     return Answer({"recording": path}, text, files=[workspace.exclusions_path])

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from scissorcal.cli.lazy import group
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import Folder
 from scissorcal.cli.output import Answer, command, is_interactive
 from scissorcal.errors import InputError
@@ -38,12 +38,10 @@ def report(
       ...
     """
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.report import write_workspace_report
     from scissorcal.workday.runs.sign import standing_review
 
-    workspace = open_workspace(folder)
-    with writing(workspace, "scissorcal report"):
+    with writes_in(folder, "scissorcal report") as workspace:
         engine = Engine.of(workspace)
         written = write_workspace_report(engine, anew=anew)
     review = standing_review(engine)
@@ -144,11 +142,9 @@ def sign(
       next: scissorcal package build
     """
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.sign import sign_report
 
-    workspace = open_workspace(folder)
-    with writing(workspace, "scissorcal report sign"):
+    with writes_in(folder, "scissorcal report sign") as workspace:
         engine = Engine.of(workspace)
         review = sign_report(engine, name, decision, note, key=key, passphrase=_passphrase)
     path = workspace.signature_path

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scissorcal.cli.opening import open_workspace
+from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import Axis, Folder, Seed
 from scissorcal.cli.output import Answer, command, note, table
 from scissorcal.cli.progress import progress
@@ -98,12 +98,10 @@ def verify(
     width: factor by which intervals are too narrow (above 1) or too wide; shift: their offset from
     the truth; p: probability of such ranks if the intervals are right.
     """
-    from scissorcal.workday.lock import writing
     from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 
     if workers is not None and cluster is not None:
         raise InputError("Give --workers or --cluster, not both: a cluster brings its workers.")
-    workspace = open_workspace(folder)
     if axis == "advance" and what != "friction":
         raise InputError(
             "--axis advance is of friction: 'scissorcal verify friction --axis advance'."
@@ -113,7 +111,7 @@ def verify(
     settings = VerifySettings(
         checks=_checks(checks), fits=fits, prior=prior, spread=spread, seed=seed
     )
-    with writing(workspace, "scissorcal verify"), progress() as tell:
+    with writes_in(folder, "scissorcal verify") as workspace, progress() as tell:
         outcomes = verify_workspace(
             workspace, wanted, settings, workers=workers, cluster=cluster, progress=tell
         )

@@ -2,12 +2,14 @@
 
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError, MissingError
+from scissorcal.files import part_of, put_beside, rename_folder
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.steps import BY_NAME, steps_of
@@ -40,9 +42,9 @@ class Version:
 
 
 def keep(engine: Engine, name: str) -> Path | None:
-    """Move the result of a step, its trust check and its pictures to fits/history/<version>/.
+    """Have the result of a step, its trust check and its pictures in fits/history/<version>/ too.
 
-    Gives the folder, None where there was no result.
+    Gives the folder, None where there was no result. A kill leaves the whole folder or none.
     """
     path = engine.file(name)
     if not path.is_file():
@@ -51,10 +53,14 @@ def keep(engine: Engine, name: str) -> Path | None:
     folder = _folder(engine) / f"{path.stem}-{stamp}-{engine.index.digest(path)[:HASH]}"
     if folder.exists():
         shutil.rmtree(folder)
-    folder.mkdir(parents=True)
-    for part in _parts(path):
-        if part.exists():
-            part.rename(folder / part.name)
+    folder.parent.mkdir(exist_ok=True)
+    part = part_of(folder)
+    try:
+        _put_all(path, part / path.name)
+        rename_folder(part, folder)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
     return folder
 
 
@@ -67,8 +73,15 @@ def versions(engine: Engine, what: str = "") -> tuple[Version, ...]:
         file = engine.file(step.name)
         if file.is_file():
             found.append(_version(engine, step.name, file, current=True))
-        folders = _folder(engine).glob(f"{step.what}-*/{file.name}")
-        found += [_version(engine, step.name, path, current=False) for path in folders]
+        in_use = {version.name for version in found}
+        folders = sorted(_folder(engine).glob(f"{step.what}-*/{file.name}"))
+        kept = [
+            _version(engine, step.name, path, current=False)
+            for path in folders
+            if _NAME.match(path.parent.name)
+        ]
+        # A restore that was killed leaves its version in both places.
+        found += [version for version in kept if version.name not in in_use]
     engine.index.save()
     return tuple(sorted(found, key=lambda version: (version.time_utc, version.name), reverse=True))
 
@@ -90,41 +103,88 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     (version,) = found
     if version.current:
         raise InputError(f"{version.name} is the version in use: nothing was changed.")
-    step = f"fit {version.what}"
-    before = keep(engine, step)
-    target = engine.file(step).parent
-    for part in sorted(version.path.parent.iterdir()):
-        part.rename(target / part.name)
-    version.path.parent.rmdir()
-    engine.refresh()
+    before = take_place(engine, f"fit {version.what}", version.path)
+    shutil.rmtree(version.path.parent)
     return version, before
 
 
-def save_version(engine: Engine, name: str, result: "Result") -> Path:
+def take_place(engine: Engine, name: str, source: Path) -> Path | None:
+    """Put the result ``source``, with what stands beside it, in use; the one in use is kept.
+
+    Gives the folder of the one that was in use.
+    """
+    before = keep(engine, name)
+    path = engine.file(name)
+    for part in _beside(path):
+        _remove(part)
+    _put_all(source, path)
+    engine.refresh()
+    return before
+
+
+def save_version(
+    engine: Engine, name: str, result: "Result", draw: Callable[[Path], object] | None = None
+) -> Path:
     """Keep the result that is there, then write the new one. Gives its path.
 
-    Where writing fails the earlier result is put back.
+    ``draw`` draws the pictures that stand beside it, into the folder it is given. Where writing
+    fails, or is killed, the earlier result stays in use; pictures are never those of another
+    result, and may be missing after a kill.
     """
     from scissorcal.calibration.store import save
 
     path = engine.file(name)
-    kept = keep(engine, name)
+    pictures = path.with_suffix("")
+    drawn = part_of(pictures)
     try:
-        save(result, path)
-    except BaseException:
-        if kept is not None:
-            for part in kept.iterdir():
-                part.replace(path.parent / part.name)
-            kept.rmdir()
-        raise
+        if draw is not None:
+            draw(drawn)
+        kept = keep(engine, name)
+        _remove(pictures)
+        try:
+            save(result, path)
+        except BaseException:
+            if kept is not None:
+                _put(kept / pictures.name, pictures)
+                shutil.rmtree(kept)
+            raise
+        if drawn.exists():
+            rename_folder(drawn, pictures)
+    finally:
+        shutil.rmtree(drawn, ignore_errors=True)
     if kept is not None and file_digest(path) == file_digest(kept / path.name):
         # The same result again: its trust check stands, and no version is added.
-        (kept / path.name).unlink()
-        for part in kept.iterdir():
-            part.replace(path.parent / part.name)
-        kept.rmdir()
+        shutil.rmtree(kept)
+    else:
+        for check in _checks_beside(path):
+            _remove(check)
     engine.refresh()
     return path
+
+
+def _put_all(source: Path, target: Path) -> None:
+    """Put a result and what stands beside it under another name, the result itself last."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    for one, other in zip(_beside(source), _beside(target), strict=True):
+        _put(one, other)
+    _put(source, target)
+
+
+def _put(source: Path, target: Path) -> None:
+    """Put a file, or the files of a folder, under another name; nothing where there is none."""
+    if source.is_dir():
+        target.mkdir(exist_ok=True)
+        for file in source.iterdir():
+            put_beside(file, target / file.name)
+    elif source.exists():
+        put_beside(source, target)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _version(engine: Engine, name: str, path: Path, current: bool) -> Version:
@@ -149,11 +209,10 @@ def _folder(engine: Engine) -> Path:
     return engine.workspace.root / "fits" / "history"
 
 
-def _parts(path: Path) -> tuple[Path, ...]:
-    """A result's file, its trust check, the records of that, and its folder of pictures."""
-    return (
-        path,
-        path.with_suffix(".verify.json"),
-        path.with_suffix(".verify.partial.jsonl"),
-        path.with_suffix(""),
-    )
+def _beside(path: Path) -> tuple[Path, ...]:
+    """What stands beside a result: its trust check, the records of that, its folder of pictures."""
+    return (*_checks_beside(path), path.with_suffix(""))
+
+
+def _checks_beside(path: Path) -> tuple[Path, ...]:
+    return (path.with_suffix(".verify.json"), path.with_suffix(".verify.partial.jsonl"))

@@ -6,8 +6,9 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
 from scissorcal.files import remove_left_over
@@ -16,17 +17,21 @@ if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace
 
 LOCK_FILE = "lock"
+_LONGEST = 4096
 _READ_ONLY = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
 @contextlib.contextmanager
-def writing(workspace: "Workspace", command: str) -> Iterator[None]:
+def writing(
+    workspace: "Workspace", command: str, tell: Callable[[str], None] = lambda sentence: None
+) -> Iterator[None]:
     """Hold the workspace for a command that writes results; parts of killed ones are removed.
 
-    The system gives the lock back when its process ends, however it ends: none is ever stale. On a
-    network folder it may hold for one computer only. A workspace that may only be read needs no
-    lock: nothing can be written there. Raises InputError where another command holds the lock, with
-    that command and its age.
+    The system gives the lock back when its process ends, however it ends: none is ever stale. A
+    network folder may not carry it from one computer to another: the holder's name stands in the
+    file until it ends, and ``tell`` hears of one on another computer that has not ended or was
+    killed. A workspace that may only be read needs no lock: nothing can be written there. Raises
+    InputError where another command holds the lock, with that command and its age.
     """
     path = workspace.root / ".scissorcal" / LOCK_FILE
     try:
@@ -41,33 +46,67 @@ def writing(workspace: "Workspace", command: str) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            file.seek(0)
-            raise InputError(_refusal(workspace, file.read())) from None
-        holder = {
-            "command": command,
-            "host": os.uname().nodename,
-            "pid": os.getpid(),
-            "start_s": time.time(),
-        }
+            raise InputError(_refusal(workspace, _holder(file))) from None
+        before = _holder(file)
+        if before is not None and before.host != os.uname().nodename:
+            tell(_not_seen(workspace, before))
+        holder = _Holder(command, os.uname().nodename, os.getpid(), time.time())
         file.truncate(0)
-        file.write(json.dumps(holder))
-        file.flush()
-        for folder in (workspace.root, workspace.fit_path("cut").parent, path.parent):
-            remove_left_over(folder)
-        yield
+        file.write(json.dumps(asdict(holder)))
+        with contextlib.suppress(OSError):  # a full disk: the lock itself takes no space
+            file.flush()
+        _remove_left_over(workspace)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                file.truncate(0)
 
 
-def _refusal(workspace: "Workspace", text: str) -> str:
+@dataclass(frozen=True)
+class _Holder:
+    command: str
+    host: str
+    pid: int
+    start_s: float
+
+    @property
+    def words(self) -> str:
+        age_s = max(0.0, time.time() - self.start_s)
+        return f"'{self.command}' (process {self.pid} on {self.host}, for {age_s:.0f} s)"
+
+
+def _holder(file: IO[str]) -> _Holder | None:
+    """Who holds the lock, or held it and was killed; None where nobody is named."""
+    file.seek(0)
     try:
-        holder = json.loads(text)
-        age_s = max(0.0, time.time() - float(holder["start_s"]))
-        who = (
-            f"'{holder['command']}' (process {holder['pid']} on {holder['host']}, for "
-            f"{age_s:.0f} s)"
+        found = json.loads(file.read(_LONGEST))
+        return _Holder(
+            str(found["command"]), str(found["host"]), int(found["pid"]), float(found["start_s"])
         )
-    except (ValueError, KeyError, TypeError):  # it has taken the lock and not yet said who it is
-        who = "another command"
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _remove_left_over(workspace: "Workspace") -> None:
+    """Remove what killed commands left half-written; half a capture is recovered elsewhere."""
+    root = workspace.root
+    folders = [one for one in root.iterdir() if one.is_dir() and one != workspace.captures_dir]
+    for folder in (root, root / "fits" / "history", *folders):
+        remove_left_over(folder)
+
+
+def _refusal(workspace: "Workspace", holder: _Holder | None) -> str:
+    who = holder.words if holder else "another command"
     return (
         f"{workspace.root} is being written by {who}: wait until that has ended, or end it, and "
         "run this command again. Nothing was changed."
+    )
+
+
+def _not_seen(workspace: "Workspace", holder: _Holder) -> str:
+    return (
+        f"{holder.words} wrote in {workspace.root} and has not ended, or was killed. Where a "
+        "network folder does not carry locks to other computers, both write: each file is then "
+        "whole, and the last one written stays."
     )

@@ -41,8 +41,7 @@ def photograph_indexes(workspace: Workspace, step: Step) -> list[Path]:
     """Index files of the folders of photographs that count for a step."""
     paths: list[Path] = []
     for kind in step.photographs:
-        own = sorted(workspace.captures_dir.glob(f"{kind}-*/capture.json"))
-        own = [path for path in own if not path.parent.name.endswith(".part")]
+        own = workspace.photograph_indexes(kind)
         paths += own[-1:] if step.newest_only else own
     return paths
 

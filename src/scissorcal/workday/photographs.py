@@ -10,17 +10,20 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from scissorcal.errors import InputError
+from scissorcal.files import left_over, part_of, rename_folder
 from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard, MarkerBoard
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday.workspace import PHOTOGRAPH_INDEX, Workspace
 
 if TYPE_CHECKING:
     from scissorcal.vision.photo import Photo
     from scissorcal.vision.targets.detect import Detection
 
 PhotoKind = Literal["camera", "blade", "plate", "rig"]
-INDEX_FILE = "capture.json"
+DRAWN_SUFFIX = "-detected.png"
+"""How the name of a picture ends that shows what was found in the photograph beside it."""
+KEPT_SUFFIX = ".interrupted"
 
 
 class Photograph(BaseModel):
@@ -86,11 +89,8 @@ class PhotoCapture:
 
 def photo_captures(workspace: Workspace, kind: PhotoKind) -> tuple[PhotoCapture, ...]:
     """Read the captures of one kind, oldest first. Raises InputError where one is damaged."""
-    folders = sorted(workspace.captures_dir.glob(f"{kind}-*/{INDEX_FILE}"))
     return tuple(
-        PhotoCapture(path.parent, _index(path))
-        for path in folders
-        if not path.parent.name.endswith(".part")
+        PhotoCapture(path.parent, _index(path)) for path in workspace.photograph_indexes(kind)
     )
 
 
@@ -152,7 +152,7 @@ def take_photographs(
                 continue
             stored = writer.add(path, photo, found.detection, found.stance)
             if found.drawn is not None:
-                found.drawn(writer.part / f"{Path(stored.file).stem}-detected.png")
+                found.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
             seen.append(found)
             tell(found.words)
         if not seen:
@@ -165,13 +165,13 @@ def take_photographs(
 class PhotoWriter:
     """A capture that is being taken: nothing of it is to be seen until `finish`.
 
-    Leaving without it removes what was copied.
+    Leaving without it removes what was copied. After a kill `recover_photographs` finds it.
     """
 
     def __init__(self, workspace: Workspace, kind: PhotoKind) -> None:
         self.kind = kind
         self.folder = _new_folder(workspace, kind)
-        self.part = self.folder.with_name(self.folder.name + ".part")
+        self.part = part_of(self.folder)
         self.photographs: list[Photograph] = []
 
     def __enter__(self) -> "PhotoWriter":
@@ -226,9 +226,33 @@ class PhotoWriter:
         index = PhotoIndex(
             kind=self.kind, board=board, blade=blade, photographs=tuple(self.photographs)
         )
-        (self.part / INDEX_FILE).write_text(index.model_dump_json(indent=1) + "\n", "utf-8")
-        self.part.rename(self.folder)
+        (self.part / PHOTOGRAPH_INDEX).write_text(index.model_dump_json(indent=1) + "\n", "utf-8")
+        rename_folder(self.part, self.folder)
         return PhotoCapture(self.folder, index)
+
+
+def recover_photographs(folder: Path) -> tuple[str, ...]:
+    """Keep the photographs of killed captures in ``folder``; return a sentence for each.
+
+    They are not a capture: what was found in them is not known.
+    """
+    said = []
+    for part in left_over(folder):
+        number, kept = 1, folder / f"{part.name.split('.')[0]}{KEPT_SUFFIX}"
+        while kept.exists():
+            number += 1
+            kept = kept.with_suffix(f"{KEPT_SUFFIX}-{number}")
+        pictures = [file for file in part.iterdir() if not file.name.endswith(DRAWN_SUFFIX)]
+        if not pictures:
+            shutil.rmtree(part)
+            continue
+        part.rename(kept)
+        kind = kept.name.split("-")[0]
+        said.append(
+            f"A capture of photographs was interrupted: {len(pictures)} are kept in {kept}. Give "
+            f"them to 'scissorcal capture {kind}' again."
+        )
+    return tuple(said)
 
 
 def detection_of(capture: PhotoCapture, photograph: Photograph) -> "Detection":

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_json
 from scissorcal.foreign.formats import STATE
@@ -242,12 +242,26 @@ def notes_of(workspace: Workspace, recipe: Recipe, used: Sequence[RecordingRow])
 
 
 def recover_recordings(workspace: Workspace) -> tuple[str, ...]:
-    """Finish captures that were interrupted; return a sentence for each."""
+    """Finish captures that were interrupted; return a sentence for each.
+
+    Where the workspace cannot be written they wait, and the sentence is why.
+    """
     if not any(workspace.captures_dir.glob("*.part")):
         return ()
     from scissorcal.recording import recover
+    from scissorcal.workday.photographs import recover_photographs
 
-    return tuple(recovered.sentence for recovered in recover(workspace.captures_dir))
+    try:
+        recovered = recover(workspace.captures_dir)
+        return (
+            *(one.sentence for one in recovered),
+            *recover_photographs(workspace.captures_dir),
+        )
+    except (OSError, InputError) as error:
+        known = file_error(error, workspace.captures_dir) if isinstance(error, OSError) else error
+        if known is None:
+            raise
+        return (f"A capture that was interrupted could not be recovered yet: {known}",)
 
 
 def _facts(path: Path, kind: CaptureKind) -> dict[str, Any]:

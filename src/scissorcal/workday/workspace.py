@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 RecordingKind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
 FitKind = Literal["friction", "friction-advance", "cut"]
 
+PHOTOGRAPH_INDEX = "capture.json"
 RECIPE_FILE = "recipe.toml"
 DEMO_MARKER = ".scissorcal-demo"
 
@@ -95,6 +96,14 @@ class Workspace:
         found = self.captures_dir.glob(f"{kind}-*.mcap")
         own = [path for path in found if not path.name.startswith(longer)]
         return tuple(sorted(own, key=lambda path: path.stem))
+
+    def photograph_indexes(self, kind: str) -> list[Path]:
+        """Return the index of each finished capture of photographs, oldest first.
+
+        A dot in the name of its folder marks one that is being taken or was interrupted.
+        """
+        found = self.captures_dir.glob(f"{kind}-*/{PHOTOGRAPH_INDEX}")
+        return sorted(path for path in found if "." not in path.parent.name)
 
     def new_recording(self, kind: RecordingKind, now: datetime | None = None) -> Path:
         """Return a file name for a new recording that no file has yet; makes the folder."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.history import save_version
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
@@ -136,8 +135,14 @@ def fit_step(
     force: bool = False,
     progress: Progress | None = None,
     stop: Stop | None = None,
+    save_to: Path | None = None,
 ) -> FitOutcome:
-    """Run one fit, or read it back where its identity is the stored one's, unless ``force``."""
+    """Run one fit, or read it back where its identity is the stored one's, unless ``force``.
+
+    Where the workspace cannot be written, the fit is kept in ``save_to`` (`workday.elsewhere`).
+    """
+    from scissorcal.workday.elsewhere import refuse_unwritable, save_anywhere
+
     chosen: Effort = effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
     path = engine.file(step.name)
@@ -147,6 +152,7 @@ def fit_step(
         state = engine.state(step.name)
         return FitOutcome(step.what, _load(step, path), path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
+    refuse_unwritable(engine, save_to)
     request = Request(
         effort=chosen,
         seed=seed,
@@ -157,9 +163,7 @@ def fit_step(
         stop=stop or (lambda: False),
     )
     made = cast(FitModule, import_module(step.run)).fit(engine, request)
-    save_version(engine, step.name, made.result)
-    if made.draw:
-        made.draw(path.with_suffix(""))
+    save_anywhere(engine, step, made.result, made.draw, save_to)
     state = engine.state(step.name)
     if state.state != "incomplete":
         request.checkpoint.unlink(missing_ok=True)
