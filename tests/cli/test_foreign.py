@@ -55,3 +55,21 @@ def test_a_foreign_file_ends_in_one_sentence_and_one_object(
     assert found["result"]["exit_code"] == said.code
     assert name in found["result"]["error"]
     assert "Unexpected failure" not in said.err
+
+
+def test_many_logs_are_imported_and_the_bad_ones_named(workspace: Path, cli: Cli) -> None:
+    logs = [workspace / f"run{number}.csv" for number in range(4)]
+    for log in logs:
+        rows = [f"{0.01 * i:.2f},{20 + 10 * (i % 200 > 100)},{i % 7}" for i in range(400)]
+        log.write_text("t_s,angle_deg,force_g\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    logs[1].write_text("t_s,angle_deg,force_g\n1,2,3\n0,1,2\n", encoding="utf-8")
+    columns = ("-c", "time=t_s", "-c", "opening=angle_deg", "-c", "handle_force=force_g")
+    said = cli("import", *logs, *columns, "--json")
+    assert said.code == 2
+    assert "1 of 4 logs were not imported; the other 3 were" in said.err
+    assert "run1.csv, line 3" in said.err
+    assert len(said.envelope["files"]) == 3
+    assert len(list((workspace / "captures").glob("friction-*.mcap"))) == 3
+    said = cli("import", logs[0], logs[2], *columns)
+    assert said.code == 0
+    assert "2 logs imported" in said.out

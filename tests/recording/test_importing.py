@@ -52,14 +52,15 @@ def test_a_delimiter_may_be_named(tmp_path: Path) -> None:
 def test_decimal_commas_quotes_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
     lines = ['"t";"angle";"torque"']
     lines += [";".join(f'"{value}"'.replace(".", ",") for value in row) for row in rows()]
-    (tmp_path / "log.csv").write_text("\r\n".join(lines), encoding="utf-8-sig", newline="")
+    text = "\r\n".join([*lines, ""])
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8-sig", newline="")
     assert_holds(import_table(tmp_path / "log.csv", columns=COLUMNS, units=UNITS), rows())
 
 
 def test_comments_preamble_units_line_and_blank_lines(tmp_path: Path) -> None:
     body = [",".join(map(str, row)) for row in rows()]
     text = ["# a log", "Rate,100", "Operator: A", "t,angle,torque", "s,rad,mNm", ""]
-    text += [*body[:100], "% the hand rested", "", *body[100:]]
+    text += [*body[:100], "% the hand rested", "", *body[100:], ""]
     path = tmp_path / "log.txt"
     path.write_text("\n".join(text), encoding="utf-8")
     recording = import_table(path, columns=COLUMNS)
@@ -172,7 +173,10 @@ def test_a_last_line_that_was_cut_off_is_named(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", rows())
     text = path.read_text().rstrip("\n")
     path.write_text(text[: text.rindex(",")])
-    assert "line 401 has 2 cells where the others have 3" in refusal(path)
+    found = import_table(path, columns=COLUMNS, units=UNITS)
+    assert_holds(found, rows()[:-1])
+    assert any("Line 401, the last one, has 2 cells" in note for note in found.notes)
+    assert "line 401 has 2 cells where the others have 3" in refusal(path, drop_last_line=False)
 
 
 def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """``scissorcal import``"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -8,10 +9,12 @@ import typer
 
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.signals.survey import Survey
     from scissorcal.recording import Recording
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml")
@@ -21,7 +24,9 @@ def _per_channel(short: str, long: str, help_text: str) -> Any:
     return typer.Option(short, long, metavar="CHANNEL=...", help=help_text)
 
 
-File = Annotated[Path, typer.Argument(dir_okay=False, help="The log, or a camera's file.")]
+Files = Annotated[
+    list[Path], typer.Argument(dir_okay=False, help="Logs of one layout, or a camera's file.")
+]
 Columns = Annotated[
     list[str] | None, _per_channel("-c", "--column", "Which column holds a channel.")
 ]
@@ -40,13 +45,20 @@ Kind = Annotated[Literal["friction", "cut"], typer.Option(help="What was recorde
 HandleRadiusMm = Annotated[float | None, typer.Option(help="The recipe's if not given.")]
 MinTravel = Annotated[float | None, typer.Option(help="Least travel of a stroke (rad, or m).")]
 AllowGaps = Annotated[bool, typer.Option("--allow-gaps", help="Keep gaps in time, with a note.")]
+DropLastLine = Annotated[
+    bool,
+    typer.Option(
+        "--drop-last-line/--keep-last-line",
+        help="Leave out the last line of a text file where it is not whole.",
+    ),
+]
 Delimiter = Annotated[str | None, typer.Option(help="What separates the columns of a CSV file.")]
 Output = Annotated[Path | None, typer.Option(help="Write here, without a workspace.")]
 
 
 @command
 def import_(
-    file: File,
+    files: Files,
     columns: Columns = None,
     units: Units = None,
     scales: Scales = None,
@@ -56,11 +68,12 @@ def import_(
     handle_radius_mm: HandleRadiusMm = None,
     min_travel: MinTravel = None,
     allow_gaps: AllowGaps = False,
+    drop_last_line: DropLastLine = True,
     delimiter: Delimiter = None,
     output: Output = None,
     folder: Folder = None,
 ) -> Answer:
-    """Import a log from FILE: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
+    """Import logs: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
 
     A camera file is one of OpenCV, ROS (camera_info) or Kalibr (camchain), and takes no option but
     --workspace.
@@ -68,7 +81,11 @@ def import_(
     For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command and
     force_command; a column is a heading, a number from 0, or a variable of a .mat file (X[2] for
     its third column). Units may stand in the headings; for a linear joint, opening is in metres
-    and motor_torque in newtons. A scale is a number or a variable of the file.
+    and motor_torque in newtons. A scale is a number or a variable of the file, such as rad per
+    count. Grams, g, are grams of force.
+
+    Several logs of one layout become a recording each. One that cannot be read is named with its
+    reason, and the others are imported; the command then ends with 2.
 
     \b
     Example:
@@ -76,14 +93,19 @@ def import_(
           -u time=s -u opening=m -u motor_torque=V -s motor_torque=gtau --joint linear
       captures/friction-20261121T131415Z.mcap: 24841 samples, 24.8 s, 8 strokes, linear joint
       ...
+      $ scissorcal import run*.csv -c time=t_ms -c opening=angle_deg -c handle_force=force_g
+      run01.csv: captures/friction-20261121T131502Z.mcap: 6000 samples, 30.0 s, 12 strokes, ...
+      ...
       $ scissorcal import left_intrinsics.yml
       fits/camera.nc: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
       ...
     """
     import math
 
-    if file.suffix.lower() in _CAMERA_FILES:
-        return _import_camera(file, folder)
+    if len(files) == 1 and files[0].suffix.lower() in _CAMERA_FILES:
+        return _import_camera(files[0], folder)
+    if output and len(files) > 1:
+        raise InputError(f"--output names one file, and {len(files)} logs are given.")
 
     from scissorcal.recording import Joint, import_table, write_recording
     from scissorcal.recording.table import column_of
@@ -91,42 +113,95 @@ def import_(
     workspace = None if output else open_workspace(folder)
     rig = workspace.recipe().rig if workspace else None
     radius_mm = handle_radius_mm if handle_radius_mm or not rig else rig.handle_radius_mm
-    recording = import_table(
-        file,
-        columns={name: column_of(at) for name, at in _pairs("column", columns)},
-        units=dict(_pairs("unit", units)),
-        scale=dict(_pairs("scale", scales)),
-        rate_Hz=rate_Hz,
-        joint=Joint(joint or (rig.joint if rig else "rotary")),
-        kind=kind,
-        handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
-        min_travel=min_travel,
-        allow_gaps=allow_gaps,
-        delimiter=delimiter,
-    )
-    target = output or (workspace.new_recording(kind) if workspace else None)
-    assert target is not None
-    path = write_recording(recording, target)
-    shown = workspace.relative(path) if workspace else str(path)
-    return _answer(recording, path, shown, rig.joint if rig else recording.joint.kind)
+    chosen = {name: column_of(at) for name, at in _pairs("column", columns)}
+    unit_of, scale_of = dict(_pairs("unit", units)), dict(_pairs("scale", scales))
+
+    def import_one(file: Path) -> _Imported:
+        recording = import_table(
+            file,
+            columns=chosen,
+            units=unit_of,
+            scale=scale_of,
+            rate_Hz=rate_Hz,
+            joint=Joint(joint or (rig.joint if rig else "rotary")),
+            kind=kind,
+            handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
+            min_travel=min_travel,
+            allow_gaps=allow_gaps,
+            drop_last_line=drop_last_line,
+            delimiter=delimiter,
+        )
+        target = output or (workspace.new_recording(kind) if workspace else None)
+        assert target is not None
+        path = write_recording(recording, target)
+        shown = workspace.relative(path) if workspace else str(path)
+        planned = rig.joint if rig else recording.joint.kind
+        return _Imported(recording, path, shown, planned, tuple(chosen))
+
+    if len(files) == 1:
+        return _answer(import_one(files[0]))
+    return _import_all(files, import_one)
 
 
-def _answer(recording: "Recording", path: Path, shown: str, planned: str) -> Answer:
+@dataclass(frozen=True)
+class _Imported:
+    """One log: what was read, where it was written, the recipe's joint, the columns it had."""
+
+    recording: "Recording"
+    path: Path
+    shown: str
+    planned: str
+    measured: tuple[str, ...]
+
+
+def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]") -> Answer:
+    """Import each log that can be read; raises InputError that names the others."""
+    lines, facts, paths, refused = [], [], [], []
+    with progress() as tell:
+        for done, file in enumerate(files):
+            tell(done / len(files), f"{file.name}")
+            try:
+                one = import_one(file)
+            except InputError as error:
+                refused.append(str(error))
+                continue
+            answer = _answer(one)
+            first, *_ = answer.text.splitlines()
+            lines.append(f"{file.name}: {first}")
+            lines += [f"  note: {said}" for said in one.recording.notes if "the last one" in said]
+            facts.append(answer.result)
+            paths.append(one.path)
+    if refused:
+        told = InputError(
+            f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
+            + "".join(f"\n  {sentence}" for sentence in refused)
+        )
+        told.kept = tuple(paths)
+        raise told
+    lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
+    return Answer({"imported": facts}, "\n".join(lines), files=paths)
+
+
+def _answer(one: _Imported) -> Answer:
     """What was imported; a note where the recipe plans for another joint than was recorded."""
-    joint = recording.joint
+    from scissorcal.calibration.signals.survey import survey
+
+    recording, joint = one.recording, one.recording.joint
     notes = list(recording.notes)
-    if planned != joint.kind:
+    if one.planned != joint.kind:
         notes.append(
-            f'The recipe has a {planned} joint: set joint = "{joint.kind}" in its '
+            f'The recipe has a {one.planned} joint: set joint = "{joint.kind}" in its '
             f"[rig] to plan for a {joint.kind} one."
         )
+    found = survey(recording, one.measured)
     lines = [
-        f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
+        f"{one.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",
+        *_survey_lines(found),
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
-        "recording": path,
+        "recording": one.path,
         "kind": recording.kind,
         "joint": joint.kind,
         "position_unit": joint.position_unit,
@@ -134,9 +209,31 @@ def _answer(recording: "Recording", path: Path, shown: str, planned: str) -> Ans
         "samples": len(recording.samples),
         "duration_s": recording.duration_s,
         "strokes": recording.strokes,
+        "survey": found,
         "notes": notes,
     }
-    return Answer(result, "\n".join(lines), files=[path])
+    return Answer(result, "\n".join(lines), files=[one.path])
+
+
+def _survey_lines(found: "Survey") -> list[str]:
+    """Rate and sensors, for people; angles in deg."""
+    import math
+
+    gaps = found.gaps
+    lost = f"{gaps.missing} samples missing in {gaps.places} gaps" if gaps.places else "no gap"
+    head = (
+        f"rate: {found.rate_Hz:.4g} Hz; {found.interval_low_ms:.4g} to "
+        f"{found.interval_high_ms:.4g} ms between samples (5 to 95 %), longest "
+        f"{found.longest_ms:.4g} ms; {lost}"
+    )
+    rows = [["sensor", "unit", "step", "lowest", "highest", "cut off low", "high", "dead band"]]
+    for one in found.sensors:
+        unit, factor = ("deg", 180.0 / math.pi) if one.unit == "rad" else (one.unit, 1.0)
+        values = [f"{factor * value:.4g}" for value in (one.low, one.high)]
+        step = "constant" if one.constant else f"{factor * one.step:.3g}" if one.step else "none"
+        shares = [f"{share:.1%}" for share in (one.at_low, one.at_high, one.dead)]
+        rows.append([one.channel, unit, step, *values, *shares])
+    return [head, table(rows, right=range(2, 8))]
 
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:

@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 def open_workspace(folder: Path | None) -> "Workspace":
     """Find the workspace that contains ``folder`` (default: the current folder).
 
-    Captures that were interrupted are recovered first, and reported on stderr. Raises MissingError
-    where there is no workspace.
+    Captures that were interrupted are recovered first, and reported on stderr; other files that a
+    killed command left half-written are removed. Raises MissingError where there is no workspace.
     """
     from scissorcal.workday.recordings import recover_recordings
     from scissorcal.workday.workspace import find_workspace
 
     workspace = find_workspace(folder)
     works_in(workspace)
+    workspace.remove_left_over()
     for sentence in recover_recordings(workspace):
         note(sentence)
     return workspace

@@ -2,7 +2,9 @@
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
+from scissorcal.recording.resolution import StrokeThreshold, stroke_threshold
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_note
 from scissorcal.recording.table import Table, read_table
@@ -20,9 +23,12 @@ from scissorcal.recording.table import Table, read_table
 GAP_FACTOR = 1.5
 """A step longer than this many usual ones is a gap: a sample is missing."""
 
-TRAVEL_SHARE = 0.05
-LEAST_TRAVEL = {"rotary": 5e-3, "linear": 5e-4}
-"""Least travel of a stroke by default: 5 % of the range, and 5 mrad or 0.5 mm."""
+WRAP = 2.0**32
+"""Where the counter of a logger's clock begins at 0 again: 32 bits of us last 71.6 min."""
+NEAR_WRAP = 0.01
+"""Before and after that its time is within this share of the counter's range of either end."""
+SHORT_SHARE, MANY = 0.25, 20
+"""More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
 
 def import_table(
@@ -38,6 +44,7 @@ def import_table(
     min_travel: float | None = None,
     allow_gaps: bool = False,
     delimiter: str | None = None,
+    drop_last_line: bool = True,
     motion_only: bool = False,
 ) -> Recording:
     """Read a table as a recording, in SI, with strokes found from the motion.
@@ -52,6 +59,11 @@ def import_table(
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
     of the .mat file joined by * and /, as in ``{"motor_torque": "gtau"}`` for a gain in N/V.
+
+    A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
+    neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
+    The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
+    false. A clock of 32 bits that begins at 0 again is continued, with a note.
 
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
     it and notes it. Both clocks begin at 0 and are rounded to 1 us.
@@ -71,7 +83,7 @@ def import_table(
     units, scale = units or {}, scale or {}
     wanted = () if motion_only else ("motor_torque", "handle_force")
     _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel, wanted)
-    table = read_table(path, columns, delimiter)
+    table = read_table(path, columns, delimiter, drop_last_line=drop_last_line)
     quantities = {
         channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
         for channel in columns
@@ -79,11 +91,15 @@ def import_table(
     samples = empty_samples(table.length)
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
+    said = list(table.notes)
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
+        table, wrapped = _continued(table)
+        said += wrapped
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
-    strokes = _label(samples, joint, min_travel)
+    strokes, found = _label(samples, joint, min_travel)
+    said += found
     digest = content_hash(path)
     return Recording(
         kind=kind,
@@ -93,7 +109,7 @@ def import_table(
         handle_radius_m=handle_radius_m,
         source=str(path),
         content_hash=digest,
-        notes=_notes(f"{path.name} (sha256:{digest[:16]})", columns, quantities, samples),
+        notes=_notes(f"{path.name} (sha256:{digest[:16]})", columns, quantities, samples, said),
     )
 
 
@@ -190,13 +206,47 @@ def _set_times(samples: NDArray[np.void], microseconds: NDArray[np.int64]) -> No
     samples["host_time_ns"] = microseconds * 1000
 
 
-def _label(samples: NDArray[np.void], joint: Joint, min_travel: float | None) -> tuple[Stroke, ...]:
-    if min_travel is None:
-        span = float(np.ptp(samples["opening"]))
-        min_travel = max(TRAVEL_SHARE * span, LEAST_TRAVEL[joint.kind])
-    labels = label_strokes(samples["opening"], samples["device_time_us"] * 1e-6, min_travel)
+def _continued(table: Table) -> tuple[Table, list[str]]:
+    """The table with a clock that goes on where its counter of 32 bits begins at 0 again."""
+    clock = table.columns["time"]
+    falls = np.flatnonzero(np.diff(clock.values) < 0)
+    before, after = clock.values[falls], clock.values[falls + 1]
+    near = NEAR_WRAP * WRAP
+    if not len(falls) or not np.all((before > WRAP - near) & (before < WRAP) & (after < near)):
+        return table, []
+    turns = np.zeros(len(clock.values))
+    turns[falls + 1] = WRAP
+    columns = {**table.columns, "time": replace(clock, values=clock.values + np.cumsum(turns))}
+    places = ", ".join(table.place(int(row) + 1).rpartition(", ")[2] for row in falls)
+    note = f"The clock begins at 0 again at {places}, after 2^32: it was continued."
+    return replace(table, columns=columns), [note]
+
+
+def _label(
+    samples: NDArray[np.void], joint: Joint, min_travel: float | None
+) -> tuple[tuple[Stroke, ...], list[str]]:
+    """Label the strokes; give them, and sentences on how they were found."""
+    opening = np.asarray(samples["opening"], dtype=np.float64)
+    chosen = stroke_threshold(opening, joint)
+    if min_travel is not None:
+        chosen = StrokeThreshold(min_travel, "as given")
+    labels = label_strokes(opening, samples["device_time_us"] * 1e-6, chosen.travel)
     samples["stroke"] = labels.stroke_of_sample
-    return labels.strokes
+    counts = Counter(stroke.kind for stroke in labels.strokes)
+    unit = joint.position_unit
+    said = [
+        f"{counts['closing']} closing and {counts['opening']} opening strokes were found, of at "
+        f"least {chosen.travel:.3g} {unit} ({chosen.reason})."
+    ]
+    span = float(np.ptp(opening))
+    travels = [np.ptp(opening[labels.stroke_of_sample == one.index]) for one in labels.strokes]
+    if len(travels) > MANY and np.median(travels) < SHORT_SHARE * span:
+        said.append(
+            f"Half of the {len(travels)} strokes travel less than {np.median(travels):.3g} {unit}, "
+            f"where the range is {span:.3g} {unit}: if these are no strokes of yours, give a "
+            "larger --min-travel."
+        )
+    return labels.strokes, said
 
 
 def _notes(
@@ -204,11 +254,13 @@ def _notes(
     columns: Mapping[str, str | int],
     quantities: Mapping[str, Quantity],
     samples: NDArray[np.void],
+    said: Sequence[str],
 ) -> tuple[str, ...]:
     missing = [channel for channel in MEASURED if channel not in columns]
     notes = [f"Imported from {source}: {describe(quantities)}."]
     notes += [f"Not in the file, and set to 0: {', '.join(missing)}."] if missing else []
     notes += [entry.note for entry in quantities.values() if entry.note]
+    notes += said
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
     return (*notes, *gap_note(samples))

@@ -11,6 +11,11 @@ from scissorcal.recording.layout import unit_of
 from scissorcal.recording.recording import Joint
 from scissorcal.recording.table import Table
 
+G_N_PER_KG = 9.80665
+"""Standard gravity: load cells and servos state grams and kilograms of force."""
+_GRAMS = re.compile(r"^(?P<prefix>[km]?)g(?:f)?(?P<length>[cm]?m)?$")
+_POUNDS_N = {"lbf": 4.4482216152605, "ozf": 0.27801385095378125}
+
 COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
 
 
@@ -96,7 +101,8 @@ def _factor(table: Table, channel: str, part: str) -> float:
 
 
 def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joint) -> float:
-    unit, si = parse_unit(_plain(stated)), parse_unit(_plain(target))
+    name, force = _of_force(_plain(stated)) if "N" in target else (_plain(stated), 1.0)
+    unit, si = parse_unit(name), parse_unit(_plain(target))
     heading = table.columns[channel].heading
     if unit is None or si is None:
         raise InputError(
@@ -113,7 +119,22 @@ def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joi
             f"{table.path}, column {heading!r}: {stated} is not a unit for {channel} of a "
             f"{joint.kind} joint, which is in {target}. {remedy}, or name another column."
         )
-    return factor
+    return force * factor
+
+
+def _of_force(unit: str) -> tuple[str, float]:
+    """A unit in newtons for one in grams or pounds of force, and what to multiply it by.
+
+    >>> _of_force("kgcm")
+    ('Ncm', 9.80665)
+    """
+    if unit in _POUNDS_N:
+        return "N", _POUNDS_N[unit]
+    found = _GRAMS.match(unit)
+    if not found:
+        return unit, 1.0
+    grams = {"": 1.0, "k": 1e3, "m": 1e-3}[found["prefix"]]
+    return f"N{found['length'] or ''}", grams * 1e-3 * G_N_PER_KG
 
 
 def _contradiction(table: Table, channel: str, heading: str | None, stated: str | None) -> str:
@@ -133,7 +154,8 @@ def _unit_in(heading: str) -> str | None:
     brackets = re.search(r"[\[(]([^\])]*)[\])]\s*$", heading)
     if brackets:
         text = brackets[1].strip()
-        return text if _is_raw(text) or parse_unit(_plain(text)) else None
+        known = _is_raw(text) or parse_unit(_of_force(_plain(text))[0])
+        return text if known else None
     _, unit = split_unit(heading.strip())
     return unit.name if unit else None
 

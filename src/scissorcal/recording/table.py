@@ -32,13 +32,15 @@ class Column:
 class Table:
     """The wanted columns of a file by channel, all of one length, and the file's single numbers.
 
-    ``lines`` has the line number of each row where the file is text, shape (N,).
+    ``lines`` has the line number of each row where the file is text, shape (N,). ``notes`` are
+    sentences on what was left out.
     """
 
     path: Path
     columns: Mapping[str, Column]
     scalars: Mapping[str, float] = field(default_factory=dict)
     lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def length(self) -> int:
@@ -51,11 +53,14 @@ class Table:
         return f"{self.path}, {where}{column}"
 
 
-def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
+def read_table(
+    path: Path, wanted: Wanted, delimiter: str | None = None, *, drop_last_line: bool = True
+) -> Table:
     """Read the wanted columns of a table; the file's extension says its format.
 
     ``.mat`` is MATLAB, ``.parquet`` and ``.pq`` are Parquet, everything else is text with one
-    row a line. Every number is finite. Raises InputError naming file, place and remedy.
+    row a line, of which a last one without its end is left out (``drop_last_line``). Every number
+    is finite. Raises InputError naming file, place and remedy.
     """
     suffix = path.suffix.lower()
     if suffix == ".mat":
@@ -70,7 +75,7 @@ def read_table(path: Path, wanted: Wanted, delimiter: str | None = None) -> Tabl
         from scissorcal.recording.textfile import read_text
 
         with reading(path, LOG):
-            table = read_text(path, wanted, delimiter)
+            table = read_text(path, wanted, delimiter, drop_last_line=drop_last_line)
     _check_lengths(table)
     _check_finite(table)
     return table

@@ -16,6 +16,8 @@ from scissorcal.recording.table import Column, Table, Wanted, find_column
 COMMENT_MARKS = ("%", "#")
 DELIMITERS = (",", ";", "\t", "|", None)
 """Tried in this order, the first of equals wins; None is white space."""
+SHOWN = 60
+"""Characters of a dropped line that its note shows."""
 
 
 @dataclass(frozen=True)
@@ -26,25 +28,34 @@ class Line:
     text: str
 
 
-def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table:
+def read_text(
+    path: Path, wanted: Wanted, delimiter: str | None = None, *, drop_last_line: bool = True
+) -> Table:
     """Read the wanted columns of a text table.
+
+    A last line without its end, or with fewer cells, is one that a stopped logger may have cut off:
+    it is left out, with a note, unless ``drop_last_line`` is false.
 
     Lines that begin with % or # are comments. The rows begin with the first line that is as wide
     as they are and holds a number; headings stand in the last such wide line before them (also
     a commented one), and a line of units may follow those. Decimal commas are read where
     the comma does not separate the cells.
     """
-    comments, lines = _lines(path)
-    tail = [line.text for line in lines[-20:]]
+    comments, lines, cut = _lines(path)
+    last = [line for line in lines[-21:] if line != cut] or lines
+    tail = [line.text for line in last]
     delimiter = _named(delimiter) if delimiter else _find_delimiter(tail)
-    widths = Counter(len(_cells(line.text, delimiter)) for line in lines[-20:])
+    widths = Counter(len(_cells(text, delimiter)) for text in tail)
     width = widths.most_common(1)[0][0] if widths else 0
     start = next((i for i, line in enumerate(lines) if _is_row(line.text, delimiter, width)), None)
     if start is None:
         raise InputError(
             f"{path} has no row of numbers. Name a table in text, Parquet or MATLAB format."
         )
-    rows = lines[start:]
+    rows, notes = lines[start:], tuple[str, ...]()
+    why = _why_incomplete(rows[-1], cut, delimiter, width)
+    if drop_last_line and why and len(rows) > 1:
+        rows, notes = rows[:-1], (_dropped(rows[-1], why),)
     _check_width(path, rows, delimiter, width)
     commented = [line for line in comments if line.number < rows[0].number]
     headings = _headings(lines[:start], commented, delimiter, width)
@@ -54,11 +65,33 @@ def read_text(path: Path, wanted: Wanted, delimiter: str | None = None) -> Table
         channel: Column(headings[number], values[:, place])
         for place, (channel, number) in enumerate(chosen.items())
     }
-    return Table(path, columns, lines=np.array([line.number for line in rows], dtype=np.int64))
+    numbers = np.array([line.number for line in rows], dtype=np.int64)
+    return Table(path, columns, lines=numbers, notes=notes)
 
 
-def _lines(path: Path) -> tuple[list[Line], list[Line]]:
-    """Return the comment lines, without their mark, and the other lines that are not blank."""
+def _why_incomplete(line: Line, cut: Line | None, delimiter: str | None, width: int) -> str:
+    """Why the last line may not be whole; empty where it is."""
+    cells = _cells(line.text, delimiter)
+    if len(cells) < width:
+        return f"has {len(cells)} cells where the others have {width}"
+    if line == cut:
+        return "has no end, so that its last number may be cut off"
+    return ""
+
+
+def _dropped(line: Line, why: str) -> str:
+    text = line.text if len(line.text) <= SHOWN else f"{line.text[:SHOWN]}..."
+    return (
+        f"Line {line.number}, the last one, {why}: it was left out ({text!r}). --keep-last-line "
+        "reads it."
+    )
+
+
+def _lines(path: Path) -> tuple[list[Line], list[Line], Line | None]:
+    """Return comment lines without their mark, other lines that are not blank, and a cut one.
+
+    The cut one is the last of the others, where the file ends without the end of a line.
+    """
     data = read_foreign(path, LOG)
     if b"\0" in data:
         raise InputError(
@@ -70,13 +103,15 @@ def _lines(path: Path) -> tuple[list[Line], list[Line]]:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     comments, lines = [], []
-    for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
+    split = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    for number, raw in enumerate(split, 1):
         line = raw.strip(" ")
         if line.startswith(COMMENT_MARKS):
             comments.append(Line(number, line.lstrip("".join(COMMENT_MARKS))))
         elif line.strip():
             lines.append(Line(number, line))
-    return comments, lines
+    cut = lines[-1] if lines and lines[-1].number == len(split) else None
+    return comments, lines, cut
 
 
 def _is_row(text: str, delimiter: str | None, width: int) -> bool:
@@ -128,6 +163,8 @@ def _is_number(cell: str) -> bool:
 
 def _check_width(path: Path, rows: list[Line], delimiter: str | None, width: int) -> None:
     for line in rows:
+        if delimiter is not None and line.text.count(delimiter) == width - 1:
+            continue  # nearly all lines, and twenty times as fast as to divide each
         found = len(_cells(line.text, delimiter))
         if found != width:
             raise InputError(

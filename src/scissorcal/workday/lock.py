@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass
 from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
-from scissorcal.files import remove_left_over
 
 if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace
@@ -25,7 +24,7 @@ _READ_ONLY = (errno.EROFS, errno.EACCES, errno.EPERM)
 def writing(
     workspace: "Workspace", command: str, tell: Callable[[str], None] = lambda sentence: None
 ) -> Iterator[None]:
-    """Hold the workspace for a command that writes results; parts of killed ones are removed.
+    """Hold the workspace for a command that writes results.
 
     The system gives the lock back when its process ends, however it ends: none is ever stale. A
     network folder may not carry it from one computer to another: the holder's name stands in the
@@ -55,7 +54,6 @@ def writing(
         file.write(json.dumps(asdict(holder)))
         with contextlib.suppress(OSError):  # a full disk: the lock itself takes no space
             file.flush()
-        _remove_left_over(workspace)
         try:
             yield
         finally:
@@ -86,14 +84,6 @@ def _holder(file: IO[str]) -> _Holder | None:
         )
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
-
-
-def _remove_left_over(workspace: "Workspace") -> None:
-    """Remove what killed commands left half-written; half a capture is recovered elsewhere."""
-    root = workspace.root
-    folders = [one for one in root.iterdir() if one.is_dir() and one != workspace.captures_dir]
-    for folder in (root, root / "fits" / "history", *folders):
-        remove_left_over(folder)
 
 
 def _refusal(workspace: "Workspace", holder: _Holder | None) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from scissorcal.errors import InputError, MissingError, file_error
-from scissorcal.files import replacing
+from scissorcal.files import remove_left_over, replacing
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -130,6 +130,12 @@ class Workspace:
     def scene_choice_path(self) -> Path:
         """What the scene needs of the fits, as it was worked out last."""
         return self.root / "package" / "scene-choice.json"
+
+    def remove_left_over(self) -> None:
+        """Remove what killed commands left half-written; half a capture is recovered elsewhere."""
+        inside = [one for one in self.root.iterdir() if one.is_dir() and one != self.captures_dir]
+        for folder in (self.root, self.root / "fits" / "history", *inside):
+            remove_left_over(folder)
 
     def relative(self, path: Path) -> str:
         """Name a file of the workspace as seen from its root."""

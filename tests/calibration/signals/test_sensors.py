@@ -7,9 +7,10 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.signals.filtering import low_pass
-from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors, resolution_of
+from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recording.resolution import resolution_of
 from tests.calibration.truth import Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")

@@ -9,6 +9,7 @@ from scissorcal.errors import InputError
 from scissorcal.model.friction_terms import TERMS, terms_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
+from scissorcal.recording.resolution import resolution_of
 
 FEWEST_BINS = 200
 LEAST_TRAVEL_S = 0.1
@@ -46,7 +47,7 @@ def _refuse_poor_motion(
             f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
             f"{len(bins.rate) * bins.bin_s:.2g} s of it moving). Friction needs at least "
             f"{FEWEST_BINS * bins.bin_s:.1g} s of motion: capture sweeps in both directions at "
-            "several speeds."
+            f"several speeds.{_coarse(recordings, every, joint)}"
         )
     if not (np.any(bins.rate > 0) and np.any(bins.rate < 0)):
         missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
@@ -59,6 +60,22 @@ def _refuse_poor_motion(
             f"{names}: the drive torque is constant while the joint moves; check the "
             "motor_torque column or the sensor's connection."
         )
+
+
+def _coarse(recordings: tuple[Recording, ...], every: Bins, joint: Joint) -> str:
+    """That the encoder's step hides the motion, where it has one and the sweeps are slower."""
+    steps = [resolution_of(np.asarray(one.samples["opening"], float)) for one in recordings]
+    step = max((one for one in steps if np.isfinite(one)), default=0.0)
+    moved = any(np.ptp(one.samples["opening"]) > step for one in recordings)
+    if not step or not every.rate_floor or not moved:
+        return ""
+    shown = f"{step:.3g} {joint.position_unit}"
+    if joint.kind == "rotary":
+        shown += f" ({np.degrees(step):.3g} deg)"
+    return (
+        f" The encoder's step of {shown} hides motion below {every.rate_floor:.2g} "
+        f"{joint.position_unit}/s: use a finer encoder, or faster sweeps."
+    )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.sensors import resolution_of
+from scissorcal.recording.resolution import resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

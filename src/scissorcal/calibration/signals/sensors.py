@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.resolution import resolution_of
 from scissorcal.verdicts import Verdict, judge
 
 Array = NDArray[np.float64]
@@ -43,7 +44,6 @@ STANDS_OUT = 2.0
 end than the longer runs at any level within."""
 WITHIN = 0.5
 """Least share of moving samples within the range, without which its ends are not judged."""
-STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
 """Flags of a device's state frame (docs/protocol.md)."""
 
@@ -118,23 +118,6 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
     return tuple(
         _inspect(name, np.asarray(samples[name], dtype=np.float64), moves, tick_s) for name in names
     )
-
-
-def resolution_of(values: Array) -> float:
-    """Step of a quantised channel (m,), NaN where its values are not multiples of one.
-
-    >>> f"{resolution_of(np.round(np.sin(np.arange(1000.0)) / 0.01) * 0.01):.6f}"
-    '0.010000'
-    """
-    levels = np.unique(values)
-    apart = np.diff(levels)
-    apart = apart[apart > SAME * np.ptp(values)]
-    if len(apart) < 2:
-        return float("nan")
-    least = float(apart.min())
-    step = float(apart.sum() / np.round(apart / least).sum())
-    away = np.abs(apart / step - np.round(apart / step))
-    return step if np.mean(away < NEAR_WHOLE) > STEADY_STEP else float("nan")
 
 
 def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S
 from scissorcal.calibration.signals.segments import edge_samples
-from scissorcal.calibration.signals.sensors import resolution_of
+from scissorcal.recording.resolution import resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import pieces_of, sheets_of
-from scissorcal.calibration.signals.sensors import resolution_of
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.resolution import resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

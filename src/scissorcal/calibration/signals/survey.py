@@ -1,0 +1,86 @@
+"""What a recording tells of its sensors before a fit: rate, steps, ends of range, dead bands."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.calibration.signals.sensors import Channel, channels_of
+from scissorcal.recording.layout import unit_of
+from scissorcal.recording.recording import Recording
+from scissorcal.recording.summarising import Gaps, find_gaps
+
+SPREAD = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class SensorSurvey:
+    """One channel in SI: its resolution, range, and shares of samples that do not measure.
+
+    ``step`` is None where none shows. ``at_low`` and ``at_high`` are the shares at the ends of the
+    range where the channel looks cut off there, ``dead`` that at exactly 0 while the joint moves.
+    """
+
+    channel: str
+    unit: str
+    constant: bool
+    step: float | None
+    low: float
+    high: float
+    at_low: float
+    at_high: float
+    dead: float
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Sampling, sensors and strokes of a recording.
+
+    ``interval_low_ms`` and ``interval_high_ms`` are the 5 % and 95 % quantiles of the time between
+    two samples, ``longest_ms`` the longest.
+    """
+
+    rate_Hz: float
+    interval_low_ms: float
+    interval_high_ms: float
+    longest_ms: float
+    gaps: Gaps
+    sensors: tuple[SensorSurvey, ...]
+    closings: int
+    openings: int
+
+
+def survey(recording: Recording, measured: Iterable[str]) -> Survey:
+    """Survey a recording of at least two samples; ``measured`` names the channels to look at."""
+    intervals_ms = 1e3 * np.diff(recording.device_time_s)
+    low_ms, high_ms = np.quantile(intervals_ms, SPREAD)
+    counts = Counter(stroke.kind for stroke in recording.strokes)
+    wanted = set(measured)
+    return Survey(
+        rate_Hz=1e3 / float(np.median(intervals_ms)),
+        interval_low_ms=float(low_ms),
+        interval_high_ms=float(high_ms),
+        longest_ms=float(intervals_ms.max()),
+        gaps=find_gaps(recording.samples),
+        sensors=tuple(
+            _sensor(recording, one) for one in channels_of(recording) if one.name in wanted
+        ),
+        closings=counts["closing"],
+        openings=counts["opening"],
+    )
+
+
+def _sensor(recording: Recording, channel: Channel) -> SensorSurvey:
+    values = recording.samples[channel.name]
+    return SensorSurvey(
+        channel=channel.name,
+        unit=unit_of(channel.name, recording.joint),
+        constant=channel.constant,
+        step=channel.step if np.isfinite(channel.step) else None,
+        low=channel.low,
+        high=channel.high,
+        at_low=float(np.mean(channel.saturated & (values == channel.low))),
+        at_high=float(np.mean(channel.saturated & (values == channel.high))),
+        dead=float(channel.dead.mean()),
+    )

@@ -1,0 +1,80 @@
+"""What a position sensor can tell apart: its step, its noise, and the least stroke that is one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.recording.recording import Joint
+
+Array = NDArray[np.float64]
+
+STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
+
+TRAVEL_SHARE = 0.05
+LEAST_TRAVEL = {"rotary": 5e-3, "linear": 5e-4}
+"""Least travel of a stroke: 5 % of the range, and 5 mrad or 0.5 mm."""
+STEPS_OF_STROKE = 3.0
+"""A resting encoder moves between two neighbouring values; with noise of a step, between three."""
+NOISE_OF_STROKE = 10.0
+"""Of 10^6 samples of white normal noise, the largest and the smallest lie 9.8 sd apart (mean)."""
+
+
+@dataclass(frozen=True)
+class StrokeThreshold:
+    """Least travel of a stroke [rad, or m], and in words what decided it."""
+
+    travel: float
+    reason: str
+
+
+def stroke_threshold(position: Array, joint: Joint) -> StrokeThreshold:
+    """Choose the least travel that noise and steps of the sensor ``position`` (m,) cannot make.
+
+    >>> angle = np.round(np.cos(np.arange(0.0, 30.0, 0.01)) / 0.1) * 0.1
+    >>> stroke_threshold(angle, Joint())
+    StrokeThreshold(travel=0.3, reason='3 steps of the sensor')
+    """
+    step, noise = resolution_of(position), noise_of(position)
+    choices = {
+        f"{TRAVEL_SHARE:.0%} of the range": TRAVEL_SHARE * float(np.ptp(position)),
+        f"the least for a {joint.kind} joint": LEAST_TRAVEL[joint.kind],
+        f"{STEPS_OF_STROKE:.0f} steps of the sensor": STEPS_OF_STROKE * step,
+        f"{NOISE_OF_STROKE:.0f} standard deviations of its noise": NOISE_OF_STROKE * noise,
+    }
+    known = {reason: travel for reason, travel in choices.items() if np.isfinite(travel)}
+    reason = max(known, key=lambda name: known[name])
+    return StrokeThreshold(float(f"{known[reason]:.6g}"), reason)
+
+
+def resolution_of(values: Array) -> float:
+    """Step of a quantised channel (m,), NaN where its values are not multiples of one.
+
+    >>> f"{resolution_of(np.round(np.sin(np.arange(1000.0)) / 0.01) * 0.01):.6f}"
+    '0.010000'
+    """
+    levels = np.unique(values)
+    apart = np.diff(levels)
+    apart = apart[apart > SAME * np.ptp(values)]
+    if len(apart) < 2:
+        return float("nan")
+    least = float(apart.min())
+    step = float(apart.sum() / np.round(apart / least).sum())
+    away = np.abs(apart / step - np.round(apart / step))
+    return step if np.mean(away < NEAR_WHOLE) > STEADY_STEP else float("nan")
+
+
+def noise_of(values: Array) -> float:
+    """Standard deviation of white noise on a smooth signal (m,), from second differences.
+
+    Those of white noise have six times its variance, those of a smooth motion vanish; the median
+    is not moved by turns. NaN for less than three values.
+
+    >>> rng = np.random.default_rng(0)
+    >>> round(noise_of(np.sin(np.arange(0, 9, 1e-3)) + rng.normal(0, 0.02, 9000)), 3)
+    0.02
+    """
+    if len(values) < 3:
+        return float("nan")
+    # 0.6745: the median of |x| for a standard normal x.
+    return float(np.median(np.abs(np.diff(values, 2))) / 0.6745 / np.sqrt(6.0))
