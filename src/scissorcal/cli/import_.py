@@ -113,8 +113,8 @@ def import_(
     workspace = None if output else open_workspace(folder)
     rig = workspace.recipe().rig if workspace else None
     radius_mm = handle_radius_mm if handle_radius_mm or not rig else rig.handle_radius_mm
-    chosen = {name: column_of(at) for name, at in _pairs("column", columns)}
-    unit_of, scale_of = dict(_pairs("unit", units)), dict(_pairs("scale", scales))
+    chosen = {name: column_of(at) for name, at in pairs("column", columns)}
+    unit_of, scale_of = dict(pairs("unit", units)), dict(pairs("scale", scales))
 
     def import_one(file: Path) -> _Imported:
         recording = import_table(
@@ -252,7 +252,7 @@ def _import_camera(file: Path, folder: Path | None) -> Answer:
     return Answer(result, text, fit.verdicts, files=[path])
 
 
-def _pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:
+def pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:
     """Read CHANNEL=... words; a channel may be given once."""
     pairs: list[tuple[str, str]] = []
     for word in given or ():

@@ -24,6 +24,7 @@ _COMMANDS = {
     "target": ("scissorcal.cli.target:target", "Sheets to print: camera board, mat, markers."),
     "capture": ("scissorcal.cli.capture:capture", "Record friction, cuts or photographs."),
     "import": ("scissorcal.cli.import_:import_", "Import a log (CSV, Parquet, .mat) or a camera."),
+    "summarise": ("scissorcal.cli.summarise:summarise", "Sum up force or torque over angle."),
     "export": ("scissorcal.cli.export:export", "Write a recording as Parquet or CSV."),
     "recording": ("scissorcal.cli.recording:recording", "Look into recordings."),
     "fit": ("scissorcal.cli.fit:fit", "Fit what the scene requires; cached."),

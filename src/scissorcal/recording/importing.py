@@ -141,7 +141,7 @@ def _check_request(
             f"{path}: no column is given for {' or '.join(wanted)}. Name one of them with "
             "-c CHANNEL=COLUMN."
         )
-    if "handle_force" in columns and not handle_radius_m > 0:
+    if wanted and "handle_force" in columns and not handle_radius_m > 0:
         raise InputError(
             f"{path}: handle_force needs the handle radius, which is not known. Give it."
         )

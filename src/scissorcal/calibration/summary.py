@@ -1,0 +1,397 @@
+"""What force or torque over an angle tells by itself: curves by direction, work, plateau, slope.
+
+Nothing here is a model of a cut. A stroke is the unit of every interval: samples within one share
+its friction, its sheet and its hand.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from scissorcal.errors import InputError
+from scissorcal.recording.recording import Recording, StrokeKind
+
+Array = NDArray[np.float64]
+Effort = Literal["motor_torque", "handle_force"]
+
+BINS = 60
+LEVEL = 0.90
+ENVELOPE = (0.1, 0.9)
+FEWEST = 3
+"""Strokes without which no interval is given."""
+EDGE = 0.05
+"""Share of a stroke's travel at either end that is left out: there the joint speeds up or stops."""
+SPEED_CLASS = 1.4
+"""Speeds further apart than this factor are different classes."""
+FLAT = 0.2
+"""On a plateau the mean curve stays within this share of its mean, all in all."""
+LEAST_PLATEAU = 0.15
+"""A plateau is at least this share of the range."""
+STEEP, WHOLE = 0.5, 0.8
+"""It rises at most half as steeply as the whole range, or is nearly the whole itself."""
+FULL_TURN_RAD = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean over strokes with its 90 % interval (None: fewer than three strokes)."""
+
+    value: float
+    low: float | None
+    high: float | None
+    strokes: int
+
+
+@dataclass(frozen=True)
+class Curves:
+    """The strokes of one direction: ``values`` (n, BINS) at the places of the grid.
+
+    ``speeds`` (n,) [rad/s, or m/s], ``work`` (n,) is the integral over the grid's range.
+    """
+
+    kind: StrokeKind
+    values: Array
+    speeds: Array
+    work: Array
+
+    @property
+    def mean(self) -> Array:
+        return np.asarray(self.values.mean(axis=0))
+
+    @property
+    def envelope(self) -> tuple[Array, Array]:
+        """The 10 % and 90 % quantiles over strokes, (BINS,) each."""
+        low, high = np.quantile(self.values, ENVELOPE, axis=0)
+        return low, high
+
+
+@dataclass(frozen=True)
+class SpeedClass:
+    """Strokes of one direction and of about one speed, and their mean over the range."""
+
+    kind: StrokeKind
+    speed: float
+    level: Interval
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """Where the mean curve is level: from ``low`` to ``high`` [rad, or m], and how high."""
+
+    low: float
+    high: float
+    level: Interval
+
+
+@dataclass(frozen=True)
+class LogSummary:
+    """One log on the grid ``places`` (BINS,). Resistance is positive while closing is resisted.
+
+    ``left_out`` strokes do not reach over the range. ``turned`` says that the sign was changed.
+    ``drift`` is the change of a closing stroke's mean from one to the next.
+    """
+
+    source: str
+    places: Array
+    closing: Curves
+    opening: Curves | None
+    speeds: tuple[SpeedClass, ...]
+    mean: Interval
+    work: Interval
+    drift: Interval
+    left_out: int
+    turned: bool
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One log minus another: the mean curves with a pointwise interval (BINS,), and their means.
+
+    ``work`` is that of a closing stroke over the range, ``slope`` the change of the difference
+    along the range, ``excludes_zero`` whether the interval of ``mean`` leaves out 0.
+    """
+
+    curve: Array
+    low: Array | None
+    high: Array | None
+    mean: Interval
+    work: Interval
+    slope: Interval
+    plateau: Plateau | None
+
+    @property
+    def excludes_zero(self) -> bool | None:
+        if self.mean.low is None or self.mean.high is None:
+            return None
+        return not self.mean.low <= 0.0 <= self.mean.high
+
+
+def common_places(recordings: Sequence[Recording]) -> Array:
+    """The grid that most strokes of all recordings reach over: centres of BINS bins.
+
+    Raises InputError where a recording has no closing stroke, or the ranges have no common part.
+    """
+    ends = [_range_of(recording) for recording in recordings]
+    low, high = max(a for a, _ in ends), min(b for _, b in ends)
+    if high - low < 0.1 * min(b - a for a, b in ends):
+        listed = "; ".join(
+            f"{recording.source}: {a:.3g} to {b:.3g} {recording.joint.position_unit}"
+            for recording, (a, b) in zip(recordings, ends, strict=True)
+        )
+        raise InputError(
+            f"The logs have no common range of opening ({listed}): compare strokes over the same "
+            "range, and check units and zero of the angle."
+        )
+    edges = np.linspace(low, high, BINS + 1)
+    return np.asarray(0.5 * (edges[1:] + edges[:-1]))
+
+
+def summarise(recording: Recording, effort: Effort, places: Array) -> LogSummary:
+    """Sum up a recording on the grid ``places``, of :func:`common_places`.
+
+    ``effort`` is the channel: ``motor_torque``, or ``handle_force`` as a force, or as a torque
+    where the recording has a handle radius. Raises InputError where the channel is constant or too
+    few strokes reach over the range.
+    """
+    values = effort_of(recording, effort)
+    if float(np.ptp(values)) == 0.0:
+        raise InputError(
+            f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "
+            "check the sensor."
+        )
+    closing, left_out = _curves(recording, values, places, "closing")
+    opening, other = _curves(recording, values, places, "opening")
+    if closing is None:
+        raise InputError(
+            f"{recording.source}: no closing stroke reaches over the range from {places[0]:.3g} to "
+            f"{places[-1]:.3g} {recording.joint.position_unit}: give a smaller --min-travel, or "
+            "another log."
+        )
+    turned = float(np.median(closing.values)) < 0.0
+    if turned:
+        closing = _negated(closing)
+        opening = None if opening is None else _negated(opening)
+    every = (closing, *((opening,) if opening else ()))
+    return LogSummary(
+        source=recording.source,
+        places=places,
+        closing=closing,
+        opening=opening,
+        speeds=tuple(one for curves in every for one in _classes(curves)),
+        mean=mean_interval(closing.values.mean(axis=1)),
+        work=mean_interval(closing.work),
+        drift=_trend(closing.values.mean(axis=1)),
+        left_out=left_out + other,
+        turned=turned,
+    )
+
+
+def difference(one: LogSummary, other: LogSummary) -> Difference:
+    """Closing strokes of ``one`` minus those of ``other``, on one grid (Welch's t-intervals)."""
+    places, (a, b) = one.places, (one.closing.values, other.closing.values)
+    low = high = None
+    if min(len(a), len(b)) >= FEWEST:
+        each = [difference_interval(x, y) for x, y in zip(a.T, b.T, strict=True)]
+        low = np.array([entry.low for entry in each], dtype=np.float64)
+        high = np.array([entry.high for entry in each], dtype=np.float64)
+    curve = a.mean(axis=0) - b.mean(axis=0)
+    found = plateau_of(curve, places)
+    plateau = None
+    if found is not None:
+        chosen = slice(*found)
+        level = difference_interval(a[:, chosen].mean(axis=1), b[:, chosen].mean(axis=1))
+        plateau = Plateau(float(places[found[0]]), float(places[found[1] - 1]), level)
+    return Difference(
+        curve,
+        low,
+        high,
+        mean=difference_interval(a.mean(axis=1), b.mean(axis=1)),
+        work=difference_interval(one.closing.work, other.closing.work),
+        slope=difference_interval(_slopes(a, places), _slopes(b, places)),
+        plateau=plateau,
+    )
+
+
+def plateau_in(found: LogSummary) -> Plateau | None:
+    """The plateau of the closing strokes of one log; None where their mean has none."""
+    place = plateau_of(found.closing.mean, found.places)
+    if place is None:
+        return None
+    level = mean_interval(found.closing.values[:, slice(*place)].mean(axis=1))
+    return Plateau(float(found.places[place[0]]), float(found.places[place[1] - 1]), level)
+
+
+def slope_in(found: LogSummary) -> Interval:
+    """Change of the closing resistance along the range, per rad (or m): local sharpness."""
+    return mean_interval(_slopes(found.closing.values, found.places))
+
+
+def friction_of(blank: LogSummary) -> Interval | None:
+    """Half the difference of closing and opening without material; None without openings.
+
+    Weight, springs and the sensor's zero are alike in both directions and drop out.
+    """
+    if blank.opening is None:
+        return None
+    closing, opening = blank.closing.values.mean(axis=1), blank.opening.values.mean(axis=1)
+    return difference_interval(0.5 * closing, 0.5 * opening)
+
+
+def effort_of(recording: Recording, effort: Effort) -> Array:
+    """The channel (N,): a force becomes a torque where the handle's radius is known."""
+    values = np.asarray(recording.samples[effort], dtype=np.float64)
+    if effort == "handle_force" and np.isfinite(recording.handle_radius_m):
+        return values * recording.handle_radius_m
+    return values
+
+
+def effort_unit(recording: Recording, effort: Effort) -> str:
+    """Unit of :func:`effort_of`."""
+    if effort == "handle_force" and not np.isfinite(recording.handle_radius_m):
+        return "N"
+    return recording.joint.effort_unit
+
+
+def plateau_of(curve: Array, places: Array) -> tuple[int, int] | None:
+    """First bin and the one past the last of the longest level part of ``curve`` (BINS,)."""
+    best: tuple[int, int] | None = None
+    least = max(2, round(LEAST_PLATEAU * len(places)))
+    steepness = float(np.ptp(curve)) / len(curve)
+    for first in range(len(curve)):
+        low = high = total = curve[first]
+        for after in range(first + 2, len(curve) + 1):
+            value = curve[after - 1]
+            low, high, total = min(low, value), max(high, value), total + value
+            if high - low > FLAT * abs(total / (after - first)):
+                break
+            size = after - first
+            # A steady rise is no plateau, however high it stands: it is as steep as the whole.
+            level = size >= WHOLE * len(curve) or (high - low) / size < STEEP * steepness
+            if size >= least and level and (best is None or size > best[1] - best[0]):
+                best = (first, after)
+    return best
+
+
+def mean_interval(values: Array) -> Interval:
+    """Mean of values (n,), one a stroke, with Student's 90 % interval."""
+    count, mean = len(values), float(np.mean(values))
+    if count < FEWEST:
+        return Interval(mean, None, None, count)
+    reach = _t(count - 1) * float(np.std(values, ddof=1)) / np.sqrt(count)
+    return Interval(mean, mean - reach, mean + reach, count)
+
+
+def difference_interval(one: Array, other: Array) -> Interval:
+    """Difference of two means with Welch's 90 % interval (doi:10.1093/biomet/34.1-2.28)."""
+    value, count = float(np.mean(one) - np.mean(other)), min(len(one), len(other))
+    if count < FEWEST:
+        return Interval(value, None, None, count)
+    a, b = np.var(one, ddof=1) / len(one), np.var(other, ddof=1) / len(other)
+    if a + b == 0.0:
+        return Interval(value, value, value, count)
+    freedom = (a + b) ** 2 / (a**2 / (len(one) - 1) + b**2 / (len(other) - 1))
+    reach = _t(float(freedom)) * float(np.sqrt(a + b))
+    return Interval(value, value - reach, value + reach, count)
+
+
+def _t(freedom: float) -> float:
+    return float(stats.t.ppf(0.5 + 0.5 * LEVEL, freedom))
+
+
+def _trend(values: Array) -> Interval:
+    """Slope of values (n,) over their number, with the 90 % interval of least squares."""
+    count = len(values)
+    if count < FEWEST:
+        return Interval(0.0, None, None, count)
+    fitted = stats.linregress(np.arange(count), values)
+    reach = _t(count - 2) * float(fitted.stderr)
+    slope = float(fitted.slope)
+    return Interval(slope, slope - reach, slope + reach, count)
+
+
+def _range_of(recording: Recording) -> tuple[float, float]:
+    """The range of opening that at least half of the closing strokes reach over."""
+    opening = np.asarray(recording.samples["opening"], dtype=np.float64)
+    unit = recording.joint.position_unit
+    if unit == "rad" and np.ptp(opening) > FULL_TURN_RAD:
+        raise InputError(
+            f"{recording.source}: the opening covers {np.ptp(opening):.3g} rad, more than a full "
+            "turn: if its column is in degrees, state it with -u opening=deg."
+        )
+    kinds = [stroke.index for stroke in recording.strokes if stroke.kind == "closing"]
+    parts = [opening[recording.samples["stroke"] == index] for index in kinds]
+    parts = [part for part in parts if len(part) > 2]
+    if not parts:
+        raise InputError(
+            f"{recording.source} has no closing stroke: the angle falls while the tool closes; if "
+            "it grows, give the scale -1 (-s opening=-1)."
+        )
+    low = float(np.median([part.min() for part in parts]))
+    high = float(np.median([part.max() for part in parts]))
+    margin = EDGE * (high - low)
+    return low + margin, high - margin
+
+
+def _curves(
+    recording: Recording, values: Array, places: Array, kind: StrokeKind
+) -> tuple[Curves | None, int]:
+    """The strokes of one direction that reach over the grid, and how many do not."""
+    opening = np.asarray(recording.samples["opening"], dtype=np.float64)
+    half = 0.5 * (places[1] - places[0])
+    edges = np.append(places - half, places[-1] + half)
+    rows, speeds, left_out = [], [], 0
+    for stroke in recording.strokes:
+        if stroke.kind != kind:
+            continue
+        own = recording.samples["stroke"] == stroke.index
+        curve = _binned(opening[own], values[own], edges)
+        if curve is None:
+            left_out += 1
+            continue
+        rows.append(curve)
+        speeds.append(stroke.speed)
+    if not rows:
+        return None, left_out
+    table = np.array(rows)
+    work = table.mean(axis=1) * (edges[-1] - edges[0])
+    return Curves(kind, table, np.array(speeds), work), left_out
+
+
+def _binned(opening: Array, values: Array, edges: Array) -> Array | None:
+    """Mean in each bin, between neighbours where a bin is empty; None where the ends are."""
+    inside = (opening >= edges[0]) & (opening < edges[-1])
+    index = np.clip(np.searchsorted(edges, opening[inside], side="right") - 1, 0, len(edges) - 2)
+    counts = np.bincount(index, minlength=len(edges) - 1)
+    seen = np.flatnonzero(counts)
+    reach = max(1, round(EDGE * len(counts)))
+    if len(seen) < 2 or seen[0] > reach or seen[-1] < len(counts) - 1 - reach:
+        return None
+    sums = np.bincount(index, values[inside], minlength=len(edges) - 1)
+    return np.asarray(np.interp(np.arange(len(counts)), seen, sums[seen] / counts[seen]))
+
+
+def _classes(curves: Curves) -> list[SpeedClass]:
+    """Strokes grouped by speed, slow ones first."""
+    order = np.argsort(curves.speeds)
+    speeds = curves.speeds[order]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.flatnonzero(speeds[1:] / speeds[:-1] > SPEED_CLASS) + 1
+    means = curves.values.mean(axis=1)[order]
+    return [
+        SpeedClass(curves.kind, float(np.median(own)), mean_interval(level))
+        for own, level in zip(np.split(speeds, apart), np.split(means, apart), strict=True)
+    ]
+
+
+def _slopes(values: Array, places: Array) -> Array:
+    """Least-squares slope of each row of values (n, BINS) over the places."""
+    away = places - places.mean()
+    return np.asarray(values @ away / (away @ away))
+
+
+def _negated(curves: Curves) -> Curves:
+    return Curves(curves.kind, -curves.values, curves.speeds, -curves.work)

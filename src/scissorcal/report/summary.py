@@ -1,0 +1,315 @@
+"""The page of `summarise`: force or torque over the angle, by direction, and what it adds up to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Look,
+    Panel,
+    Row,
+    Series,
+    Value,
+    band,
+    curve,
+    number,
+    points,
+    words,
+)
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.summary import (
+        Array,
+        Curves,
+        Difference,
+        Interval,
+        LogSummary,
+        Plateau,
+    )
+
+PART = "summary"
+LOOKS: dict[str, Look] = {"closing": "closing", "opening": "opening"}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """All that the page shows. ``against`` is "blank" or "other", as the second log was given.
+
+    ``unit`` is that of the resistance, ``place`` that of the opening in SI ("rad" or "m");
+    ``cut_length_m`` the length that one stroke cuts, where it was stated.
+    """
+
+    log: LogSummary
+    second: LogSummary | None
+    against: str
+    apart: Difference | None
+    plateau: Plateau | None
+    slope: Interval
+    friction: Interval | None
+    unit: str
+    place: str
+    cut_length_m: float | None
+    created: datetime
+    version: str
+
+    @property
+    def has_work(self) -> bool:
+        """A force over an angle has none: without its lever it is no torque."""
+        return not (self.unit == "N" and self.place == "rad")
+
+
+def summary_page(shown: Shown) -> str:
+    """The offline page."""
+    panels = summary_panels(shown)
+    made = made_line(shown.created.strftime("%Y-%m-%d %H:%M %Z"), shown.version)
+    title = "Force over angle" if shown.unit == "N" else "Torque over angle"
+    named = f"{shown.log.source}"
+    if shown.second:
+        named += f", against {shown.second.source}"
+    body = (
+        f'<main><section id="decision" class="plain"><p class="kicker">{title}</p>'
+        f"<h1>{prose(named)}</h1>"
+        f'<p class="finding">{prose(panels[0].sentence)}</p>{made}</section>'
+        f"{parts_nav([(panel.id, panel.title) for panel in panels])}"
+    )
+    said = panels[0].sentence
+    body += "".join(panel_section(panel, open_=True, above=said) for panel in panels)
+    return whole_page(f"{title}: {shown.log.source}", body + "</main>")
+
+
+def summary_panels(shown: Shown) -> list[Panel]:
+    """The panels in order: figures, curves, second log, strokes one by one, what is missing."""
+    found = [_figures(shown), _curves(shown)]
+    if shown.apart is not None:
+        found.append(_difference(shown, shown.apart))
+    return [*found, _strokes(shown), _missing(shown)]
+
+
+def _figures(shown: Shown) -> Panel:
+    log, place = shown.log, _place_unit(shown)
+    rows = [_row("closing, mean", log.mean, shown.unit, "over the range, positive: resists")]
+    if shown.has_work:
+        rows.append(_row("work of a closing stroke", log.work, "J"))
+        if shown.cut_length_m:
+            rows.append(
+                _row("work per length of cut", _times(log.work, 1.0 / shown.cut_length_m), "J/m")
+            )
+    if shown.plateau:
+        low, high = (_in_shown(shown, end) for end in (shown.plateau.low, shown.plateau.high))
+        note = f"level from {low:.3g} to {high:.3g} {place}"
+        rows.append(_row("plateau, closing", shown.plateau.level, shown.unit, note))
+    slope = _times(shown.slope, _per(shown))
+    rows.append(_row("slope, closing", slope, f"{shown.unit}/{place}"))
+    if shown.friction:
+        rows.append(
+            _row(
+                "half of closing minus opening",
+                shown.friction,
+                shown.unit,
+                "friction, where no material is between the blades",
+            )
+        )
+    rows.append(_row("drift from stroke to stroke", log.drift, shown.unit))
+    for one in log.speeds:
+        speed = _in_shown(shown, one.speed)
+        rows.append(_row(f"{one.kind} at {speed:.3g} {place}/s", one.level, shown.unit))
+    return Panel(
+        "figures",
+        PART,
+        "Figures",
+        _sentence(shown),
+        rows=tuple(rows),
+        notes=_notes(shown),
+        caption="Means over strokes with 90 % intervals by Student's t; a stroke is the unit.",
+    )
+
+
+def _sentence(shown: Shown) -> str:
+    count = shown.log.mean.strokes
+    ends = [_in_shown(shown, float(end)) for end in (shown.log.places[0], shown.log.places[-1])]
+    told = (
+        f"{count} closing strokes from {ends[0]:.3g} to {ends[1]:.3g} {_place_unit(shown)}: "
+        f"a mean of {_words(shown.log.mean, shown.unit)}"
+    )
+    if shown.apart is None:
+        return f"{told}."
+    what = "more than the blank" if shown.against == "blank" else "more than the other log"
+    told += f"; {_words(shown.apart.mean, shown.unit)} {what}"
+    if shown.apart.excludes_zero is None:
+        return f"{told} (fewer than 3 strokes: no interval)."
+    leaves = "does not contain 0" if shown.apart.excludes_zero else "contains 0"
+    return f"{told}: the interval {leaves}."
+
+
+def _notes(shown: Shown) -> tuple[str, ...]:
+    found = []
+    for log in (shown.log, *((shown.second,) if shown.second else ())):
+        if log.turned:
+            found.append(
+                f"{log.source}: the sign was changed, so that what resists closing is positive."
+            )
+        if log.left_out:
+            found.append(f"{log.source}: {log.left_out} strokes do not reach over the range.")
+        if log.mean.low is None:
+            found.append(f"{log.source}: fewer than 3 closing strokes, so there is no interval.")
+    return tuple(found)
+
+
+def _curves(shown: Shown) -> Panel:
+    charts = [_chart("curves", shown, shown.log)]
+    if shown.second:
+        charts.append(_chart("second-curves", shown, shown.second))
+    return Panel(
+        "curves",
+        PART,
+        "Curves by direction",
+        charts=tuple(charts),
+        caption="Lines: means over strokes. Bands: 10 % and 90 % quantiles over strokes.",
+    )
+
+
+def _chart(id_: str, shown: Shown, log: LogSummary) -> Chart:
+    series = _curve(shown, log.closing)
+    if log.opening:
+        series += _curve(shown, log.opening)
+    return Chart(
+        id_,
+        f"Strokes of {log.source}",
+        Axis("opening", _place_unit(shown)),
+        Axis("resistance", shown.unit),
+        tuple(series),
+        caption="Lines: means over strokes; bands: 10 % to 90 % of the strokes.",
+    )
+
+
+def _curve(shown: Shown, found: Curves) -> list[Series]:
+    x, look = _places(shown), LOOKS[found.kind]
+    low, high = found.envelope
+    return [
+        band(f"{found.kind}, 10 to 90 %", x, low, high, look),
+        curve(f"{found.kind}, mean", x, found.mean, look),
+    ]
+
+
+def _difference(shown: Shown, apart: Difference) -> Panel:
+    x = _places(shown)
+    name = "log minus blank" if shown.against == "blank" else "first minus second"
+    series = [curve(name, x, apart.curve, "blue")]
+    if apart.low is not None and apart.high is not None:
+        series.insert(0, band("90 % interval, pointwise", x, apart.low, apart.high, "blue"))
+    rows = [_row("mean", apart.mean, shown.unit)]
+    if shown.has_work:
+        rows.append(_row("work of a closing stroke", apart.work, "J"))
+        if shown.cut_length_m:
+            per_m = _times(apart.work, 1.0 / shown.cut_length_m)
+            rows.append(_row("work per length of cut", per_m, "J/m"))
+    if apart.plateau:
+        low, high = (_in_shown(shown, end) for end in (apart.plateau.low, apart.plateau.high))
+        note = f"level from {low:.3g} to {high:.3g} {_place_unit(shown)}"
+        rows.append(_row("plateau", apart.plateau.level, shown.unit, note))
+    rows.append(
+        _row("slope", _times(apart.slope, _per(shown)), f"{shown.unit}/{_place_unit(shown)}")
+    )
+    return Panel(
+        "difference",
+        PART,
+        "Log minus blank" if shown.against == "blank" else "First log minus second",
+        rows=tuple(rows),
+        charts=(
+            Chart(
+                "difference-chart",
+                f"Closing: {name}",
+                Axis("opening", _place_unit(shown)),
+                Axis("resistance", shown.unit),
+                tuple(series),
+            ),
+        ),
+        caption="Closing strokes; 90 % intervals by Welch's t over strokes.",
+    )
+
+
+def _strokes(shown: Shown) -> Panel:
+    series = []
+    logs: tuple[tuple[LogSummary | None, Look], ...] = (
+        (shown.log, "blue"),
+        (shown.second, "orange"),
+    )
+    for log, look in logs:
+        if log is None:
+            continue
+        values = log.closing.work if shown.has_work else log.closing.values.mean(axis=1)
+        series.append(points(log.source, np.arange(1, len(values) + 1), values, look))
+    what, unit = ("work", "J") if shown.has_work else ("mean resistance", shown.unit)
+    chart = Chart(
+        "strokes-chart",
+        f"Closing strokes one by one: {what}",
+        Axis("closing stroke"),
+        Axis(what, unit),
+        tuple(series),
+    )
+    return Panel("strokes", PART, "Strokes one by one", charts=(chart,))
+
+
+def _missing(shown: Shown) -> Panel:
+    needs = []
+    if not shown.has_work:
+        needs.append(("work", "the lever of the force: --handle-radius-mm"))
+    if shown.against != "blank":
+        needs.append(("friction apart from cutting", "a log of empty strokes: --blank LOG"))
+    if shown.log.opening is None:
+        needs.append(("friction from the log itself", "opening strokes as well as closing ones"))
+    if shown.has_work and not shown.cut_length_m:
+        needs.append(("work per length of cut", "that length: --cut-length-mm"))
+    needs.append(
+        (
+            "toughness, response to indentation, sharpness of the edge",
+            "a calibration: the blades' geometry, empty sweeps at several speeds, and cuts at "
+            "several places of the sheet ('scissorcal init', then 'scissorcal plan')",
+        )
+    )
+    return Panel(
+        "missing",
+        PART,
+        "What more would need",
+        rows=tuple(Row(name, (words("needs", what),)) for name, what in needs),
+    )
+
+
+def _row(name: str, found: Interval, unit: str, note: str = "") -> Row:
+    value: Value = number("mean", found.value, unit, low=found.low, high=found.high)
+    return Row(name, (value, Value("strokes", found.strokes)), note)
+
+
+def _words(found: Interval, unit: str) -> str:
+    return f"{number('', found.value, unit, low=found.low, high=found.high)} {unit}"
+
+
+def _times(found: Interval, factor: float) -> Interval:
+    from scissorcal.calibration.summary import Interval as New
+
+    ends = [None if end is None else factor * end for end in (found.low, found.high)]
+    return New(factor * found.value, ends[0], ends[1], found.strokes)
+
+
+def _place_unit(shown: Shown) -> str:
+    return "deg" if shown.place == "rad" else "mm"
+
+
+def _per(shown: Shown) -> float:
+    """From a slope per rad (or m) to one per deg (or mm)."""
+    return float(np.pi / 180.0) if shown.place == "rad" else 1e-3
+
+
+def _in_shown(shown: Shown, value: float) -> float:
+    return value / _per(shown)
+
+
+def _places(shown: Shown) -> Array:
+    return np.asarray(shown.log.places / _per(shown))

@@ -1,0 +1,204 @@
+"""Force or torque over angle, summed up: closed forms, recovery, and how often intervals hold.
+
+Logs are made here, by sums of a few plain terms, with noise, steps, drift and an effect of speed.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from scissorcal.calibration.summary import (
+    BINS,
+    LogSummary,
+    common_places,
+    difference,
+    difference_interval,
+    effort_unit,
+    friction_of,
+    mean_interval,
+    plateau_in,
+    plateau_of,
+    slope_in,
+    summarise,
+)
+from scissorcal.errors import InputError
+from scissorcal.recording import Joint, Recording
+from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.strokes import label_strokes
+
+LOW, HIGH = 0.2, 1.0
+RATE_HZ = 250.0
+
+
+@dataclass(frozen=True)
+class Made:
+    """Torque of closing: ``level`` + ``slope`` (opening - 0.6) + friction; opening: - friction."""
+
+    level: float = 0.10
+    slope: float = 0.0
+    friction: float = 0.03
+    strokes: int = 8
+    stroke_sd: float = 0.0
+    noise: float = 0.0
+    step: float = 0.0
+    drift: float = 0.0
+    speeds: tuple[float, ...] = (0.8,)
+    per_speed: float = 0.0
+    sign: float = 1.0
+
+
+def log(made: Made, seed: int = 0) -> Recording:
+    rng = np.random.default_rng(seed)
+    opening, torque = [], []
+    for number in range(made.strokes):
+        speed = made.speeds[number % len(made.speeds)]
+        count = round((HIGH - LOW) / speed * RATE_HZ)
+        down = np.linspace(HIGH, LOW, count)
+        own = rng.normal(0.0, made.stroke_sd) if made.stroke_sd else 0.0
+        cut = made.level + made.slope * (down - 0.6) + own + made.drift * number
+        cut = cut + made.per_speed * speed + made.friction
+        opening += [down, down[::-1]]
+        torque += [cut, np.full(count, made.level * 0.0 - made.friction)]
+    place = np.concatenate(opening)
+    values = made.sign * (np.concatenate(torque) + rng.normal(0.0, 1.0, len(place)) * made.noise)
+    if made.step:
+        place = np.round(place / made.step) * made.step
+    samples = empty_samples(len(place))
+    samples["opening"], samples["motor_torque"] = place, values
+    samples["device_time_us"] = np.rint(np.arange(len(place)) * 1e6 / RATE_HZ)
+    labels = label_strokes(place, samples["device_time_us"] * 1e-6, 0.1)
+    samples["stroke"] = labels.stroke_of_sample
+    return Recording("cut", samples, labels.strokes, Joint(), source=f"log{seed}.csv")
+
+
+def summed(*made: Recording) -> tuple[LogSummary, ...]:
+    places = common_places(made)
+    return tuple(summarise(one, "motor_torque", places) for one in made)
+
+
+def test_a_plain_log_has_its_closed_form() -> None:
+    (found,) = summed(log(Made(slope=-0.05)))
+    span = found.places[-1] - found.places[0]
+    width = span * BINS / (BINS - 1)
+    assert found.mean.value == pytest.approx(0.13, rel=1e-3)
+    assert found.work.value == pytest.approx(0.13 * width, rel=1e-3)
+    assert slope_in(found).value == pytest.approx(-0.05, rel=1e-3)
+    assert (found.mean.strokes, found.left_out, found.turned) == (8, 0, False)
+    assert found.opening is not None
+    assert found.opening.mean == pytest.approx(np.full(BINS, -0.03), rel=1e-6)
+    # Half of closing minus opening: the level of closing alone is halved with it.
+    half = friction_of(found)
+    assert half is not None
+    assert half.value == pytest.approx(0.5 * (0.13 + 0.03), rel=1e-3)
+
+
+def test_the_blank_gives_friction_and_the_difference_the_cut() -> None:
+    cut, blank = summed(log(Made()), log(Made(level=0.0)))
+    apart = difference(cut, blank)
+    assert apart.mean.value == pytest.approx(0.10, rel=1e-6)
+    assert apart.curve == pytest.approx(np.full(BINS, 0.10), rel=1e-6)
+    assert apart.excludes_zero is True
+    friction = friction_of(blank)
+    assert friction is not None
+    assert friction.value == pytest.approx(0.03, rel=1e-6)
+
+
+def test_a_sign_that_is_the_other_way_round_is_changed_and_told() -> None:
+    (found,) = summed(log(Made(sign=-1.0)))
+    assert found.turned
+    assert found.mean.value == pytest.approx(0.13, rel=1e-3)
+
+
+def test_speeds_are_classes_of_their_own() -> None:
+    (found,) = summed(log(Made(speeds=(0.4, 1.2), per_speed=0.02)))
+    closing = [one for one in found.speeds if one.kind == "closing"]
+    assert [round(one.speed, 1) for one in closing] == [0.4, 1.2]
+    assert [one.level.value for one in closing] == pytest.approx([0.138, 0.154], rel=1e-3)
+    assert [one.level.strokes for one in closing] == [4, 4]
+
+
+@pytest.mark.parametrize(("level", "start", "end"), [(1.0, 20, 50), (-0.3, 0, 60), (5e-6, 5, 15)])
+def test_a_plateau_is_found_where_it_is(level: float, start: int, end: int) -> None:
+    curve = np.linspace(3.0, 9.0, BINS) * abs(level) * np.where(np.arange(BINS) % 2, 1.0, -1.0)
+    curve[start:end] = level
+    places = np.linspace(0.2, 0.8, BINS)
+    assert plateau_of(curve, places) == (start, end)
+
+
+def test_a_slope_throughout_is_no_plateau() -> None:
+    assert plateau_of(np.linspace(1.0, 30.0, BINS), np.linspace(0.0, 1.0, BINS)) is None
+    (found,) = summed(log(Made(slope=-1.0, level=0.5)))
+    plateau = plateau_in(found)
+    assert plateau is None or plateau.high - plateau.low < 0.3
+
+
+def test_fewer_than_three_strokes_have_no_interval() -> None:
+    cut, blank = summed(log(Made(strokes=2)), log(Made(level=0.0)))
+    assert (cut.mean.low, cut.mean.high, cut.mean.strokes) == (None, None, 2)
+    apart = difference(cut, blank)
+    assert (apart.low, apart.mean.low, apart.excludes_zero) == (None, None, None)
+
+
+def test_equal_strokes_have_an_interval_of_no_width() -> None:
+    assert difference_interval(np.ones(4), np.zeros(5)).low == 1.0
+    assert mean_interval(np.ones(4)).high == 1.0
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: [log(Made(level=0.0, friction=0.0))], "motor_torque is constant at 0"),
+        (lambda: [_moved(log(Made()), 0.0), _moved(log(Made()), 2.0)], "no common range"),
+        (lambda: [_moved(log(Made()), 0.0, 57.3)], "-u opening=deg"),
+        (lambda: [_without_strokes(log(Made()))], "has no closing stroke"),
+    ],
+)
+def test_what_cannot_be_summed_up_is_refused(made: object, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        summed(*made())  # type: ignore[operator]
+
+
+def _moved(recording: Recording, by: float, times: float = 1.0) -> Recording:
+    recording.samples["opening"] = times * (recording.samples["opening"] + by)
+    return recording
+
+
+def _without_strokes(recording: Recording) -> Recording:
+    recording.samples["stroke"] = -1
+    return replace(recording, strokes=())
+
+
+def test_a_force_without_a_lever_stays_a_force() -> None:
+    made = log(Made())
+    assert math.isnan(made.handle_radius_m)
+    assert (effort_unit(made, "handle_force"), effort_unit(made, "motor_torque")) == ("N", "N m")
+
+
+@pytest.mark.slow
+def test_intervals_hold_as_often_as_they_state() -> None:
+    """90 % intervals of mean, work, slope and difference, over 400 pairs of logs.
+
+    Outside 360 +- 5 binomial standard deviations (6.0) by chance: once in 10^6 for each of four.
+    The truth has coloured angle steps, noise, and an effect of speed that is alike in all strokes.
+    """
+    held = {"mean": 0, "slope": 0, "difference": 0, "work": 0}
+    for seed in range(400):
+        truth = Made(slope=-0.05, strokes=6, stroke_sd=0.01, noise=0.02, step=0.004)
+        other = Made(slope=-0.05, level=0.12, strokes=9, stroke_sd=0.02, noise=0.02, step=0.004)
+        one, two = summed(log(truth, 1000 + seed), log(other, 5000 + seed))
+        apart = difference(two, one)
+        middle = float(one.places.mean())
+        width = (one.places[1] - one.places[0]) * BINS
+        mean = 0.13 - 0.05 * (middle - 0.6)
+        for name, found, true in (
+            ("mean", one.mean, mean),
+            ("work", one.work, mean * width),
+            ("slope", slope_in(one), -0.05),
+            ("difference", apart.mean, 0.02),
+        ):
+            assert found.low is not None
+            assert found.high is not None
+            held[name] += found.low <= true <= found.high
+    assert all(330 <= count <= 390 for count in held.values()), held

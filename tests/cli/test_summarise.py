@@ -1,0 +1,110 @@
+"""``scissorcal summarise``: the terminal, the page, JSON, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Cli
+
+COLUMNS = ("-c", "time=t_s", "-c", "opening=angle_deg", "-c", "handle_force=force_N")
+LEVER = ("--handle-radius-mm", "60")
+DATA = Path(__file__).parents[3] / "shared" / "data" / "mis_tool_friction"
+
+
+def logged(path: Path, cut_N: float, seed: int) -> Path:
+    """Eight closings and openings: friction of 0.5 N, and the cut while closing."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 16.0, 0.005)
+    angle = 30.0 + 25.0 * np.cos(np.pi * time)
+    force = np.where(np.sin(np.pi * time) > 0, 0.5 + cut_N, -0.5) + rng.normal(0, 0.05, len(time))
+    rows = [f"{t:.3f},{a:.2f},{f:.3f}" for t, a, f in zip(time, angle, force, strict=True)]
+    path.write_text("\n".join(["t_s,angle_deg,force_N", *rows, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def value_of(said: dict[str, object], panel: str, row: str) -> dict[str, float]:
+    (found,) = [one for one in said["panels"] if one["id"] == panel]  # type: ignore[index, attr-defined]
+    (own,) = [one for one in found["rows"] if one["name"] == row]
+    return dict(own["values"][0])
+
+
+def test_cut_minus_blank_on_terminal_page_and_json(here: Path, cli: Cli) -> None:
+    logged(here / "cut.csv", 2.0, 1), logged(here / "blank.csv", 0.0, 2)
+    words = ("summarise", "cut.csv", "--blank", "blank.csv", *COLUMNS, *LEVER)
+    said = cli(*words, "--cut-length-mm", "40")
+    assert said.code == 0, said.err
+    assert "8 closing strokes" in said.out
+    assert "more than the blank: the interval does not contain 0" in said.out
+    page = (here / "summary.html").read_text(encoding="utf-8")
+    assert "Log minus blank" in page
+    assert str(here) not in page
+    found = cli(*words, "--cut-length-mm", "40", "--json").envelope["result"]
+    apart = value_of(found, "difference", "mean")
+    assert apart["number"] == pytest.approx(2.0 * 0.06, rel=0.01)
+    assert apart["low"] < apart["number"] < apart["high"]
+    friction = value_of(found, "figures", "half of closing minus opening")
+    assert friction["number"] == pytest.approx(0.5 * 0.06, rel=0.02)
+    work = value_of(found, "difference", "work of a closing stroke")["number"]
+    per_length = value_of(found, "difference", "work per length of cut")["number"]
+    assert per_length == pytest.approx(work / 0.040, rel=1e-6)
+
+
+def test_equal_logs_do_not_differ(here: Path, cli: Cli) -> None:
+    logged(here / "a.csv", 1.0, 1), logged(here / "b.csv", 1.0, 12)
+    said = cli("summarise", "a.csv", "--compare", "b.csv", *COLUMNS, *LEVER)
+    assert "more than the other log: the interval contains 0" in said.out
+
+
+def test_a_force_without_its_lever_has_no_work(here: Path, cli: Cli) -> None:
+    logged(here / "a.csv", 1.0, 1)
+    said = cli("summarise", "a.csv", *COLUMNS)
+    assert said.code == 0, said.err
+    assert "work of a closing stroke" not in said.out
+    assert "--handle-radius-mm" in said.out
+
+
+def test_what_cannot_be_compared_is_refused(here: Path, cli: Cli) -> None:
+    logged(here / "a.csv", 1.0, 1)
+    twice = cli("summarise", "a.csv", "--blank", "a.csv", "--compare", "a.csv", *COLUMNS)
+    assert twice.code == 2
+    assert "not both" in twice.err
+    without = cli("summarise", "a.csv", "-c", "time=t_s", "-c", "opening=angle_deg")
+    assert without.code == 2
+    assert "-c handle_force=COLUMN" in without.err
+    turns = cli("summarise", "a.csv", *COLUMNS, "-u", "opening=rad")
+    assert turns.code == 2
+    assert "-u opening=deg" in turns.err
+    assert not (here / "summary.html").exists()
+
+
+def test_a_recording_is_summed_up_as_its_log(here: Path, cli: Cli) -> None:
+    logged(here / "a.csv", 1.0, 1)
+    cli("import", "a.csv", *COLUMNS, *LEVER, "--output", "a.mcap")
+    of_log = cli("summarise", "a.csv", *COLUMNS, *LEVER, "--json").envelope["result"]
+    of_recording = cli("summarise", "a.mcap", "--json").envelope["result"]
+    row = ("figures", "closing, mean")
+    assert value_of(of_recording, *row) == value_of(of_log, *row)
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the real data are not beside the project")
+@pytest.mark.parametrize(("name", "low", "high"), [("00", 0.045, 0.060), ("03", 0.055, 0.086)])
+def test_friction_of_a_real_tool_is_the_published_one(
+    here: Path, cli: Cli, name: str, low: float, high: float
+) -> None:
+    """Maryland jaw (mis_tool_friction): 50 mN m at little load, 86 mN m at the largest load."""
+    said = cli(
+        "summarise",
+        DATA / f"Tool_4_Maryland_L_2_{name}.TXT",
+        *("-c", "time=0", "-c", "opening=1", "-c", "motor_torque=2"),
+        *("-u", "time=s", "-u", "opening=counts", "-u", "motor_torque=counts"),
+        *("-s", "opening=7.66990394e-4", "-s", "motor_torque=3.9811e-5", "--json"),
+    )
+    friction = value_of(said.envelope["result"], "figures", "half of closing minus opening")
+    assert low < friction["number"] < high
