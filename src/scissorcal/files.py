@@ -97,15 +97,20 @@ def left_over(folder: Path) -> tuple[Path, ...]:
     )
 
 
-def remove_left_over(folder: Path) -> tuple[Path, ...]:
-    """Remove what :func:`left_over` finds; returns which. A read-only folder keeps them."""
+def remove_left_over(folder: Path, *, folders: bool = True) -> tuple[Path, ...]:
+    """Remove what :func:`left_over` finds, or the files of it; returns which.
+
+    A read-only folder keeps them.
+    """
     removed = []
     for part in left_over(folder):
         with contextlib.suppress(OSError):
-            if part.is_dir():
+            if not part.is_dir():
+                part.unlink()
+            elif folders:
                 shutil.rmtree(part)
             else:
-                part.unlink()
+                continue
             removed.append(part)
     return tuple(removed)
 

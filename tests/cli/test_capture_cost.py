@@ -106,5 +106,5 @@ def test_a_long_capture_may_be_meant_and_a_full_disk_is_told() -> None:
     with pytest.raises(InputError, match="--yes-long"):
         refuse_long(cost, 1e12)
     refuse_long(cost, 1e12, meant=True)
-    with pytest.raises(InputError, match="1 MB left"):
+    with pytest.raises(InputError, match=r"1\.0 MB left"):
         refuse_long(cost, 1e6, meant=True)

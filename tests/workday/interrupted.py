@@ -76,7 +76,7 @@ def at_events(
             wrong = []
             if kind == "kill" and done.code != -9:
                 wrong.append(f"was not killed: {done.code}")
-            if kind != "kill" and done.code and (said := said_rightly(done, folder)):
+            if kind != "kill" and done.code and (said := said_rightly(done, str(folder))):
                 wrong.append(said)
             yield Ended(words, f"{kind} at {at}", done.code, (*wrong, *_after(day, folder, words)))
 
@@ -147,11 +147,11 @@ def left_behind(folder: Path) -> list[str]:
     return [str(path.relative_to(folder)) for path in folder.rglob("*.part")]
 
 
-def said_rightly(done: Outcome, folder: Path) -> str:
-    """What is wrong with how a refused command ended; empty where nothing is."""
+def said_rightly(done: Outcome, *places: str) -> str:
+    """What is wrong with how a refused command ended, which is to name one of ``places``."""
     if done.code != 2:
         return f"ended with {done.code}, not 2: {done.err[-300:]}"
-    if "Error: " not in done.err or str(folder) not in done.err.replace("'", ""):
+    if "Error: " not in done.err or not any(place in done.err for place in places):
         return f"does not name the place: {done.err[-300:]}"
     if "fault of scissorcal" in done.err:
         return f"calls itself faulty: {done.err[-300:]}"

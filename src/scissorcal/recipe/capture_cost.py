@@ -110,7 +110,7 @@ def refuse_long(cost: CaptureCost, free_bytes: float, *, meant: bool = False) ->
     if cost.bytes > free_bytes:
         raise InputError(
             f"The capture of {cost.kind} would take {cost.sentence}, and the disk has "
-            f"{free_bytes / 1e6:,.0f} MB left: free some space. Nothing was moved."
+            f"{free_bytes / 1e6:,.1f} MB left: free some space. Nothing was moved."
         )
 
 

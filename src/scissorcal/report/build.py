@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import SIGNATURE
@@ -151,7 +151,9 @@ def sign_page(html: Path, review: Review) -> None:
         page = with_signature(html.read_text(encoding="utf-8"), review)
         with replacing(html) as part:
             part.write_text(page, encoding="utf-8")
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise file_error(error, html, "The report is not signed.") or error from None
+    except ValueError as error:
         raise InputError(
             f"{html} cannot take the signature: {error}. Run 'scissorcal report --anew', then sign."
         ) from error

@@ -1,5 +1,6 @@
 """Earlier versions of results: kept when a new one is written, listed, and restored."""
 
+import contextlib
 import re
 import shutil
 from collections.abc import Callable
@@ -145,8 +146,9 @@ def save_version(
             save(result, path)
         except BaseException:
             if kept is not None:
-                _put(kept / pictures.name, pictures)
-                shutil.rmtree(kept)
+                with contextlib.suppress(OSError):  # what could not be written is told instead
+                    _put(kept / pictures.name, pictures)
+                    shutil.rmtree(kept)
             raise
         if drawn.exists():
             rename_folder(drawn, pictures)

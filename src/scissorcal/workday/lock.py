@@ -35,7 +35,7 @@ def writing(
     path = workspace.root / ".scissorcal" / LOCK_FILE
     try:
         path.parent.mkdir(exist_ok=True)
-        opened = path.open("a+", encoding="utf-8")
+        opened = path.open("ab+", buffering=0)
     except OSError as error:
         if error.errno not in _READ_ONLY:
             raise
@@ -51,9 +51,8 @@ def writing(
             tell(_not_seen(workspace, before))
         holder = _Holder(command, os.uname().nodename, os.getpid(), time.time())
         file.truncate(0)
-        file.write(json.dumps(asdict(holder)))
         with contextlib.suppress(OSError):  # a full disk: the lock itself takes no space
-            file.flush()
+            file.write(json.dumps(asdict(holder)).encode())
         try:
             yield
         finally:
@@ -74,7 +73,7 @@ class _Holder:
         return f"'{self.command}' (process {self.pid} on {self.host}, for {age_s:.0f} s)"
 
 
-def _holder(file: IO[str]) -> _Holder | None:
+def _holder(file: IO[bytes]) -> _Holder | None:
     """Who holds the lock, or held it and was killed; None where nobody is named."""
     file.seek(0)
     try:

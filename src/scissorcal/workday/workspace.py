@@ -136,6 +136,7 @@ class Workspace:
         inside = [one for one in self.root.iterdir() if one.is_dir() and one != self.captures_dir]
         for folder in (self.root, self.root / "fits" / "history", *inside):
             remove_left_over(folder)
+        remove_left_over(self.captures_dir, folders=False)
 
     def relative(self, path: Path) -> str:
         """Name a file of the workspace as seen from its root."""

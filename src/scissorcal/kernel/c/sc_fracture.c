@@ -26,9 +26,15 @@ void sc_sit(const sc_model *model, sc_bite *bite)
         return;
     }
     sc_table_look(response, bite->indentation, &at);
-    const float excess = at.y - RESPONSE_CAP;
-    if (excess > 0.0f && at.index == response->size - 1 && at.slope > 0.0f) {
-        at.area -= 0.5f * excess * (excess / at.slope);
+    const int32_t last = response->size - 1;
+    if (at.y > RESPONSE_CAP && at.index == last && at.slope > 0.0f) {
+        /* Summed from the table's end on: what lies beyond may be so much larger than the capped
+         * energy that a difference of the two has no digit left. */
+        const float rise = RESPONSE_CAP - response->y[last];
+        const float reached = rise / at.slope;
+        const float beyond = bite->indentation - response->x[last] - reached;
+        at.area = response->area[last] + reached * (response->y[last] + 0.5f * rise);
+        at.area += RESPONSE_CAP * beyond;
     }
     bite->knot = at.index;
     bite->force = at.y > RESPONSE_CAP ? RESPONSE_CAP : at.y;
