@@ -16,7 +16,7 @@ PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests kernel setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel setup clean
 
 demo: $(STAMP)
 	$(RUN)/scissorcal demo
@@ -55,9 +55,15 @@ api: $(STAMP)
 api-check: $(STAMP)
 	$(RUN)/python docs/make_api.py --check
 
-# Strict, and again under the address and undefined-behaviour sanitizers.
+# Strict, and again under the address and undefined-behaviour sanitizers; then the fuzzers' inputs.
 c-tests:
 	$(MAKE) --no-print-directory -C tests/c check BUILD=$(CURDIR)/build/c-tests
+	$(MAKE) --no-print-directory -C tests/c/fuzz corpus BUILD=$(CURDIR)/build/fuzz
+
+# libFuzzer, MINUTES for each harness; then the lines of the C core that its inputs reach. Needs clang.
+MINUTES ?= 1
+fuzz fuzz-coverage fuzz-merge:
+	$(MAKE) --no-print-directory -C tests/c/fuzz $(patsubst fuzz-%,%,$@) BUILD=$(CURDIR)/build/fuzz MINUTES=$(MINUTES)
 
 setup kernel: $(STAMP)
 

@@ -53,11 +53,13 @@ static inline float take_float(input *from, float low, float high)
     return low + (high - low) * (float)step / 65535.0f;
 }
 
-/* Change up to 7 of the 4-byte words of a struct: a float by a factor or to any bits, a count by one. */
+/* Change none, or up to 7, of the 4-byte words of a struct: a float by a factor or to any bits, a count
+ * by one. */
 static inline void change_words(input *from, void *what, size_t bytes)
 {
     static const float FACTORS[8] = {0.0f, -1.0f, 0.5f, 2.0f, 1e3f, 1e-3f, 0.9f, 1.1f};
-    for (int left = take_byte(from) % 8; left > 0; left--) {
+    const uint8_t many = take_byte(from);
+    for (int left = many < 128 ? 0 : many % 8; left > 0; left--) {
         const uint32_t place = ((uint32_t)take_byte(from) << 8 | take_byte(from)) % (bytes / 4);
         uint8_t *word = (uint8_t *)what + 4 * (size_t)place;
         const uint8_t how = take_byte(from);

@@ -278,8 +278,7 @@ static void fill_cycles(cycle_table *table, const sc_cut_parameters *p, double b
 static cycle cycle_at(const cycle_table *table, double slope)
 {
     double place = (slope - table->first) * table->per_step;
-    int32_t low = place > 1.0 ? (int32_t)place - 1 : 0;
-    if (low > CYCLE_KNOTS - 4) low = CYCLE_KNOTS - 4;
+    int32_t low = place < (double)(CYCLE_KNOTS - 3) ? (int32_t)fmax(place, 1.0) - 1 : CYCLE_KNOTS - 4;
     double t = place - (double)low;
     double a = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0, b = t * (t - 2.0) * (t - 3.0) / 2.0;
     double c = -t * (t - 1.0) * (t - 3.0) / 2.0, d = t * (t - 1.0) * (t - 2.0) / 6.0;

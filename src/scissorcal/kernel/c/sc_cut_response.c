@@ -14,9 +14,9 @@ typedef struct {
 static int32_t locate(const sc_response_table *table, double log_depth, cell *inside)
 {
     double place = (log_depth - table->first) / table->step;
-    int32_t index = (int32_t)floor(place);
-    if (index < 0) index = 0;
-    if (index > table->size - 2) index = table->size - 2;
+    int32_t index = 0; /* chosen before the cast, which a place beyond all numbers would not survive */
+    if (place >= (double)(table->size - 2)) index = table->size - 2;
+    else if (place > 0.0) index = (int32_t)place;
     inside->t = place - (double)index;
     inside->t2 = inside->t * inside->t;
     inside->t3 = inside->t2 * inside->t;
