@@ -39,6 +39,8 @@ static void fill(sc_block *block, input *from)
     config->opening_rate_limit = 30.0f;
     config->advance_rate_limit = 5.0f;
     config->tick_us = 1000;
+    const sc_plate_config plate = {take_byte(from) % 2, 100000, 0.015f, 0.1f, -1.0f, 1.0f};
+    config->plate = plate;
     const sc_model model = taken_model(from, &room);
     block->model = model;
     store(&model.edge, &block->edge);
@@ -49,9 +51,11 @@ static void fill(sc_block *block, input *from)
     block->has_model = take_byte(from) % 4 != 0;
     block->silence_limit_ms = 1;
     block->control.config = sound_control();
+    block->control.has_config = take_byte(from) % 2;
     change_words(from, config, sizeof *config);
     if (take_byte(from) % 8 == 0) change_words(from, block, offsetof(sc_block, ring));
-    block->reference_capacity = REFERENCE; /* what the memory has; sc_block_is_sound compares it */
+    (void)sc_block_is_sound(block, sc_block_size(REFERENCE));
+    block->reference_capacity = REFERENCE; /* what the memory has */
     sc_block_set_reference_size(block, take_byte(from) % (REFERENCE + 1));
 }
 
@@ -80,7 +84,8 @@ static void send_states(int fd, input *from)
             whole = 1u + take_byte(from) % 32u;
             for (size_t i = 0; i < whole; i++) frame[i] = take_byte(from);
         } else if (what % 8 == 6) {
-            const sc_config_echo echo = {.key = take_byte(from), .value = take_bits(from)};
+            const sc_config_echo echo = {.key = take_byte(from) % 8u, .nonce = take_byte(from) % 4u,
+                                         .value = take_bits(from)};
             whole = sc_encode_frame(payload, sc_pack_config_echo(&echo, payload), frame, sizeof frame);
         } else {
             sequence += what % 8 != 5;
@@ -134,6 +139,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     close(ends[0]);
     if (!hangs_up) hold_answers(ends[1], block);
     close(ends[1]);
+    if (size > 0 && data[0] % 32 == 31) { /* a reader that was away for longer than the ring holds */
+        sc_control_sample tick;
+        memset(&tick, 0, sizeof tick);
+        for (uint32_t i = 0; i < SC_RING_SAMPLES + 10u; i++) {
+            sc_block_push(block, &block->servo.sample);
+            sc_control_block_push(&block->control, &tick);
+        }
+    }
     while (sc_block_read(block, &cursor, samples, 64, &lost) > 0) {
     }
     (void)sc_block_answered(block, 1);

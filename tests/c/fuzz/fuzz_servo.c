@@ -77,6 +77,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     config.passivity.is_measured = take_byte(&from) % 2;
     config.plate.is_estimated = take_byte(&from) % 2;
     change_words(&from, &config, sizeof config);
+    /* Short, so that a run of some hundred ticks passes them. */
+    law.stale_s = 0.01f;
+    law.end_s = 0.1f;
+    law.approach_s = 0.2f;
+    law.sustained_s = 0.005f;
+    config.watch.held_s = config.watch.jitter_s = 0.02f;
     change_words(&from, &law, sizeof law);
     sc_model model = taken_model(&from, &room);
     const int has_model = take_byte(&from) % 4 != 0;
@@ -111,6 +117,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             change_words(&from, &placing, sizeof placing);
             sc_servo_place(&config, has_model ? &model : NULL, &servo, &placing);
         } else if (what % 32 == 24) {
+            task.contour.number++;
+            task.contour.lift = take_byte(&from) % 4 == 0;
+            task.contour.point[1] = take_float(&from, -0.03f, 0.03f);
             change_words(&from, &task.contour, sizeof task.contour);
         } else if (what == 255) {
             sc_servo_end(&servo, SC_STOP_ASKED);
