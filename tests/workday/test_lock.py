@@ -49,3 +49,18 @@ def test_the_lock_of_a_killed_writer_is_free(tmp_path: Path) -> None:
     with writing(Workspace(tmp_path), "scissorcal report"):
         said = json.loads((tmp_path / ".scissorcal" / "lock").read_text())
     assert (said["command"], said["pid"]) == ("scissorcal report", os.getpid())
+
+
+def test_a_holder_on_another_computer_that_has_not_ended_is_told_of(tmp_path: Path) -> None:
+    told: list[str] = []
+    (tmp_path / ".scissorcal").mkdir()
+    holder = {"command": "scissorcal fit", "host": "elsewhere", "pid": 7, "start_s": 0.0}
+    (tmp_path / ".scissorcal" / "lock").write_text(json.dumps(holder))
+    with writing(Workspace(tmp_path), "scissorcal report", told.append):
+        pass
+    (note,) = told
+    assert "'scissorcal fit' (process 7 on elsewhere" in note
+    assert "has not ended, or was killed" in note
+    with writing(Workspace(tmp_path), "scissorcal report", told.append):
+        pass
+    assert len(told) == 1

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from scissorcal.calibration.summary import Effort
     from scissorcal.recording import Recording
 
+_HAND: "Effort" = "handle_force"
+
 RadiusMm = Annotated[
     float | None,
     typer.Option(help="Lever of handle_force: with it the force is a torque, and has work."),
@@ -155,6 +157,3 @@ def summarise(
     notes = [f"{log.name}: {said}" for said in recording.notes[1:]]
     text = "\n".join([panels_text(panels), *(f"note: {said}" for said in notes), str(output)])
     return Answer({"panels": panels, "notes": notes}, text, files=[output])
-
-
-_HAND: "Effort" = "handle_force"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scissorcal.calibration.summary import Interval
 from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
 from scissorcal.report.panel import (
     Axis,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
         Array,
         Curves,
         Difference,
-        Interval,
         LogSummary,
         Plateau,
     )
@@ -292,10 +292,8 @@ def _words(found: Interval, unit: str) -> str:
 
 
 def _times(found: Interval, factor: float) -> Interval:
-    from scissorcal.calibration.summary import Interval as New
-
     ends = [None if end is None else factor * end for end in (found.low, found.high)]
-    return New(factor * found.value, ends[0], ends[1], found.strokes)
+    return Interval(factor * found.value, ends[0], ends[1], found.strokes)
 
 
 def _place_unit(shown: Shown) -> str:

@@ -249,8 +249,8 @@ def recover_photographs(folder: Path) -> tuple[str, ...]:
         part.rename(kept)
         kind = kept.name.split("-")[0]
         said.append(
-            f"A capture of photographs was interrupted: {len(pictures)} are kept in {kept}. Give "
-            f"them to 'scissorcal capture {kind}' again."
+            f"A capture of photographs was interrupted; those taken ({len(pictures)}) are kept in "
+            f"{kept}. Give the photographs to 'scissorcal capture {kind}' again."
         )
     return tuple(said)
 

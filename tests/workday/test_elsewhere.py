@@ -1,0 +1,96 @@
+"""A fit that its workspace cannot take is kept elsewhere, and put in place later."""
+
+import errno
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from scissorcal.calibration import store
+from scissorcal.errors import InputError
+from scissorcal.workday.elsewhere import put_in_place, refuse_unwritable
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.history import restore, versions
+from scissorcal.workday.runs.fit import fit_step, fit_workspace
+from scissorcal.workday.steps import BY_NAME
+from scissorcal.workday.workspace import Workspace
+from tests.workday.made import quick_workspace, record_friction
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    workspace = quick_workspace(tmp_path_factory.mktemp("elsewhere") / "paper")
+    record_friction(workspace)
+    fit_workspace(workspace, ("friction",))
+    return workspace.root
+
+
+@pytest.fixture
+def workspace(fitted: Path, tmp_path: Path) -> Workspace:
+    return Workspace(Path(shutil.copytree(fitted, tmp_path / "paper")))
+
+
+def refused(workspace: Workspace, folder: Path, patch: pytest.MonkeyPatch) -> InputError:
+    """Fit again where the workspace's folder of fits takes nothing."""
+    save = store.save
+
+    def full(result: object, path: Path) -> None:
+        if path.is_relative_to(workspace.root):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        save(result, path)  # type: ignore[arg-type]
+
+    patch.setattr(store, "save", full)
+    step = BY_NAME["fit friction"]
+    with pytest.raises(InputError) as found:
+        fit_step(Engine.of(workspace), step, seed=5, force=True, save_to=folder)
+    patch.undo()
+    return found.value
+
+
+def test_it_is_kept_named_and_put_in_place(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = workspace.fit_path("friction").read_bytes()
+    told = refused(workspace, tmp_path / "spare", monkeypatch)
+    (kept,) = told.kept
+    assert kept.parent == tmp_path / "spare"
+    assert "The disk is full" in str(told)
+    assert f"'scissorcal fit restore {kept}'" in str(told)
+    assert workspace.fit_path("friction").read_bytes() == before
+    step, earlier = put_in_place(Engine.of(workspace), kept)
+    assert step.name == "fit friction"
+    assert workspace.fit_path("friction").read_bytes() == kept.read_bytes() != before
+    assert earlier is not None
+    assert (earlier / "friction.nc").read_bytes() == before
+
+
+def test_a_file_of_another_kind_is_refused(workspace: Workspace, tmp_path: Path) -> None:
+    engine = Engine.of(workspace)
+    shutil.copyfile(workspace.fit_path("friction"), tmp_path / "other.nc")
+    with pytest.raises(InputError, match="does not tell by its name"):
+        put_in_place(engine, tmp_path / "other.nc")
+    shutil.copyfile(workspace.fit_path("friction"), tmp_path / "camera-1.nc")
+    with pytest.raises(InputError, match=r"camera-1\.nc"):
+        put_in_place(engine, tmp_path / "camera-1.nc")
+
+
+def test_a_workspace_that_may_only_be_read_is_refused_before_the_fit(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(InputError, match="--save-to FOLDER"):
+        refuse_unwritable(Engine.of(workspace), None)
+    refuse_unwritable(Engine.of(workspace), tmp_path)
+
+
+def test_a_restore_that_was_killed_half_way_can_be_done_again(workspace: Workspace) -> None:
+    fit_workspace(workspace, ("friction",), seed=9, force=True)
+    engine = Engine.of(workspace)
+    (earlier,) = [one for one in versions(engine, "friction") if not one.current]
+    shutil.copytree(earlier.path.parent, workspace.root / "aside")
+    restore(engine, earlier.name)
+    # The kill: the restored version still stands in the history, too.
+    shutil.copytree(workspace.root / "aside", earlier.path.parent)
+    names = [one.name for one in versions(Engine.of(workspace), "friction")]
+    assert len(names) == len(set(names)) == 2
