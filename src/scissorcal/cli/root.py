@@ -1,10 +1,11 @@
 """The ``scissorcal`` command itself: its commands in the order of the day, and how it ends."""
 
+import contextlib
 import gc
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 import typer
@@ -85,12 +86,24 @@ def run(arguments: Sequence[str] | None = None) -> None:
         os.environ.setdefault(variable, "1")
     # no plugin is used, and looking for some reads the metadata of every installed distribution
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # imports make many objects that stay, through which the collector would go again and again
-    gc.set_threshold(100_000)
     given = list(sys.argv[1:] if arguments is None else arguments)
-    with patient_output():
+    with patient_output(), _collecting_seldom():
         code = _run(given)
     sys.exit(code)
+
+
+@contextlib.contextmanager
+def _collecting_seldom() -> Iterator[None]:
+    """Have the collector of cycles look seldom: imports make many objects that stay.
+
+    Only while a command runs: a process that goes on would keep cycles of large arrays for long.
+    """
+    before = gc.get_threshold()
+    gc.set_threshold(100_000)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _run(given: list[str]) -> int:

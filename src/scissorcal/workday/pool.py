@@ -1,5 +1,6 @@
 """Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -119,6 +120,7 @@ class _Here(Executor):
             future.set_result(fn(*args, **kwargs))
         except Exception as error:  # noqa: BLE001 - handed on to the caller
             future.set_exception(error)
+        gc.collect()  # a fit leaves cycles of large arrays, and a command collects seldom
         return future
 
 
