@@ -11,7 +11,7 @@ import pytest
 from tests.workday.disks import can_mount, every_command, on_disks
 from tests.workday.interrupted import at_events, at_moments, commands_that_write, finished_day
 
-FEW = 3
+FEW = 2
 
 
 @pytest.fixture(scope="module")
