@@ -63,8 +63,10 @@ def put_beside(source: Path, target: Path) -> None:
     """Have the file ``source`` under the name ``target`` too, in place of what was there.
 
     Neither name is ever without a whole file. No bytes are copied where the file system has hard
-    links; both names are then one file, so that it is replaced and never written to.
+    links; both names are then one file, so that it is replaced and never written to. Of a symbolic
+    link it is the file that the link leads to.
     """
+    source = source.resolve()
     if target.exists() and target.samefile(source):
         return
     part = part_of(target)
@@ -75,6 +77,8 @@ def put_beside(source: Path, target: Path) -> None:
             if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES):
                 raise
             shutil.copy2(source, part)
+            with part.open("rb") as file:
+                os.fsync(file.fileno())
         part.replace(target)
     except BaseException:
         with contextlib.suppress(OSError):
@@ -86,8 +90,11 @@ def put_beside(source: Path, target: Path) -> None:
 def left_over(folder: Path) -> tuple[Path, ...]:
     """Parts in ``folder``, files and folders, whose writer was killed.
 
-    Only parts of this computer are judged, as the processes of another cannot be seen from here.
+    Only parts of this computer are judged, as the processes of another cannot be seen from here. A
+    folder that is a symbolic link has none.
     """
+    if folder.is_symlink():
+        return ()
     return tuple(
         part
         for part in sorted(folder.glob("*.part"))
@@ -105,7 +112,7 @@ def remove_left_over(folder: Path, *, folders: bool = True) -> tuple[Path, ...]:
     removed = []
     for part in left_over(folder):
         with contextlib.suppress(OSError):
-            if not part.is_dir():
+            if part.is_symlink() or not part.is_dir():
                 part.unlink()
             elif folders:
                 shutil.rmtree(part)

@@ -75,7 +75,7 @@ def log(made: Made, seed: int = 0) -> Recording:
 
 def summed(*made: Recording) -> tuple[LogSummary, ...]:
     places = common_places(made)
-    return tuple(summarise(one, "motor_torque", places) for one in made)
+    return summarise([(one, "motor_torque") for one in made], places)
 
 
 def test_a_plain_log_has_its_closed_form() -> None:
@@ -119,6 +119,13 @@ def test_speeds_are_classes_of_their_own() -> None:
     assert [one.level.strokes for one in closing] == [4, 4]
 
 
+def test_a_class_holds_speeds_of_at_most_its_factor() -> None:
+    (found,) = summed(log(Made(speeds=(0.5, 0.65, 0.85, 1.1))))
+    closing = [one for one in found.speeds if one.kind == "closing"]
+    assert [one.level.strokes for one in closing] == [4, 4]
+    assert [one.speed for one in closing] == pytest.approx([0.575, 0.975], rel=0.02)
+
+
 @pytest.mark.parametrize(("level", "start", "end"), [(1.0, 20, 50), (-0.3, 0, 60), (5e-6, 5, 15)])
 def test_a_plateau_is_found_where_it_is(level: float, start: int, end: int) -> None:
     curve = np.linspace(3.0, 9.0, BINS) * abs(level) * np.where(np.arange(BINS) % 2, 1.0, -1.0)
@@ -137,6 +144,7 @@ def test_a_slope_throughout_is_no_plateau() -> None:
 def test_fewer_than_three_strokes_have_no_interval() -> None:
     cut, blank = summed(log(Made(strokes=2)), log(Made(level=0.0)))
     assert (cut.mean.low, cut.mean.high, cut.mean.strokes) == (None, None, 2)
+    assert cut.drift is None
     apart = difference(cut, blank)
     assert (apart.low, apart.mean.low, apart.excludes_zero) == (None, None, None)
 

@@ -12,12 +12,15 @@ LEVER = ("--handle-radius-mm", "60")
 DATA = Path(__file__).parents[3] / "shared" / "data" / "mis_tool_friction"
 
 
-def logged(path: Path, cut_N: float, seed: int) -> Path:
+def logged(
+    path: Path, cut_N: float, seed: int, zero_N: float = 0.0, travel_deg: float = 25.0
+) -> Path:
     """Eight closings and openings: friction of 0.5 N, and the cut while closing."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 16.0, 0.005)
-    angle = 30.0 + 25.0 * np.cos(np.pi * time)
+    angle = 30.0 + travel_deg * np.cos(np.pi * time)
     force = np.where(np.sin(np.pi * time) > 0, 0.5 + cut_N, -0.5) + rng.normal(0, 0.05, len(time))
+    force += zero_N
     rows = [f"{t:.3f},{a:.2f},{f:.3f}" for t, a, f in zip(time, angle, force, strict=True)]
     path.write_text("\n".join(["t_s,angle_deg,force_N", *rows, ""]), encoding="utf-8")
     return path
@@ -53,7 +56,9 @@ def test_cut_minus_blank_on_terminal_page_and_json(here: Path, cli: Cli) -> None
     assert friction["number"] == pytest.approx(0.5 * 0.06, rel=0.02)
     work = value_of(found, "difference", "work of a closing stroke")["number"]
     per_length = value_of(found, "difference", "work per length of cut")["number"]
-    assert per_length == pytest.approx(work / 0.040, rel=1e-6)
+    # 2 N on a lever of 60 mm over 50 deg, for 40 mm
+    assert per_length == pytest.approx(0.12 * np.radians(50.0) / 0.040, rel=0.01)
+    assert work < 0.95 * 0.12 * np.radians(50.0), "a stroke's ends are left out"
 
 
 def test_equal_logs_do_not_differ(here: Path, cli: Cli) -> None:
@@ -68,6 +73,62 @@ def test_a_force_without_its_lever_has_no_work(here: Path, cli: Cli) -> None:
     assert said.code == 0, said.err
     assert "work of a closing stroke" not in said.out
     assert "--handle-radius-mm" in said.out
+
+
+@pytest.mark.parametrize("zero_N", [-3.0, -0.7, 0.8])
+def test_the_sensors_zero_drops_out(here: Path, cli: Cli, zero_N: float) -> None:
+    logged(here / "cut.csv", 2.0, 1, zero_N), logged(here / "blank.csv", 0.0, 2, zero_N)
+    said = cli("summarise", "cut.csv", "--blank", "blank.csv", *COLUMNS, *LEVER, "--json")
+    found = said.envelope["result"]
+    assert value_of(found, "difference", "mean")["number"] == pytest.approx(0.12, rel=0.01)
+    friction = value_of(found, "figures", "half of closing minus opening")
+    assert friction["number"] == pytest.approx(0.03, rel=0.02)
+
+
+def test_a_blank_over_half_the_range_gives_no_work_per_length(here: Path, cli: Cli) -> None:
+    logged(here / "cut.csv", 2.0, 1), logged(here / "blank.csv", 0.0, 2, travel_deg=10.0)
+    words = ("summarise", "cut.csv", "--blank", "blank.csv", *COLUMNS, *LEVER)
+    said = cli(*words, "--cut-length-mm", "40")
+    assert "work per length of cut" not in said.out
+    assert "how much of the cut's length falls within it is not known" in " ".join(said.out.split())
+
+
+def test_notes_of_both_logs_are_shown(here: Path, cli: Cli) -> None:
+    logged(here / "cut.csv", 2.0, 1)
+    blank = logged(here / "blank.csv", 0.0, 2)
+    blank.write_text(blank.read_text(encoding="utf-8")[:-4], encoding="utf-8")
+    said = cli("summarise", "cut.csv", "--blank", "blank.csv", *COLUMNS, *LEVER)
+    assert "blank.csv: Line 3201, the last one, has no end" in " ".join(said.out.split())
+    assert "Line 3201" in (here / "summary.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--handle-radius-mm", "-60"), "is no lever"),
+        (("--handle-radius-mm", "nan"), "is no lever"),
+        (("--handle-radius-mm", "60", "--joint", "linear"), "has no lever"),
+        (("--output", "a.csv"), "is a log that is read"),
+        (("--output", "page.csv"), "ends in .html"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(
+    here: Path, cli: Cli, words: tuple[str, ...], said: str
+) -> None:
+    log = logged(here / "a.csv", 1.0, 1)
+    before = log.read_bytes()
+    refused = cli("summarise", "a.csv", *COLUMNS, *words)
+    assert refused.code == 2
+    assert said in refused.err
+    assert log.read_bytes() == before
+
+
+def test_a_force_on_a_sledge_is_no_torque(here: Path, cli: Cli) -> None:
+    logged(here / "a.csv", 1.0, 1)
+    words = ("--joint", "linear", "-u", "opening=mm")
+    found = cli("summarise", "a.csv", *COLUMNS, *words, "--json").envelope["result"]
+    mean = value_of(found, "figures", "closing, mean")
+    assert (mean["number"], mean["unit"]) == (pytest.approx(1.5, rel=0.01), "N")
 
 
 def test_what_cannot_be_compared_is_refused(here: Path, cli: Cli) -> None:

@@ -85,3 +85,12 @@ def test_nothing_is_said_of_a_reader_who_left() -> None:
         running.stdout.close()
         assert running.stderr.read() == b""
         assert running.wait(timeout=60) == 0
+
+
+def test_the_log_is_not_written_through_a_link(cli: Cli, workspace: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "precious.txt"
+    precious.write_text("precious")
+    (workspace / "scissorcal.log").unlink(missing_ok=True)
+    (workspace / "scissorcal.log").symlink_to(precious)
+    assert cli("plan").code == 0
+    assert precious.read_text() == "precious"

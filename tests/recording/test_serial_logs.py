@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
-from scissorcal.recording import Recording, import_table
+from scissorcal.recording import Joint, Recording, import_table, textfile
 from scissorcal.recording.resolution import noise_of, stroke_threshold
 
 HEAD = "t_ms,angle_deg,force_g"
@@ -149,8 +149,6 @@ def test_a_threshold_below_the_sensors_step_is_told_of(tmp_path: Path) -> None:
 
 def test_what_decides_the_threshold_is_stated() -> None:
     fine = np.sin(np.arange(0.0, 20.0, 1e-3))
-    from scissorcal.recording import Joint
-
     assert stroke_threshold(fine, Joint()).reason == "5% of the range"
     coarse = stroke_threshold(np.round(fine / 0.2) * 0.2, Joint())
     assert (coarse.travel, coarse.reason) == (0.6, "3 steps of the sensor")
@@ -165,6 +163,48 @@ def test_noise_is_told_from_motion(sd: float, seed: int) -> None:
     noise = np.random.default_rng(seed).normal(0.0, sd, 4000)
     slow = sd * np.sin(np.linspace(0.0, 20.0, 4000))
     assert noise_of(slow + noise) == pytest.approx(sd, rel=0.09)
+
+
+@pytest.mark.parametrize(("rate_Hz", "strokes_Hz"), [(10.0, 1.4), (20.0, 2.1), (250.0, 3.0)])
+def test_fast_strokes_in_a_slow_log_are_no_noise(rate_Hz: float, strokes_Hz: float) -> None:
+    angle = 0.44 * np.sin(2 * np.pi * strokes_Hz * np.arange(0.0, 30.0, 1.0 / rate_Hz))
+    assert stroke_threshold(angle, Joint()).travel <= 0.25 * np.ptp(angle)
+
+
+def test_noise_never_asks_for_more_than_a_quarter_of_the_range() -> None:
+    noise = np.random.default_rng(4).normal(0.0, 0.1, 4000)
+    angle = np.sin(np.arange(4000) * 0.01) + noise
+    assert stroke_threshold(angle, Joint()).travel == pytest.approx(0.25 * np.ptp(angle), rel=1e-5)
+
+
+@pytest.mark.parametrize("heading", ["force_gf", "force_g", "force [gf]"])
+def test_a_heading_may_end_in_a_unit_of_force(tmp_path: Path, heading: str) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"{0.01 * i:.2f},{30 + 20 * np.cos(0.05 * i):.3f},100" for i in range(500)]
+    path.write_text("\n".join([f"t_s,angle_deg,{heading}", *rows, ""]), encoding="utf-8")
+    columns = {"time": "t_s", "opening": "angle_deg", "handle_force": heading}
+    made = import_table(path, columns=columns, handle_radius_m=0.06)
+    assert made.samples["handle_force"][0] == pytest.approx(0.980665, rel=1e-6)
+
+
+def test_decimal_commas_are_read_where_the_first_row_has_none(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"{0.01 * i:.2f};{30 + 20 * np.cos(0.05 * i):.3f};1,5" for i in range(500)]
+    text = "\n".join(["t_s;angle_deg;torque_Nm", "0;50;1", *rows[1:], ""]).replace(".", ",")
+    path.write_text(text, encoding="utf-8")
+    columns = {"time": "t_s", "opening": "angle_deg", "motor_torque": "torque_Nm"}
+    made = import_table(path, columns=columns)
+    assert list(made.samples["motor_torque"][:3]) == pytest.approx([1.0, 1.5, 1.5])
+
+
+def test_a_file_of_more_lines_than_are_read_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(textfile, "MOST_LINES", 100)
+    path = tmp_path / "log.csv"
+    path.write_text("1\n" * 101, encoding="utf-8")
+    with pytest.raises(InputError, match="has 101 lines, and 100 are read at most"):
+        import_table(path, columns={"opening": 0}, rate_Hz=1.0, motion_only=True)
 
 
 def test_the_survey_finds_steps_ends_and_gaps(tmp_path: Path) -> None:

@@ -38,9 +38,13 @@ def finished_day(folder: Path) -> Workspace:
     workspace = quick_workspace(folder)
     record_friction(workspace)
     record_cut(workspace)
-    for words in WHOLE_DAY:
+    records = workspace.root / "fits" / "friction.verify.partial.jsonl"
+    done = run(("fit", "friction", "--seed", "8"), workspace.root)
+    records.write_text("records of the earlier fit's trust check\n", encoding="utf-8")
+    for words in (("fit", "friction", "--force"), *WHOLE_DAY):
         done = run(words, workspace.root)
         assert done.code == 0, done.err
+    records.write_text("records of the trust check of the fit in use\n", encoding="utf-8")
     return workspace
 
 
@@ -48,11 +52,13 @@ def commands_that_write(day: Workspace) -> dict[str, tuple[str, ...]]:
     cut = day.recordings("cut")[0].name
     sim = ("--device", "sim", "--yes")
     elsewhere = str(day.root.parent / "elsewhere")
+    (earlier,) = [path.name for path in (day.root / "fits" / "history").glob("friction-2*")]
     return {
         "capture": ("capture", "cut", *sim),
         "device probe": ("device", "probe", *sim),
         "recording exclude": ("recording", "exclude", cut, "--why", "torn"),
         "fit": ("fit", "friction", "--force", "--seed", "4", "--save-to", elsewhere),
+        "fit restore": ("fit", "restore", earlier),
         "report": ("report", "--anew"),
         "report sign": SIGN,
         "package build": ("package", "build", "--force"),
@@ -117,11 +123,17 @@ def faults_of(folder: Path, before: Path) -> list[str]:
         for path in sorted(folder.rglob("*"))
         if path.is_file() and (why := _damage(path))
     ]
-    there = {path.read_bytes() for path in folder.rglob("*.nc")}
+    for kind in ("*.nc", "*.verify.partial.jsonl"):
+        there = {path.read_bytes() for path in folder.rglob(kind)}
+        found += [
+            f"{path.relative_to(before)} is lost"
+            for path in before.rglob(kind)
+            if path.read_bytes() not in there
+        ]
     found += [
-        f"{path.relative_to(before)} is lost"
-        for path in before.rglob("*.nc")
-        if path.read_bytes() not in there
+        f"{records.relative_to(folder)} stands beside another fit"
+        for records in folder.rglob("*.verify.partial.jsonl")
+        if records.read_bytes() not in _records_of(before, records.with_name("friction.nc"))
     ]
     for name in ("fits/friction.nc", "fits/cut.nc", "report/report.html", "recipe.toml"):
         if (before / name).exists() and not (folder / name).exists():
@@ -140,6 +152,15 @@ def faults_of(folder: Path, before: Path) -> list[str]:
         states = json.loads(plan.out)["result"]["steps"]
         found += [f"{one['name']} is damaged" for one in states if one["state"] == "damaged"]
     return found
+
+
+def _records_of(before: Path, fit: Path) -> set[bytes]:
+    """What the records beside a fit may be: those that stood beside one of its content."""
+    return {
+        path.with_name("friction.verify.partial.jsonl").read_bytes()
+        for path in before.rglob("friction.nc")
+        if fit.exists() and path.read_bytes() == fit.read_bytes()
+    }
 
 
 def left_behind(folder: Path) -> list[str]:
@@ -161,7 +182,9 @@ def said_rightly(done: Outcome, *places: str) -> str:
 def again(words: Sequence[str], folder: Path) -> str:
     """Run a command once more, without a fault; what is wrong then, empty where it ends well."""
     done = run(words, folder)
-    return f"cannot be done again ({done.code}): {done.err[-300:]}" if done.code else ""
+    if not done.code or "is the version in use" in done.err:
+        return ""
+    return f"cannot be done again ({done.code}): {done.err[-300:]}"
 
 
 def _damage(path: Path) -> str:

@@ -441,12 +441,23 @@ def removed(path: Path) -> None:
     shutil.rmtree(path.parent)
 
 
-@pytest.mark.parametrize("change", [damaged, foreign, removed])
+def misspelt(path: Path) -> None:
+    path.write_text(path.read_text().replace('"sha256"', '"sha25c"'))
+
+
+def of_another_value(path: Path) -> None:
+    path.write_text(path.read_text().replace('"failed": []', '"failed": ["bounds"]'))
+
+
+@pytest.mark.parametrize("change", [damaged, foreign, removed, misspelt, of_another_value])
 def test_a_damaged_index_changes_no_state(
     copied: Workspace, change: Callable[[Path], None]
 ) -> None:
     before = [step.state for step in make_plan(copied).steps]
-    change(copied.root / ".scissorcal" / "index.json")
+    index = copied.root / ".scissorcal" / "index.json"
+    kept = index.read_text()
+    change(index)
+    assert not index.exists() or index.read_text() != kept
     assert [step.state for step in make_plan(copied).steps] == before
 
 

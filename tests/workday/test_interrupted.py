@@ -22,7 +22,8 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def names() -> list[object]:
     """Every command that writes; those of a second or more are slow."""
     quick = ("recording exclude",)
-    every = ("capture", "device probe", "fit", "report", "report sign", "package build", "render")
+    every = ("capture", "device probe", "fit", "fit restore", "report", "report sign")
+    every = (*every, "package build", "render")
     return [*quick, *(pytest.param(name, marks=pytest.mark.slow) for name in every)]
 
 

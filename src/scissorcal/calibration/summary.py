@@ -92,7 +92,8 @@ class LogSummary:
     """One log on the grid ``places`` (BINS,). Resistance is positive while closing is resisted.
 
     ``left_out`` strokes do not reach over the range. ``turned`` says that the sign was changed.
-    ``drift`` is the change of a closing stroke's mean from one to the next.
+    ``share`` is that of the range in the median travel of the closing strokes. ``drift`` is the
+    change of a closing stroke's mean from one to the next, None with fewer than three.
     """
 
     source: str
@@ -102,7 +103,8 @@ class LogSummary:
     speeds: tuple[SpeedClass, ...]
     mean: Interval
     work: Interval
-    drift: Interval
+    drift: Interval | None
+    share: float
     left_out: int
     turned: bool
 
@@ -150,43 +152,23 @@ def common_places(recordings: Sequence[Recording]) -> Array:
     return np.asarray(0.5 * (edges[1:] + edges[:-1]))
 
 
-def summarise(recording: Recording, effort: Effort, places: Array) -> LogSummary:
-    """Sum up a recording on the grid ``places``, of :func:`common_places`.
+def summarise(logs: Sequence[tuple[Recording, Effort]], places: Array) -> tuple[LogSummary, ...]:
+    """Sum up recordings on the grid ``places``, of :func:`common_places`.
 
-    ``effort`` is the channel: ``motor_torque``, or ``handle_force`` as a force, or as a torque
-    where the recording has a handle radius. Raises InputError where the channel is constant or too
-    few strokes reach over the range.
+    Each comes with its channel: ``motor_torque``, or ``handle_force`` as a force, or as a torque
+    where the recording has a handle radius. One sign holds for all logs of a channel. It is taken
+    from closing minus opening, which friction and cutting make positive whatever the sensor's zero;
+    from the closing strokes where nothing opens. Raises InputError where a channel is constant or
+    too few strokes reach over the range.
     """
-    values = effort_of(recording, effort)
-    if float(np.ptp(values)) == 0.0:
-        raise InputError(
-            f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "
-            "check the sensor."
-        )
-    closing, left_out = _curves(recording, values, places, "closing")
-    opening, other = _curves(recording, values, places, "opening")
-    if closing is None:
-        raise InputError(
-            f"{recording.source}: no closing stroke reaches over the range from {places[0]:.3g} to "
-            f"{places[-1]:.3g} {recording.joint.position_unit}: give a smaller --min-travel, or "
-            "another log."
-        )
-    turned = float(np.median(closing.values)) < 0.0
-    if turned:
-        closing = _negated(closing)
-        opening = None if opening is None else _negated(opening)
-    every = (closing, *((opening,) if opening else ()))
-    return LogSummary(
-        source=recording.source,
-        places=places,
-        closing=closing,
-        opening=opening,
-        speeds=tuple(one for curves in every for one in _classes(curves)),
-        mean=mean_interval(closing.values.mean(axis=1)),
-        work=mean_interval(closing.work),
-        drift=_trend(closing.values.mean(axis=1)),
-        left_out=left_out + other,
-        turned=turned,
+    seen = [_Strokes.of(recording, effort, places) for recording, effort in logs]
+    turned = {
+        effort: _resists([one for one, log in zip(seen, logs, strict=True) if log[1] == effort]) < 0
+        for _, effort in logs
+    }
+    return tuple(
+        _summary(recording, strokes, places, turned[effort])
+        for strokes, (recording, effort) in zip(seen, logs, strict=True)
     )
 
 
@@ -242,18 +224,21 @@ def friction_of(blank: LogSummary) -> Interval | None:
 
 
 def effort_of(recording: Recording, effort: Effort) -> Array:
-    """The channel (N,): a force becomes a torque where the handle's radius is known."""
+    """The channel (N,): of a rotary joint, a force becomes a torque where its lever is known."""
     values = np.asarray(recording.samples[effort], dtype=np.float64)
-    if effort == "handle_force" and np.isfinite(recording.handle_radius_m):
-        return values * recording.handle_radius_m
-    return values
+    return values * recording.handle_radius_m if _has_lever(recording, effort) else values
 
 
 def effort_unit(recording: Recording, effort: Effort) -> str:
     """Unit of :func:`effort_of`."""
-    if effort == "handle_force" and not np.isfinite(recording.handle_radius_m):
+    if effort == "handle_force" and not _has_lever(recording, effort):
         return "N"
     return recording.joint.effort_unit
+
+
+def _has_lever(recording: Recording, effort: Effort) -> bool:
+    turns = recording.joint.kind == "rotary"
+    return effort == "handle_force" and turns and bool(np.isfinite(recording.handle_radius_m))
 
 
 def plateau_of(curve: Array, places: Array) -> tuple[int, int] | None:
@@ -302,19 +287,87 @@ def _t(freedom: float) -> float:
     return float(stats.t.ppf(0.5 + 0.5 * LEVEL, freedom))
 
 
-def _trend(values: Array) -> Interval:
+def _trend(values: Array) -> Interval | None:
     """Slope of values (n,) over their number, with the 90 % interval of least squares."""
     count = len(values)
     if count < FEWEST:
-        return Interval(0.0, None, None, count)
+        return None
     fitted = stats.linregress(np.arange(count), values)
     reach = _t(count - 2) * float(fitted.stderr)
     slope = float(fitted.slope)
     return Interval(slope, slope - reach, slope + reach, count)
 
 
+@dataclass(frozen=True)
+class _Strokes:
+    """The strokes of a log that reach over the grid, as they were measured."""
+
+    closing: Curves
+    opening: Curves | None
+    left_out: int
+    travel: float
+
+    @classmethod
+    def of(cls, recording: Recording, effort: Effort, places: Array) -> "_Strokes":
+        values = effort_of(recording, effort)
+        if float(np.ptp(values)) == 0.0:
+            raise InputError(
+                f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "
+                "check the sensor."
+            )
+        closing, left_out = _curves(recording, values, places, "closing")
+        opening, other = _curves(recording, values, places, "opening")
+        if closing is None:
+            raise InputError(
+                f"{recording.source}: no closing stroke reaches over the range from "
+                f"{places[0]:.3g} to {places[-1]:.3g} {recording.joint.position_unit}: give a "
+                "smaller --min-travel, or another log."
+            )
+        low, high = _ends_of(recording)
+        return cls(closing, opening, left_out + other, high - low)
+
+
+def _resists(seen: Sequence[_Strokes]) -> float:
+    """Above 0 where the channel's sign is that in which closing is resisted."""
+    both = [
+        float(one.closing.values.mean() - one.opening.values.mean())
+        for one in seen
+        if one.opening is not None
+    ]
+    return sum(both) if both else float(np.median(seen[0].closing.values))
+
+
+def _summary(recording: Recording, strokes: _Strokes, places: Array, turned: bool) -> LogSummary:
+    closing, opening = strokes.closing, strokes.opening
+    if turned:
+        closing = _negated(closing)
+        opening = None if opening is None else _negated(opening)
+    every = (closing, *((opening,) if opening else ()))
+    width = float(places[-1] - places[0]) * len(places) / (len(places) - 1)
+    return LogSummary(
+        source=recording.source,
+        places=places,
+        closing=closing,
+        opening=opening,
+        speeds=tuple(one for curves in every for one in _classes(curves)),
+        mean=mean_interval(closing.values.mean(axis=1)),
+        work=mean_interval(closing.work),
+        drift=_trend(closing.values.mean(axis=1)),
+        share=width / strokes.travel,
+        left_out=strokes.left_out,
+        turned=turned,
+    )
+
+
 def _range_of(recording: Recording) -> tuple[float, float]:
-    """The range of opening that at least half of the closing strokes reach over."""
+    """The range of opening over which closing strokes are compared, without their ends."""
+    low, high = _ends_of(recording)
+    margin = EDGE * (high - low)
+    return low + margin, high - margin
+
+
+def _ends_of(recording: Recording) -> tuple[float, float]:
+    """Where the median closing stroke ends, and where it begins."""
     opening = np.asarray(recording.samples["opening"], dtype=np.float64)
     unit = recording.joint.position_unit
     if unit == "rad" and np.ptp(opening) > FULL_TURN_RAD:
@@ -332,8 +385,7 @@ def _range_of(recording: Recording) -> tuple[float, float]:
         )
     low = float(np.median([part.min() for part in parts]))
     high = float(np.median([part.max() for part in parts]))
-    margin = EDGE * (high - low)
-    return low + margin, high - margin
+    return low, high
 
 
 def _curves(
@@ -377,13 +429,14 @@ def _binned(opening: Array, values: Array, edges: Array) -> Array | None:
 def _classes(curves: Curves) -> list[SpeedClass]:
     """Strokes grouped by speed, slow ones first."""
     order = np.argsort(curves.speeds)
-    speeds = curves.speeds[order]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        apart = np.flatnonzero(speeds[1:] / speeds[:-1] > SPEED_CLASS) + 1
-    means = curves.values.mean(axis=1)[order]
+    speeds, means = curves.speeds[order], curves.values.mean(axis=1)[order]
+    first = [0]
+    for index, speed in enumerate(speeds):
+        if speed > SPEED_CLASS * speeds[first[-1]]:
+            first.append(index)
     return [
         SpeedClass(curves.kind, float(np.median(own)), mean_interval(level))
-        for own, level in zip(np.split(speeds, apart), np.split(means, apart), strict=True)
+        for own, level in zip(np.split(speeds, first[1:]), np.split(means, first[1:]), strict=True)
     ]
 
 

@@ -1,5 +1,6 @@
 """What is said of an error, with which exit code; files that cannot be written are user errors."""
 
+import contextlib
 import shutil
 import tempfile
 from pathlib import Path
@@ -44,6 +45,8 @@ def _fullest_folder(workspace: Path | None) -> Path:
     The first of them where none did.
     """
     folders = [workspace] if workspace else []
-    folders += [Path(), Path(tempfile.gettempdir())]
+    folders.append(Path())
+    with contextlib.suppress(OSError):  # it tries each folder, and finds none where all are full
+        folders.append(Path(tempfile.gettempdir()))
     full = (folder for folder in folders if shutil.disk_usage(folder).free < _ENOUGH_BYTES)
     return next(full, folders[0]).absolute()

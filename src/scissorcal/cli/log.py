@@ -1,6 +1,7 @@
 """The workspace's log: one line for each command, with the traceback of a fault below it."""
 
 import contextlib
+import os
 import shlex
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -26,7 +27,12 @@ def log_command(
         line += f"  # {' '.join(error.split())}"
     lines = [line, *(f"    {row}" for row in trace.splitlines())]
     with (
-        contextlib.suppress(OSError),  # a full disk or a folder of somebody else
-        (workspace / LOG_FILE).open("a", encoding="utf-8") as file,
+        contextlib.suppress(OSError),  # a full disk, a folder of somebody else, a symbolic link
+        open(workspace / LOG_FILE, "a", encoding="utf-8", opener=_own) as file,
     ):
         file.write(printable("\n".join(lines)) + "\n")
+
+
+def _own(path: str, flags: int) -> int:
+    """Open the log itself, and nothing that a symbolic link or a pipe of its name leads to."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)

@@ -21,7 +21,6 @@ import typer
 from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
 from scissorcal.cli.log import log_command
 from scissorcal.cli.terminal import drawn, echo, kept, printable_json, style
-from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
 
@@ -255,6 +254,6 @@ def _next_line(answer: Answer, running: _Running) -> str:
 
     try:
         following = make_plan(running.workspace).next_command
-    except (ScissorcalError, OSError):  # the recipe or a file is wrong, as 'plan' says
+    except Exception:  # noqa: BLE001 - the command's own answer stands; 'plan' tells what is wrong
         following = "scissorcal plan"
     return f"next: {following or 'nothing is left to do'}"

@@ -91,8 +91,7 @@ def summarise(
     from scissorcal.report.summary import Shown, summary_page, summary_panels
     from scissorcal.report.text import panels_text
 
-    if blank and compare:
-        raise InputError("Give --blank or --compare, not both.")
+    _refuse(log, blank, compare, joint, handle_radius_mm, output)
     chosen = {name: column_of(at) for name, at in pairs("column", columns)}
     unit_of, scale_of = dict(pairs("unit", units)), dict(pairs("scale", scales))
 
@@ -128,14 +127,21 @@ def summarise(
     recording, effort = read(log)
     second, second_effort = read(second_path) if second_path else (None, effort)
     unit = effort_unit(recording, effort)
+    if second is not None and second.joint.kind != recording.joint.kind:
+        raise InputError(
+            f"{log} is of a {recording.joint.kind} joint and {second_path} of a "
+            f"{second.joint.kind} one: compare logs of one kind."
+        )
     if second is not None and effort_unit(second, second_effort) != unit:
         raise InputError(
             f"{log} is in {unit} and {second_path} in {effort_unit(second, second_effort)}: "
             "compare logs of one quantity (--handle-radius-mm makes a force a torque)."
         )
-    places = common_places([recording, *([second] if second is not None else [])])
-    found = sum_up(recording, effort, places)
-    other = sum_up(second, second_effort, places) if second is not None else None
+    logs = [(recording, effort), *([(second, second_effort)] if second is not None else [])]
+    places = common_places([one for one, _ in logs])
+    found, *rest = sum_up(logs, places)
+    other = rest[0] if rest else None
+    notes = tuple(f"{one.source}: {said}" for one, _ in logs for said in _said(one))
     shown = Shown(
         log=found,
         second=other,
@@ -149,11 +155,43 @@ def summarise(
         cut_length_m=cut_length_mm * 1e-3 if cut_length_mm else None,
         created=datetime.now(UTC),
         version=scissorcal.__version__,
+        notes=notes,
     )
     panels = summary_panels(shown)
     page = summary_page(shown)
     with replacing(output) as part:
         part.write_text(page, encoding="utf-8")
-    notes = [f"{log.name}: {said}" for said in recording.notes[1:]]
-    text = "\n".join([panels_text(panels), *(f"note: {said}" for said in notes), str(output)])
+    text = "\n".join([panels_text(panels), str(output)])
     return Answer({"panels": panels, "notes": notes}, text, files=[output])
+
+
+def _said(recording: "Recording") -> tuple[str, ...]:
+    """What reading a log told, without the sentence that an import begins with: which column."""
+    imported = not recording.source.endswith(".mcap")
+    return recording.notes[1:] if imported else recording.notes
+
+
+def _refuse(
+    log: Path,
+    blank: Path | None,
+    compare: Path | None,
+    joint: str,
+    handle_radius_mm: float | None,
+    output: Path,
+) -> None:
+    """Raise InputError for options that contradict each other."""
+    if blank and compare:
+        raise InputError("Give --blank or --compare, not both.")
+    if handle_radius_mm is not None and not 0.0 < handle_radius_mm < float("inf"):
+        raise InputError(
+            f"A handle radius of {handle_radius_mm:g} mm is no lever: give a positive length."
+        )
+    if handle_radius_mm is not None and joint == "linear":
+        raise InputError(
+            "A linear joint has no lever: leave --handle-radius-mm out, or give --joint rotary."
+        )
+    for path in (log, blank, compare):
+        if path is not None and path.exists() and output.exists() and output.samefile(path):
+            raise InputError(f"--output {output} is a log that is read: name another file.")
+    if output.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--output {output} is a page: give it a name that ends in .html.")

@@ -157,7 +157,11 @@ def _unit_in(heading: str) -> str | None:
         known = _is_raw(text) or parse_unit(_of_force(_plain(text))[0])
         return text if known else None
     _, unit = split_unit(heading.strip())
-    return unit.name if unit else None
+    if unit:
+        return unit.name
+    last = heading.strip().rpartition("_")[2]
+    is_force = last != heading.strip() and _of_force(last)[0] != last
+    return last if is_force else None
 
 
 def _is_number(scale: str | float) -> bool:

@@ -1,5 +1,6 @@
 """What a position sensor can tell apart: its step, its noise, and the least stroke that is one."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,10 @@ STEPS_OF_STROKE = 3.0
 """A resting encoder moves between two neighbouring values; with noise of a step, between three."""
 NOISE_OF_STROKE = 10.0
 """Of 10^6 samples of white normal noise, the largest and the smallest lie 9.8 sd apart (mean)."""
+MOST_NOISE_SHARE = 0.25
+"""Of the range: what is taken for noise never makes a stroke of a larger share no stroke."""
+ORDERS = range(2, 9)
+"""Differences from which noise is told: a motion of x rad a sample leaves (2 sin(x/2))^k of it."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,9 @@ def stroke_threshold(position: Array, joint: Joint) -> StrokeThreshold:
         f"{TRAVEL_SHARE:.0%} of the range": TRAVEL_SHARE * float(np.ptp(position)),
         f"the least for a {joint.kind} joint": LEAST_TRAVEL[joint.kind],
         f"{STEPS_OF_STROKE:.0f} steps of the sensor": STEPS_OF_STROKE * step,
-        f"{NOISE_OF_STROKE:.0f} standard deviations of its noise": NOISE_OF_STROKE * noise,
+        f"{NOISE_OF_STROKE:.0f} standard deviations of its noise": min(
+            NOISE_OF_STROKE * noise, MOST_NOISE_SHARE * float(np.ptp(position))
+        ),
     }
     known = {reason: travel for reason, travel in choices.items() if np.isfinite(travel)}
     reason = max(known, key=lambda name: known[name])
@@ -65,10 +72,11 @@ def resolution_of(values: Array) -> float:
 
 
 def noise_of(values: Array) -> float:
-    """Standard deviation of white noise on a smooth signal (m,), from second differences.
+    """Standard deviation of white noise on a smooth signal (m,), from its differences.
 
-    Those of white noise have six times its variance, those of a smooth motion vanish; the median
-    is not moved by turns. NaN for less than three values.
+    Those of order k of white noise have (2k)! / k!^2 times its variance, those of a smooth motion
+    vanish, the sooner the higher k is: the least of several orders counts, which a log of few
+    samples a stroke needs. The median is not moved by turns. NaN for less than three values.
 
     >>> rng = np.random.default_rng(0)
     >>> round(noise_of(np.sin(np.arange(0, 9, 1e-3)) + rng.normal(0, 0.02, 9000)), 3)
@@ -76,5 +84,11 @@ def noise_of(values: Array) -> float:
     """
     if len(values) < 3:
         return float("nan")
+    orders = [order for order in ORDERS if order < len(values)]
+    return min(_noise_from(values, order) for order in orders)
+
+
+def _noise_from(values: Array, order: int) -> float:
     # 0.6745: the median of |x| for a standard normal x.
-    return float(np.median(np.abs(np.diff(values, 2))) / 0.6745 / np.sqrt(6.0))
+    spread = float(np.median(np.abs(np.diff(values, order)))) / 0.6745
+    return spread / math.sqrt(math.comb(2 * order, order))

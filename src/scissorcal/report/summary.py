@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     )
 
 PART = "summary"
+LEAST_SHARE = 0.5
+"""Of a stroke's travel; in a smaller range no length of cut is told apart."""
 LOOKS: dict[str, Look] = {"closing": "closing", "opening": "opening"}
 
 
@@ -43,7 +45,8 @@ class Shown:
     """All that the page shows. ``against`` is "blank" or "other", as the second log was given.
 
     ``unit`` is that of the resistance, ``place`` that of the opening in SI ("rad" or "m");
-    ``cut_length_m`` the length that one stroke cuts, where it was stated.
+    ``cut_length_m`` the length that one stroke cuts, where it was stated; ``notes`` are those of
+    reading the logs.
     """
 
     log: LogSummary
@@ -58,6 +61,7 @@ class Shown:
     cut_length_m: float | None
     created: datetime
     version: str
+    notes: tuple[str, ...] = ()
 
     @property
     def has_work(self) -> bool:
@@ -97,10 +101,7 @@ def _figures(shown: Shown) -> Panel:
     rows = [_row("closing, mean", log.mean, shown.unit, "over the range, positive: resists")]
     if shown.has_work:
         rows.append(_row("work of a closing stroke", log.work, "J"))
-        if shown.cut_length_m:
-            rows.append(
-                _row("work per length of cut", _times(log.work, 1.0 / shown.cut_length_m), "J/m")
-            )
+        rows += _per_length(shown, log.work)
     if shown.plateau:
         low, high = (_in_shown(shown, end) for end in (shown.plateau.low, shown.plateau.high))
         note = f"level from {low:.3g} to {high:.3g} {place}"
@@ -116,7 +117,8 @@ def _figures(shown: Shown) -> Panel:
                 "friction, where no material is between the blades",
             )
         )
-    rows.append(_row("drift from stroke to stroke", log.drift, shown.unit))
+    if log.drift:
+        rows.append(_row("drift from stroke to stroke", log.drift, shown.unit))
     for one in log.speeds:
         speed = _in_shown(shown, one.speed)
         rows.append(_row(f"{one.kind} at {speed:.3g} {place}/s", one.level, shown.unit))
@@ -148,8 +150,26 @@ def _sentence(shown: Shown) -> str:
     return f"{told}: the interval {leaves}."
 
 
+def _per_length(shown: Shown, work: Interval) -> list[Row]:
+    """Work over the length that is cut within the range: as much of it as of a stroke's travel."""
+    if not shown.cut_length_m or shown.log.share < LEAST_SHARE:
+        return []
+    within_m = shown.cut_length_m * shown.log.share
+    note = (
+        f"{1e3 * within_m:.3g} mm of {1e3 * shown.cut_length_m:.3g}: the range is "
+        f"{shown.log.share:.0%} of a stroke, which cuts alike at every opening"
+    )
+    return [_row("work per length of cut", _times(work, 1.0 / within_m), "J/m", note)]
+
+
 def _notes(shown: Shown) -> tuple[str, ...]:
-    found = []
+    found = list(shown.notes)
+    if shown.cut_length_m and shown.log.share < LEAST_SHARE:
+        found.append(
+            f"The range is {shown.log.share:.0%} of a closing stroke of {shown.log.source}: how "
+            "much of the cut's length falls within it is not known, so there is no work per "
+            "length. Compare with strokes over the same range."
+        )
     for log in (shown.log, *((shown.second,) if shown.second else ())):
         if log.turned:
             found.append(
@@ -207,9 +227,7 @@ def _difference(shown: Shown, apart: Difference) -> Panel:
     rows = [_row("mean", apart.mean, shown.unit)]
     if shown.has_work:
         rows.append(_row("work of a closing stroke", apart.work, "J"))
-        if shown.cut_length_m:
-            per_m = _times(apart.work, 1.0 / shown.cut_length_m)
-            rows.append(_row("work per length of cut", per_m, "J/m"))
+        rows += _per_length(shown, apart.work)
     if apart.plateau:
         low, high = (_in_shown(shown, end) for end in (apart.plateau.low, apart.plateau.high))
         note = f"level from {low:.3g} to {high:.3g} {_place_unit(shown)}"

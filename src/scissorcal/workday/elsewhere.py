@@ -1,6 +1,7 @@
 """Results that their workspace could not take: kept in another folder, and put in place later."""
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -38,7 +39,9 @@ def save_anywhere(
         refusal = file_error(error, engine.file(step.name))
         if refusal is None:
             raise
-        raise _kept_elsewhere(refusal, step, result, folder) from None
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        when = "once there is space" if full else "once the workspace can be written"
+        raise _kept_elsewhere(str(refusal), when, step, result, folder) from None
 
 
 def refuse_unwritable(engine: Engine, folder: Path | None) -> None:
@@ -61,12 +64,17 @@ def put_in_place(engine: Engine, path: Path) -> tuple[Step, Path | None]:
 
     step = _step_of(path)
     module, _, name = step.holds.partition(":")
-    load(path, getattr(import_module(module), name))
+    found = load(path, getattr(import_module(module), name))
+    if found.what != step.what:
+        raise InputError(
+            f"{path} holds a fit of {found.what}, and its name begins with {step.what}-: give it "
+            f"a name that begins with {found.what}-. Nothing was changed."
+        )
     return step, take_place(engine, step.name, path)
 
 
 def _kept_elsewhere(
-    refusal: InputError, step: Step, result: "Result", folder: Path | None
+    refusal: str, when: str, step: Step, result: "Result", folder: Path | None
 ) -> InputError:
     from scissorcal.calibration.store import save
 
@@ -78,7 +86,7 @@ def _kept_elsewhere(
         except OSError:
             continue
         told = InputError(
-            f"{refusal} The fit is kept in {path}: once there is space, put it in place with "
+            f"{refusal} The fit is kept in {path}: {when}, put it in place with "
             f"'scissorcal fit restore {path}'."
         )
         told.kept = (path,)
@@ -89,7 +97,8 @@ def _kept_elsewhere(
 def _places(folder: Path | None) -> Iterator[Path]:
     if folder is not None:
         yield folder.absolute()
-    yield Path(tempfile.gettempdir())
+    with contextlib.suppress(OSError):  # it tries each folder, and finds none where all are full
+        yield Path(tempfile.gettempdir())
     with contextlib.suppress(RuntimeError):  # a user without a home folder
         yield Path.home()
 

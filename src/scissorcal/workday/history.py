@@ -45,15 +45,16 @@ class Version:
 def keep(engine: Engine, name: str) -> Path | None:
     """Have the result of a step, its trust check and its pictures in fits/history/<version>/ too.
 
-    Gives the folder, None where there was no result. A kill leaves the whole folder or none.
+    Gives the folder, None where there was no result. A kill leaves the whole folder or none. A
+    folder that is there, as after a killed restore, loses nothing.
     """
     path = engine.file(name)
     if not path.is_file():
         return None
-    stamp = datetime.fromtimestamp(path.stat().st_mtime, UTC).strftime("%Y%m%dT%H%M%SZ")
-    folder = _folder(engine) / f"{path.stem}-{stamp}-{engine.index.digest(path)[:HASH]}"
+    folder = _version_folder(engine, path)
     if folder.exists():
-        shutil.rmtree(folder)
+        _put_all(path, folder / path.name)
+        return folder
     folder.parent.mkdir(exist_ok=True)
     part = part_of(folder)
     try:
@@ -102,23 +103,29 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
             f"{name} {how} of a fit. Earlier versions: {earlier}. 'scissorcal fit log' shows them."
         )
     (version,) = found
-    if version.current:
+    if not version.current:
+        before = take_place(engine, f"fit {version.what}", version.path)
+        # What cannot be removed now is not shown, and is whole where it is restored.
+        shutil.rmtree(version.path.parent, ignore_errors=True)
+        return version, before
+    folder = _version_folder(engine, version.path)
+    if not folder.exists():
         raise InputError(f"{version.name} is the version in use: nothing was changed.")
-    before = take_place(engine, f"fit {version.what}", version.path)
-    shutil.rmtree(version.path.parent)
-    return version, before
+    # A restore was killed once its fit was in use: what stands beside it is still to come.
+    _put_all(folder / version.path.name, version.path)
+    shutil.rmtree(folder, ignore_errors=True)
+    engine.refresh()
+    return version, None
 
 
 def take_place(engine: Engine, name: str, source: Path) -> Path | None:
     """Put the result ``source``, with what stands beside it, in use; the one in use is kept.
 
-    Gives the folder of the one that was in use.
+    Gives the folder of the one that was in use. Killed, or without space, it leaves one of the two
+    results in use, whole, and nothing beside it that belongs to the other.
     """
-    before = keep(engine, name)
-    path = engine.file(name)
-    for part in _beside(path):
-        _remove(part)
-    _put_all(source, path)
+    before = _replace(engine, name, lambda path: put_beside(source, path))
+    _put_all(source, engine.file(name))
     engine.refresh()
     return before
 
@@ -129,55 +136,71 @@ def save_version(
     """Keep the result that is there, then write the new one. Gives its path.
 
     ``draw`` draws the pictures that stand beside it, into the folder it is given. Where writing
-    fails, or is killed, the earlier result stays in use; pictures are never those of another
-    result, and may be missing after a kill.
+    fails, or is killed, the earlier result stays in use. Pictures and trust checks are never those
+    of another result; after a kill they may stand in the result's version alone.
     """
     from scissorcal.calibration.store import save
 
     path = engine.file(name)
-    pictures = path.with_suffix("")
-    drawn = part_of(pictures)
+    drawn = part_of(path.with_suffix(""))
     try:
         if draw is not None:
             draw(drawn)
-        kept = keep(engine, name)
-        _remove(pictures)
-        try:
-            save(result, path)
-        except BaseException:
-            if kept is not None:
-                with contextlib.suppress(OSError):  # what could not be written is told instead
-                    _put(kept / pictures.name, pictures)
-                    shutil.rmtree(kept)
-            raise
+        kept = _replace(engine, name, lambda target: save(result, target))
         if drawn.exists():
-            rename_folder(drawn, pictures)
+            rename_folder(drawn, path.with_suffix(""))
     finally:
         shutil.rmtree(drawn, ignore_errors=True)
     if kept is not None and file_digest(path) == file_digest(kept / path.name):
         # The same result again: its trust check stands, and no version is added.
+        for check in _checks_beside(kept / path.name):
+            _put(check, path.parent / check.name)
         shutil.rmtree(kept)
-    else:
-        for check in _checks_beside(path):
-            _remove(check)
     engine.refresh()
     return path
 
 
+def _replace(engine: Engine, name: str, write: Callable[[Path], object]) -> Path | None:
+    """Have ``write`` replace a result; what stood beside the earlier one stays in its version.
+
+    Gives the version's folder, None where there was no result. Where writing fails, the earlier
+    result stands as before.
+    """
+    path = engine.file(name)
+    is_new = not (path.is_file() and _version_folder(engine, path).exists())
+    kept = keep(engine, name)
+    for part in _beside(path):
+        _remove(part)
+    try:
+        write(path)
+    except BaseException:
+        if kept is not None:
+            with contextlib.suppress(OSError):  # what could not be written is told instead
+                _put_all(kept / path.name, path)
+                if is_new:
+                    shutil.rmtree(kept)
+        raise
+    return kept
+
+
 def _put_all(source: Path, target: Path) -> None:
-    """Put a result and what stands beside it under another name, the result itself last."""
+    """Put a result and what stands beside it under another name, the result itself first."""
     target.parent.mkdir(parents=True, exist_ok=True)
+    _put(source, target)
     for one, other in zip(_beside(source), _beside(target), strict=True):
         _put(one, other)
-    _put(source, target)
 
 
 def _put(source: Path, target: Path) -> None:
-    """Put a file, or the files of a folder, under another name; nothing where there is none."""
+    """Put a file, or the files of a folder, under another name; nothing where there is none.
+
+    Folders within it are other programs' (thumbnails, for example) and stay behind.
+    """
     if source.is_dir():
         target.mkdir(exist_ok=True)
         for file in source.iterdir():
-            put_beside(file, target / file.name)
+            if file.is_file():
+                put_beside(file, target / file.name)
     elif source.exists():
         put_beside(source, target)
 
@@ -205,6 +228,12 @@ def _version(engine: Engine, name: str, path: Path, current: bool) -> Version:
     return Version(
         own, step.what, when, facts["label"], tuple(facts["failed"]), verified, current, path
     )
+
+
+def _version_folder(engine: Engine, path: Path) -> Path:
+    """The folder of the version that the result ``path`` is, whether or not it is there."""
+    stamp = datetime.fromtimestamp(path.stat().st_mtime, UTC).strftime("%Y%m%dT%H%M%SZ")
+    return _folder(engine) / f"{path.stem}-{stamp}-{engine.index.digest(path)[:HASH]}"
 
 
 def _folder(engine: Engine) -> Path:

@@ -10,9 +10,9 @@ from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.foreign import read_json
 from scissorcal.foreign.formats import STATE
-from scissorcal.identity import file_digest
+from scissorcal.identity import digest, file_digest
 
-FORMAT = "scissorcal-index/3"
+FORMAT = "scissorcal-index/4"
 
 Facts = dict[str, Any]
 
@@ -44,11 +44,12 @@ class FileIndex:
             entry = self._entries[key] = {"stamp": stamp, "facts": {}}
         known = entry["facts"].get(what)
         if known is None or known["given"] != given:
-            known = {"given": given, "facts": json.loads(json.dumps(read(path)))}
+            found = json.loads(json.dumps(read(path)))
+            known = {"given": given, "facts": found, "digest": _digest(given, found)}
             entry["facts"][what] = known
             self._changed = True
-        found: Facts = known["facts"]
-        return found
+        facts: Facts = known["facts"]
+        return facts
 
     def digest(self, path: Path) -> str:
         """SHA-256 of a file's bytes."""
@@ -81,14 +82,22 @@ class FileIndex:
 
 
 def _is_entry(entry: Any) -> bool:
-    """Whether an entry has the form that :meth:`FileIndex.facts` keeps; others are dropped."""
+    """Whether an entry is whole, as :meth:`FileIndex.facts` keeps it; others are dropped."""
     if not isinstance(entry, dict) or not isinstance(entry.get("facts"), dict):
         return False
-    facts = entry["facts"].values()
-    return "stamp" in entry and all(
-        isinstance(one, dict) and "given" in one and isinstance(one.get("facts"), dict)
-        for one in facts
-    )
+    return "stamp" in entry and all(_is_whole(one) for one in entry["facts"].values())
+
+
+def _is_whole(known: Any) -> bool:
+    if not isinstance(known, dict) or not isinstance(known.get("facts"), dict):
+        return False
+    given = known.get("given")
+    return isinstance(given, str) and known.get("digest") == _digest(given, known["facts"])
+
+
+def _digest(given: str, facts: Facts) -> str:
+    """Digest of kept facts and of what they follow from, which damage changes."""
+    return digest([given, facts])
 
 
 def _stamp(path: Path) -> list[int]:

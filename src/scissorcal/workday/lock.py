@@ -5,9 +5,11 @@ import errno
 import fcntl
 import json
 import os
+import stat
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 LOCK_FILE = "lock"
 _LONGEST = 4096
 _READ_ONLY = (errno.EROFS, errno.EACCES, errno.EPERM)
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF)
+"""Answers of file systems without locks; NFS gives EBADF for a file that may only be read."""
 
 
 @contextlib.contextmanager
@@ -29,13 +33,14 @@ def writing(
     The system gives the lock back when its process ends, however it ends: none is ever stale. A
     network folder may not carry it from one computer to another: the holder's name stands in the
     file until it ends, and ``tell`` hears of one on another computer that has not ended or was
-    killed. A workspace that may only be read needs no lock: nothing can be written there. Raises
-    InputError where another command holds the lock, with that command and its age.
+    killed; it also hears where the file system has no locks at all. A workspace that may only be
+    read needs none: nothing can be written there. Raises InputError where another command holds the
+    lock, with that command and its age, and where the lock is no plain file.
     """
     path = workspace.root / ".scissorcal" / LOCK_FILE
     try:
         path.parent.mkdir(exist_ok=True)
-        opened = path.open("ab+", buffering=0)
+        opened = _open(path)
     except OSError as error:
         if error.errno not in _READ_ONLY:
             raise
@@ -46,18 +51,48 @@ def writing(
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(_refusal(workspace, _holder(file))) from None
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise
+            tell(
+                f"{path} cannot be locked on its file system: of two commands that write at once "
+                "each file is whole, and the last one written stays."
+            )
+            yield
+            return
         before = _holder(file)
         if before is not None and before.host != os.uname().nodename:
             tell(_not_seen(workspace, before))
         holder = _Holder(command, os.uname().nodename, os.getpid(), time.time())
-        file.truncate(0)
-        with contextlib.suppress(OSError):  # a full disk: the lock itself takes no space
+        # A full disk, or a lock that another user made: the lock itself is held all the same.
+        with contextlib.suppress(OSError):
+            file.truncate(0)
             file.write(json.dumps(asdict(holder)).encode())
         try:
             yield
         finally:
             with contextlib.suppress(OSError):
                 file.truncate(0)
+
+
+def _open(path: Path) -> IO[bytes]:
+    """Open the lock's own file and no other; to read alone where another user made it."""
+    for one in (path.parent, path):
+        if one.is_symlink():
+            raise InputError(
+                f"{one} is a symbolic link, and what it leads to is not the workspace's: remove "
+                "the link."
+            )
+    how = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    try:
+        handle, mode = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | how, 0o666), "ab+"
+    except PermissionError:
+        handle, mode = os.open(path, os.O_RDONLY | how), "rb"
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink != 1:
+        os.close(handle)
+        raise InputError(f"{path} is not the workspace's own plain file: remove it.")
+    return os.fdopen(handle, mode, buffering=0)
 
 
 @dataclass(frozen=True)
@@ -81,7 +116,7 @@ def _holder(file: IO[bytes]) -> _Holder | None:
         return _Holder(
             str(found["command"]), str(found["host"]), int(found["pid"]), float(found["start_s"])
         )
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
 
 
