@@ -59,6 +59,13 @@ def rename_folder(part: Path, folder: Path) -> None:
     _keep_name(folder.parent)
 
 
+def discard_folder(folder: Path) -> None:
+    """Remove a folder: at once under its name, its files then or by the next command."""
+    part = part_of(folder)
+    folder.rename(part)
+    shutil.rmtree(part, ignore_errors=True)
+
+
 def put_beside(source: Path, target: Path) -> None:
     """Have the file ``source`` under the name ``target`` too, in place of what was there.
 

@@ -289,9 +289,13 @@ def _read_checkpoint(path: Path) -> None:
 
 
 def _state_index(path: Path) -> None:
-    entry = {"stamp": [1, 2, 3, 4], "facts": {"sha256": {"given": "", "facts": {"sha256": "1f"}}}}
-    path.parent.joinpath(".scissorcal").mkdir(exist_ok=True)
-    path.write_text(json.dumps({"format": "scissorcal-index/3", "files": {"a": entry}}))
+    from scissorcal.workday.index import FileIndex
+
+    (path.parent / "a").write_bytes(b"content")
+    index = FileIndex(path.parent)
+    index.digest(path.parent / "a")
+    index.save()
+    index.path.replace(path)
 
 
 def _read_state_index(path: Path) -> None:

@@ -20,6 +20,8 @@ from tests.workday.faults import Fault, Outcome, run
 from tests.workday.made import quick_workspace, record_cut, record_friction
 
 SIGN = ("report", "sign", "--name", "A. Reviewer", "--decision", "accept")
+BESIDE = "picture"
+"""Stands beside each fit of friction, and tells of which it is."""
 WHOLE_DAY = (("fit",), ("report",), SIGN, ("package", "build"))
 
 
@@ -38,13 +40,16 @@ def finished_day(folder: Path) -> Workspace:
     workspace = quick_workspace(folder)
     record_friction(workspace)
     record_cut(workspace)
-    records = workspace.root / "fits" / "friction.verify.partial.jsonl"
+    beside = workspace.root / "fits" / "friction" / BESIDE
     done = run(("fit", "friction", "--seed", "8"), workspace.root)
-    records.write_text("records of the earlier fit's trust check\n", encoding="utf-8")
+    assert done.code == 0, done.err
+    beside.parent.mkdir(exist_ok=True)
+    beside.write_text("of the earlier fit", encoding="utf-8")
     for words in (("fit", "friction", "--force"), *WHOLE_DAY):
         done = run(words, workspace.root)
         assert done.code == 0, done.err
-    records.write_text("records of the trust check of the fit in use\n", encoding="utf-8")
+    beside.parent.mkdir(exist_ok=True)
+    beside.write_text("of the fit in use", encoding="utf-8")
     return workspace
 
 
@@ -123,7 +128,7 @@ def faults_of(folder: Path, before: Path) -> list[str]:
         for path in sorted(folder.rglob("*"))
         if path.is_file() and (why := _damage(path))
     ]
-    for kind in ("*.nc", "*.verify.partial.jsonl"):
+    for kind in ("*.nc", f"friction/{BESIDE}"):
         there = {path.read_bytes() for path in folder.rglob(kind)}
         found += [
             f"{path.relative_to(before)} is lost"
@@ -131,9 +136,9 @@ def faults_of(folder: Path, before: Path) -> list[str]:
             if path.read_bytes() not in there
         ]
     found += [
-        f"{records.relative_to(folder)} stands beside another fit"
-        for records in folder.rglob("*.verify.partial.jsonl")
-        if records.read_bytes() not in _records_of(before, records.with_name("friction.nc"))
+        f"{beside.relative_to(folder)} stands beside another fit"
+        for beside in folder.rglob(f"friction/{BESIDE}")
+        if beside.read_bytes() not in _beside(before, beside.parent.with_suffix(".nc"))
     ]
     for name in ("fits/friction.nc", "fits/cut.nc", "report/report.html", "recipe.toml"):
         if (before / name).exists() and not (folder / name).exists():
@@ -154,10 +159,10 @@ def faults_of(folder: Path, before: Path) -> list[str]:
     return found
 
 
-def _records_of(before: Path, fit: Path) -> set[bytes]:
-    """What the records beside a fit may be: those that stood beside one of its content."""
+def _beside(before: Path, fit: Path) -> set[bytes]:
+    """What may stand beside a fit: what stood beside one of its content."""
     return {
-        path.with_name("friction.verify.partial.jsonl").read_bytes()
+        (path.with_suffix("") / BESIDE).read_bytes()
         for path in before.rglob("friction.nc")
         if fit.exists() and path.read_bytes() == fit.read_bytes()
     }

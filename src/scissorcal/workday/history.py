@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError, MissingError
-from scissorcal.files import part_of, put_beside, rename_folder
+from scissorcal.files import discard_folder, part_of, put_beside, rename_folder
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.steps import BY_NAME, steps_of
@@ -105,15 +105,14 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     (version,) = found
     if not version.current:
         before = take_place(engine, f"fit {version.what}", version.path)
-        # What cannot be removed now is not shown, and is whole where it is restored.
-        shutil.rmtree(version.path.parent, ignore_errors=True)
+        discard_folder(version.path.parent)
         return version, before
     folder = _version_folder(engine, version.path)
     if not folder.exists():
         raise InputError(f"{version.name} is the version in use: nothing was changed.")
     # A restore was killed once its fit was in use: what stands beside it is still to come.
     _put_all(folder / version.path.name, version.path)
-    shutil.rmtree(folder, ignore_errors=True)
+    discard_folder(folder)
     engine.refresh()
     return version, None
 
@@ -155,7 +154,7 @@ def save_version(
         # The same result again: its trust check stands, and no version is added.
         for check in _checks_beside(kept / path.name):
             _put(check, path.parent / check.name)
-        shutil.rmtree(kept)
+        discard_folder(kept)
     engine.refresh()
     return path
 
@@ -178,7 +177,7 @@ def _replace(engine: Engine, name: str, write: Callable[[Path], object]) -> Path
             with contextlib.suppress(OSError):  # what could not be written is told instead
                 _put_all(kept / path.name, path)
                 if is_new:
-                    shutil.rmtree(kept)
+                    discard_folder(kept)
         raise
     return kept
 
@@ -207,7 +206,7 @@ def _put(source: Path, target: Path) -> None:
 
 def _remove(path: Path) -> None:
     if path.is_dir():
-        shutil.rmtree(path)
+        discard_folder(path)
     else:
         path.unlink(missing_ok=True)
 

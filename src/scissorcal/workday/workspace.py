@@ -134,7 +134,8 @@ class Workspace:
     def remove_left_over(self) -> None:
         """Remove what killed commands left half-written; half a capture is recovered elsewhere."""
         inside = [one for one in self.root.iterdir() if one.is_dir() and one != self.captures_dir]
-        for folder in (self.root, self.root / "fits" / "history", *inside):
+        fits = [one for one in (self.root / "fits").glob("*") if one.is_dir()]
+        for folder in (self.root, *inside, *fits):
             remove_left_over(folder)
         remove_left_over(self.captures_dir, folders=False)
 
