@@ -14,6 +14,7 @@ HEADERS = (
     "sc_wire.h",
     "sc_table.h",
     "sc_table16.h",
+    "sc_turn.h",
     "sc_edge.h",
     "sc_model.h",
     "sc_hybrid.h",

@@ -18,19 +18,18 @@ from numpy.typing import NDArray
 
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.table16 import Row16
-from scissorcal.kernel.tables import ModelTables
+from scissorcal.kernel.tables import TABLE_NAMES, ModelTables
 
 Array = NDArray[np.float64]
 Real = Literal["float", "double"]
 Target = Literal["host", "cortex-m4f"]
 Rows = tuple[Row16, Row16, Row16]
 
-TABLES = ("edge", "response", "friction_opening", "friction_closing", "friction_angle")
 FEWEST_STATES, MOST_STATES = 10, 50_000
 SLOW_STROKE_rad_per_s = 0.5
 _TIMEOUT_s = 300.0
 
-_CORE = ("table", "table16", "edge", "fracture", "release", "model")
+_CORE = ("table", "table16", "turn", "edge", "fracture", "release", "model")
 _WARNINGS = ("-std=c99", "-Wall", "-Wextra")
 _HOST = ("cc", *_WARNINGS, "-D_POSIX_C_SOURCE=200809L", "-O3", "-fno-math-errno")
 _CORTEX = (
@@ -151,7 +150,7 @@ def _model_text(
     lines += [f"enum {{ STATES = {len(states)} }};"]
     lines += [f"static const float STROKE_RATE = {-SLOW_STROKE_rad_per_s};"]
     body = ["    int sound = 1;", "    memset(model, 0, sizeof *model);"]
-    for name in TABLES:
+    for name in TABLE_NAMES:
         own = getattr(tables, name)
         array = arrays.get(name, np.stack([own.x, own.y, own.slope]).astype(np.float64))
         upper, size = name.upper(), array.shape[1]

@@ -23,7 +23,7 @@ from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refus
 from scissorcal.kernel.plate import Section, placing
 from scissorcal.kernel.servo import SAMPLE_DTYPE, ServoConfig, ServoView
 from scissorcal.kernel.stop_reason import StopReason
-from scissorcal.kernel.tables import ModelTables, Table, fill_numbers
+from scissorcal.kernel.tables import TABLE_NAMES, ModelTables, Table, fill_numbers
 
 RING_SAMPLES = int(lib.SC_RING_SAMPLES)
 STALL_TICKS = int(lib.SC_TICKS_OF_A_STALL)
@@ -313,7 +313,7 @@ def _anonymous_file() -> int:
 
 def _store_tables(block: Any, tables: ModelTables) -> None:
     fill_numbers(block.model, tables)
-    for name in ("edge", "response", "friction_opening", "friction_closing", "friction_angle"):
+    for name in TABLE_NAMES:
         _store_table(getattr(block, name), getattr(tables, name))
     block.has_model = 1
     model = ffi.new("sc_model *")

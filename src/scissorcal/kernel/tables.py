@@ -13,6 +13,9 @@ Float32 = NDArray[np.float32]
 
 LARGEST_TABLE = int(lib.SC_TABLE_MAX)
 
+TABLE_NAMES = ("edge", "response", "friction_opening", "friction_closing", "friction_angle")
+"""The tables of a model, in the order of the core's own struct."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -183,7 +186,7 @@ def model_struct(tables: ModelTables) -> tuple[Any, tuple[Any, ...]]:
     """Give the C model of a set of tables, and what must be kept alive with it."""
     model = ffi.new("sc_model *")
     keep: list[Any] = [model]
-    for name in ("edge", "response", "friction_opening", "friction_closing", "friction_angle"):
+    for name in TABLE_NAMES:
         table = getattr(tables, name)
         area = np.zeros(len(table.x), dtype=np.float32) if name == "response" else None
         struct, kept = table_struct(table, area)

@@ -13,6 +13,13 @@ LEVELS = 9
 EVEN = 1e-6
 
 
+def energy_levels(mean_energy: Array) -> Array:
+    """Energies (J/m) for which there are kernels, from the values of the mean energy's table."""
+    lowest, highest = float(np.min(mean_energy)), float(np.max(mean_energy))
+    even = highest - lowest <= EVEN * highest
+    return np.linspace(lowest, highest, 1 if even else LEVELS)
+
+
 class AverageTorque:
     """Evaluates a package's tables with the ripple averaged out.
 
@@ -28,9 +35,8 @@ class AverageTorque:
         if mean is None:
             self._kernels = [Kernel(kernel_tables(mechanics, ranges, arrays))]
             return
-        self._lowest, self._highest = float(np.min(mean[1])), float(np.max(mean[1]))
-        even = self._highest - self._lowest <= EVEN * self._highest
-        levels = np.linspace(self._lowest, self._highest, 1 if even else LEVELS)
+        levels = energy_levels(mean[1])
+        self._lowest, self._highest = float(levels[0]), float(levels[-1])
         self._kernels = [
             Kernel(kernel_tables(mechanics, ranges, arrays, mean_energy=float(level)))
             for level in levels

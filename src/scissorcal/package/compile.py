@@ -20,7 +20,7 @@ from scissorcal.model.curvature import (
     response_curvature,
 )
 from scissorcal.package.exact import ExactModel
-from scissorcal.package.friction_tables import friction_tables
+from scissorcal.package.friction_tables import friction_functions, friction_tables
 from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, fit_table
@@ -168,18 +168,17 @@ def table_laws(model: ExactModel, recipe: Recipe) -> dict[str, TableLaw]:
     reach = _reach(model, points, recipe.limits.torque_Nm)
     cutting = model.cutting
     edge, response = cutting.edge, cutting.response
+    functions = law_functions(model)
     laws = {
         "edge": TableLaw(
-            edge.offset_at,
-            edge.slope_at,
+            *functions["edge"],
             reach.lowest_station,
             reach.highest_station,
             curvature=partial(edge_curvature, edge),
             breaks=edge_breaks(edge),
         ),
         "response": TableLaw(
-            response.force_at,
-            response.stiffness_at,
+            *functions["response"],
             0.0,
             reach.indentation,
             monotone=True,
@@ -193,6 +192,16 @@ def table_laws(model: ExactModel, recipe: Recipe) -> dict[str, TableLaw]:
     if cutting.fracture_energy is not None and float(cutting.kappa) < 1.0:
         laws["mean_energy"] = TableLaw(**_mean_energy_law(model, recipe))
     return laws
+
+
+def law_functions(model: ExactModel) -> dict[str, tuple[Function, Function]]:
+    """The laws of a model and their derivatives, by the table that holds each."""
+    cutting = model.cutting
+    functions: dict[str, tuple[Function, Function]] = {
+        "edge": (cutting.edge.offset_at, cutting.edge.slope_at),
+        "response": (cutting.response.force_at, cutting.response.stiffness_at),
+    }
+    return functions | (friction_functions(model.friction) if model.friction else {})
 
 
 def scene_mechanics(model: ExactModel, recipe: Recipe) -> Mechanics:
@@ -345,30 +354,31 @@ def _refuse_leaning(points: Points, height: Array) -> None:
         )
 
 
-def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
-    """Mean energy of the crack over its ripple, against the opening, in J/m.
+def mean_energy(model: ExactModel, opening: Array) -> Array:
+    """Mean energy of the crack over its ripple at openings (n,) in rad: J/m.
 
     Its share of the energy that starts the crack depends on the peak force there (not at all for
     a power law), and that on how the edge is inclined where the crack settles.
     """
     cutting = model.cutting
     energy = float(cutting.fracture_energy or 0.0)
+    place = settled_contact(cutting, opening)
+    cuts = np.isfinite(place)
+    view = edge_height(cutting.edge, np.where(cuts, place, 0.0), opening / cutting.moving_blades)
+    slope = np.where(cuts, np.maximum(view.slope, LEAST_SLOPE), LEAST_SLOPE)
+    peak = energy / (cutting.moving_blades * slope)
+    return np.broadcast_to(energy * mean_share(cutting, peak), peak.shape)
 
-    def law(opening: Array) -> Array:
-        place = settled_contact(cutting, opening)
-        cuts = np.isfinite(place)
-        view = edge_height(
-            cutting.edge, np.where(cuts, place, 0.0), opening / cutting.moving_blades
-        )
-        slope = np.where(cuts, np.maximum(view.slope, LEAST_SLOPE), LEAST_SLOPE)
-        peak = energy / (cutting.moving_blades * slope)
-        return np.broadcast_to(energy * mean_share(cutting, peak), peak.shape)
+
+def _mean_energy_law(model: ExactModel, recipe: Recipe) -> dict[str, Any]:
+    """What becomes the table of the mean energy."""
+    law = partial(mean_energy, model)
 
     def derivative(opening: Array) -> Array:
         return (law(opening + STEP_rad) - law(opening - STEP_rad)) / (2.0 * STEP_rad)
 
     low, high = recipe.scene.opening_rad
-    constant = cutting.response.family == "power"
+    constant = model.cutting.response.family == "power"
     curvature = partial(cubic_curvature, np.zeros_like) if constant else None
     return {
         "law": law,

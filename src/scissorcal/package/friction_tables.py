@@ -13,11 +13,15 @@ from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.curvature import cubic_curvature, level_curvature
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.terms import Role
+from scissorcal.package.tables import Function
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
 PLACES = 201
+
+SIGNS = {"friction_opening": 1.0, "friction_closing": -1.0}
+"""Direction of motion of each table of levels."""
 
 
 def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any]]:
@@ -46,23 +50,35 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
             "scene.opening_deg, or choose a law without angle in fit.friction.rung."
         )
     laws: dict[str, dict[str, Any]] = {}
-    for name, sign in (("friction_opening", 1.0), ("friction_closing", -1.0)):
+    functions = friction_functions(law)
+    for name, sign in SIGNS.items():
         _refuse_driving(law, sign, fastest)
         laws[name] = {
-            "law": lambda speed, sign=sign: friction_level(law, sign, speed)[0],
-            "derivative": lambda speed, sign=sign: friction_level(law, sign, speed)[1],
+            **dict(zip(("law", "derivative"), functions[name], strict=True)),
             "low": 0.0,
             "high": fastest,
             "curvature": partial(level_curvature, law, sign),
         }
     laws["friction_angle"] = {
-        "law": lambda opening: angle_factor(law, opening),
-        "derivative": lambda opening: angle_slope(law, opening),
+        **dict(zip(("law", "derivative"), functions["friction_angle"], strict=True)),
         "low": low,
         "high": high,
         "curvature": partial(cubic_curvature, partial(angle_slope, law)),
     }
     return laws
+
+
+def friction_functions(law: FrictionLaw) -> dict[str, tuple[Function, Function]]:
+    """The laws of the friction tables and their derivatives, by table."""
+    functions = {name: _level(law, sign) for name, sign in SIGNS.items()}
+    return functions | {"friction_angle": (partial(angle_factor, law), partial(angle_slope, law))}
+
+
+def _level(law: FrictionLaw, sign: float) -> tuple[Function, Function]:
+    return (
+        lambda speed: friction_level(law, sign, speed)[0],
+        lambda speed: friction_level(law, sign, speed)[1],
+    )
 
 
 def least_factor(law: FrictionLaw, recipe: Recipe) -> float:

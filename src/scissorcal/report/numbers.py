@@ -200,3 +200,8 @@ def _exponent(number: float) -> int:
 def _round(number: float, digits: int) -> float:
     rounded = float(f"{number:.{digits - 1}e}")
     return rounded if math.isfinite(rounded) else number
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a parameter is shown: angles in degrees."""
+    return (math.degrees(1.0), "°") if unit == "rad" else (1.0, unit)

@@ -1,4 +1,5 @@
 #include "sc_control.h"
+#include "sc_turn.h"
 
 #include <math.h>
 #include <string.h>
@@ -75,9 +76,9 @@ static float dot(const float *a, const float *b)
 static void find_tip(const sc_control_config *config, const sc_control_tick *tick, look *now)
 {
     const float m = config->moving_blades;
-    const float sine = sinf(tick->opening / m), cosine = cosf(tick->opening / m);
-    const float along = config->station * cosine - config->edge_offset * sine;
-    const float up = config->station * sine + config->edge_offset * cosine;
+    const sc_turn blade = sc_turn_of(tick->opening / m);
+    const float along = config->station * blade.cosine - config->edge_offset * blade.sine;
+    const float up = config->station * blade.sine + config->edge_offset * blade.cosine;
     const float turn = tick->opening_rate / m;
     now->tip[0] = tick->advance + along;
     now->tip[1] = up;
@@ -93,10 +94,9 @@ static void find_tip(const sc_control_config *config, const sc_control_tick *tic
 static void find_surface(const sc_contour *contour, float age_s, const sc_control_tick *tick,
                          look *now)
 {
-    const float angle = contour->turn_rate * age_s;
-    const float sine = sinf(angle), cosine = cosf(angle);
-    const float normal[AXES] = {contour->normal[0] * cosine - contour->normal[1] * sine,
-                                contour->normal[0] * sine + contour->normal[1] * cosine};
+    const sc_turn moved = sc_turn_of(contour->turn_rate * age_s);
+    const float normal[AXES] = {contour->normal[0] * moved.cosine - contour->normal[1] * moved.sine,
+                                contour->normal[0] * moved.sine + contour->normal[1] * moved.cosine};
     const float tangent[AXES] = {normal[1], -normal[0]};
     const float away[AXES] = {now->tip[0] - contour->point[0] - contour->velocity[0] * age_s,
                               now->tip[1] - contour->point[1] - contour->velocity[1] * age_s};

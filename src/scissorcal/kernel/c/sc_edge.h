@@ -6,12 +6,7 @@
 #define SC_EDGE_H
 
 #include "sc_table.h"
-
-/* A blade angle with its sine and cosine, which one step needs many times. */
-typedef struct {
-    float sine;
-    float cosine;
-} sc_turn;
+#include "sc_turn.h"
 
 /* One place of the edge: station on the blade, where it stands (x, y), its slope tan(psi) against
  * the cut, its taper e'(s) against the blade's centreline, its bend e''(s), and its rise dy/ds and run

@@ -28,9 +28,7 @@ static void refuse(sc_step_output *out)
 
 static sc_turn turn_of(const sc_model *model, float opening)
 {
-    const float beta = opening / (float)model->moving_blades;
-    const sc_turn turn = {sinf(beta), cosf(beta)};
-    return turn;
+    return sc_turn_of(opening / (float)model->moving_blades);
 }
 
 /* Whether the release is known to fall outwards along the blade at this opening. */

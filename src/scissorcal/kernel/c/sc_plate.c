@@ -76,9 +76,9 @@ void sc_plate_move(const sc_plate_config *config, float ramp_s, float dt, sc_pla
 /* A model seen from the plate, and the rig's state there. */
 typedef struct {
     sc_model model;
-    float sine, cosine; /* of the pitch */
-    float opening;      /* of blades against the face */
-    float along;        /* u_n */
+    sc_turn pitch;
+    float opening; /* of blades against the face */
+    float along;   /* u_n */
 } seen;
 
 static void look(const sc_model *model, const sc_section *section, float opening, float advance,
@@ -86,11 +86,10 @@ static void look(const sc_model *model, const sc_section *section, float opening
 {
     const float away = advance - section->edge_x;
     from->model = *model;
-    from->sine = sinf(section->pitch);
-    from->cosine = cosf(section->pitch);
+    from->pitch = sc_turn_of(section->pitch);
     from->opening = opening - (float)model->moving_blades * section->pitch;
-    from->along = from->cosine * away - from->sine * section->edge_y;
-    from->model.upper_face = from->sine * away + from->cosine * section->edge_y;
+    from->along = from->pitch.cosine * away - from->pitch.sine * section->edge_y;
+    from->model.upper_face = from->pitch.sine * away + from->pitch.cosine * section->edge_y;
     from->model.fracture_energy *= section->thickening;
     from->model.render_friction = 0;
 }
@@ -101,8 +100,7 @@ static float press(const seen *from, const sc_step_output *out, float rate, int3
                    float *slope)
 {
     const float blades = (float)from->model.moving_blades;
-    const float beta = from->opening / blades;
-    const sc_turn turn = {sinf(beta), cosf(beta)};
+    const sc_turn turn = sc_turn_of(from->opening / blades);
     sc_edge_point point;
     point.knot = knot;
     *slope = 0.0f;
@@ -121,8 +119,8 @@ static sc_pull pull_of(const seen *from, const sc_step_output *out, float slope,
                        float stretch)
 {
     const float force = (float)from->model.moving_blades * out->response;
-    const sc_pull pull = {-force * (slope * from->cosine + from->sine),
-                          force * (from->cosine - slope * from->sine),
+    const sc_pull pull = {-force * (slope * from->pitch.cosine + from->pitch.sine),
+                          force * (from->pitch.cosine - slope * from->pitch.sine),
                           force * (stretch * crack - slope * out->indentation),
                           -force * slope * crack};
     return pull;
@@ -151,7 +149,7 @@ void sc_plate_step(const sc_plate_config *config, const sc_model *model, const s
     const float force = press(&from, out, rate, crack.edge_knot, &slope);
     if (out->response > 0.0f) {
         out->force =
-            -(float)model->moving_blades * force * (slope * from.cosine + from.sine);
+            -(float)model->moving_blades * force * (slope * from.pitch.cosine + from.pitch.sine);
     }
     if (pull != NULL) {
         *pull = pull_of(&from, out, slope, crack.crack, section->stretch);

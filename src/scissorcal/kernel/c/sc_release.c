@@ -40,8 +40,7 @@ static int falls_on(profile *seen, float release)
 static int falls_at_opening(const sc_model *model, float opening)
 {
     const sc_table *edge = &model->edge;
-    const float beta = opening / (float)model->moving_blades;
-    const sc_turn turn = {sinf(beta), cosf(beta)};
+    const sc_turn turn = sc_turn_of(opening / (float)model->moving_blades);
     const int32_t last = edge->size - 1;
     profile seen = {MARGIN * model->kappa * model->fracture_energy,
                     model->fracture_energy / MARGIN, 0.0f, 0.0f, 0};

@@ -12,8 +12,6 @@
 #include <time.h>
 
 #define float double
-#define sinf sin
-#define cosf cos
 #define fabsf fabs
 #define sqrtf sqrt
 #define ceilf ceil

@@ -9,7 +9,7 @@ import numpy as np
 from scissorcal.calibration.caveats import caveats_by_parameter
 from scissorcal.calibration.checks import K_HAT_LIMIT, PRIOR_ONLY
 from scissorcal.calibration.result import FitResult, FittedParameter
-from scissorcal.report.numbers import Number, finite, scalar, significant
+from scissorcal.report.numbers import Number, finite, scalar, shown_unit, significant
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -187,11 +187,6 @@ def diagnostics_panel(fit: FitResult, part: str) -> Panel:
     if not rows and not fit.notes:
         return absent(id_, part, title, "The fit states none.")
     return Panel(id_, part, title, rows=rows, notes=fit.notes)
-
-
-def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and unit in which a parameter is shown: angles in degrees."""
-    return (float(np.degrees(1.0)), "°") if unit == "rad" else (1.0, unit)
 
 
 def plain_name(parameter: FittedParameter) -> str:

@@ -1,0 +1,82 @@
+// The hand that moves the blades: by pointer and keys through a spring, or one that is replayed.
+
+import { Law } from "./law";
+import { Hand, Scene, unpack } from "./scene";
+
+export interface Pose {
+  opening: number;
+  advance: number;
+}
+
+/** What a hand wants at a time (s), null once it has ended. */
+export type Script = (time: number) => Pose | null;
+
+const LAG_rad = 0.15; // by which the blades stay behind the hand at the largest torque of the scene
+const LAG_m = 0.003;
+const SETTLES_s = 0.03;
+const PUSH_N = 3;
+
+/** A hand that holds the handles by a spring: it feels by how far the blades stay behind. */
+export class Coupling {
+  private readonly stiffness: number;
+  private readonly damping: number;
+  private readonly push = PUSH_N / LAG_m;
+
+  constructor(scene: Scene, law: Law, largestTorque: number) {
+    this.stiffness = largestTorque / LAG_rad;
+    // A step is stable while damping exceeds half of what the material's stiffness does in a tick.
+    const material = materialStiffness(scene, law) / scene.loop_rate_Hz;
+    this.damping = Math.max(this.stiffness * SETTLES_s, material);
+  }
+
+  /** The pose after dt, of blades that feel a torque (positive opens) and a force along the cut. */
+  moved(at: Pose, wanted: Pose, torque: number, force: number, dt: number): Pose {
+    const turn = (this.stiffness * (wanted.opening - at.opening) + torque) / this.damping;
+    const slide = (this.push * (wanted.advance - at.advance) + force) / (this.push * SETTLES_s);
+    return { opening: at.opening + dt * turn, advance: at.advance + dt * slide };
+  }
+}
+
+/** Largest stiffness (N m/rad) with which the material resists closing, up to the torque limit. */
+function materialStiffness(scene: Scene, law: Law): number {
+  const { y, slope } = law.tables.response;
+  const [near, far] = scene.contact_m;
+  const strongest = (2 * scene.torque_limit_Nm) / near;
+  let stiffest = 0;
+  for (let i = 0; i < y.length; i++) if (i === 0 || y[i - 1] < strongest) stiffest = Math.max(stiffest, slope[i]);
+  return (stiffest * far * far) / scene.moving_blades;
+}
+
+/** Strokes as a lab makes them: close, open, move on by what was cut, over and over. */
+export function madeHand(scene: Scene, strokes = 3): Script {
+  const [closed, open] = scene.opening_rad;
+  const speed = Math.min(0.6, scene.opening_rate_rad_per_s[1]);
+  const half = (open - closed) / speed;
+  const [near, far] = scene.contact_m;
+  const step = 0.6 * (far - near);
+  return (time) => {
+    const number = Math.floor(time / (2 * half + 0.3));
+    if (number >= strokes) return null;
+    const within = time - number * (2 * half + 0.3);
+    const share = within < half ? within / half : Math.max(0, 2 - within / half);
+    const smooth = 0.5 - 0.5 * Math.cos(Math.PI * Math.min(share, 1));
+    const moving = Math.min(Math.max((within - 2 * half) / 0.3, 0), 1);
+    return { opening: open - (open - closed) * smooth, advance: -near - 0.2 * (far - near) + step * (number + moving) };
+  };
+}
+
+/** A hand that was recorded. */
+export function recordedHand(hand: Hand): Script {
+  const [time, opening, advance] = [unpack(hand.time), unpack(hand.opening), unpack(hand.advance)];
+  let i = 0;
+  return (now) => {
+    if (now >= time[time.length - 1]) return null;
+    if (time[i] > now) i = 0;
+    while (time[i + 1] < now) i++;
+    const share = (now - time[i]) / (time[i + 1] - time[i]);
+    return {
+      opening: opening[i] + share * (opening[i + 1] - opening[i]),
+      advance: advance[i] + share * (advance[i + 1] - advance[i]),
+    };
+  };
+}

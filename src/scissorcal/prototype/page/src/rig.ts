@@ -1,0 +1,173 @@
+// The rig on the page: two laws (as fitted, what if) stepped by one hand at the loop's rate.
+
+import { Kernel, Step } from "./kernel";
+import { Coupling, Pose, Script } from "./hand";
+import { Law } from "./law";
+import { Scene } from "./scene";
+
+export type Which = "fitted" | "whatIf";
+
+export interface Energy {
+  hand: number;
+  stored: number;
+  fracture: number;
+  arrest: number;
+  friction: number;
+}
+
+/** One sample of a stroke or of the last seconds. */
+export interface Sample {
+  time: number;
+  opening: number;
+  torque: number;
+  force: number;
+  other: number;
+}
+
+const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
+const KEPT_s = 8;
+const EVERY = 4; // ticks from one kept sample to the next
+const TURN_rad = 0.004;
+
+export class Rig {
+  readonly kernels: Record<Which, Kernel>;
+  pose: Pose;
+  wanted: Pose;
+  rate = 0;
+  time = 0;
+  active: Which = "fitted";
+  step: Step;
+  energy: Energy = none();
+  /** Samples of the last seconds, and of the present stroke. */
+  recent: Sample[] = [];
+  stroke: Sample[] = [];
+  strokeContact: number;
+  sound: Record<Which, boolean> = { fitted: false, whatIf: false };
+  /** Energy that cracks released since it was read last, for sound and rumble. */
+  released = 0;
+  private script: Script | null = null;
+  private scriptBegan = 0;
+  private tick = 0;
+  private left = 0;
+  private closing = false;
+  private turnedAt: number;
+  private coupling: Coupling | null = null;
+
+  constructor(readonly scene: Scene, module: WebAssembly.Module) {
+    this.kernels = { fitted: new Kernel(module), whatIf: new Kernel(module) };
+    this.pose = this.wanted = startOf(scene);
+    this.turnedAt = this.pose.opening;
+    this.strokeContact = -this.pose.advance;
+    this.step = { ...NOTHING };
+  }
+
+  load(which: Which, law: Law, largestTorque: number): boolean {
+    const crack = this.kernels[which].crack;
+    const isSound = this.kernels[which].load(law.tables, law.numbers);
+    this.kernels[which].reset(crack);
+    this.sound[which] = isSound;
+    if (which === this.active && isSound) this.coupling = new Coupling(this.scene, law, largestTorque);
+    return isSound;
+  }
+
+  freshSheet(): void {
+    this.script = null;
+    this.kernels.fitted.reset();
+    this.kernels.whatIf.reset();
+    this.pose = this.wanted = startOf(this.scene);
+    this.rate = 0;
+    this.energy = none();
+    this.recent = [];
+    this.beginStroke();
+  }
+
+  play(script: Script | null): void {
+    this.freshSheet();
+    this.script = script;
+    this.scriptBegan = this.time;
+  }
+
+  get plays(): boolean {
+    return this.script !== null;
+  }
+
+  /** Let time pass, in ticks of the loop. */
+  pass(seconds: number): void {
+    const dt = 1 / this.scene.loop_rate_Hz;
+    this.left += Math.min(seconds, MOST_STEPS * dt);
+    while (this.left >= dt) {
+      this.left -= dt;
+      this.one(dt);
+    }
+  }
+
+  private one(dt: number): void {
+    if (!this.sound[this.active] || !this.coupling) return;
+    this.time += dt;
+    const last = this.pose;
+    let next: Pose;
+    const played = this.script?.(this.time - this.scriptBegan);
+    if (this.script && !played) this.script = null;
+    if (played) {
+      next = this.wanted = played;
+    } else {
+      next = this.coupling.moved(last, this.wanted, this.step.torque, this.step.force, dt);
+    }
+    this.rate = (next.opening - last.opening) / dt;
+    this.pose = next;
+    const other = this.active === "fitted" ? "whatIf" : "fitted";
+    const beside = this.sound[other]
+      ? this.kernels[other].step(next.opening, this.rate, next.advance).torque : NaN;
+    this.step = this.kernels[this.active].step(next.opening, this.rate, next.advance);
+    this.account(last, next);
+    if (this.tick++ % EVERY === 0) this.keep(beside);
+  }
+
+  private account(last: Pose, next: Pose): void {
+    const [turned, moved] = [next.opening - last.opening, next.advance - last.advance];
+    const { step, energy } = this;
+    energy.hand -= step.torque * turned + step.force * moved;
+    energy.friction -= step.friction_torque * turned;
+    energy.fracture += step.fracture_J;
+    energy.arrest += step.arrest_J;
+    energy.stored = step.stored_J;
+    this.released += step.fracture_J + step.arrest_J;
+  }
+
+  private keep(beside: number): void {
+    const sample = {
+      time: this.time, opening: this.pose.opening, torque: this.step.torque,
+      force: this.step.force, other: beside,
+    };
+    const way = this.closing ? 1 : -1;
+    if (way * (this.pose.opening - this.turnedAt) < 0) this.turnedAt = this.pose.opening;
+    if (way * (this.pose.opening - this.turnedAt) > TURN_rad) {
+      this.closing = !this.closing;
+      this.turnedAt = this.pose.opening;
+      if (this.closing) this.beginStroke();
+    }
+    this.stroke.push(sample);
+    this.recent.push(sample);
+    while (this.recent[0].time < this.time - KEPT_s) this.recent.shift();
+  }
+
+  private beginStroke(): void {
+    this.stroke = [];
+    this.strokeContact = this.kernels[this.active].crack - this.pose.advance;
+  }
+}
+
+const NOTHING: Step = {
+  torque: 0, force: 0, contact: 0, indentation: 0, height: 0, response: 0, friction_torque: 0,
+  stored_J: 0, fracture_J: 0, arrest_J: 0, flags: 0,
+};
+
+function none(): Energy {
+  return { hand: 0, stored: 0, fracture: 0, arrest: 0, friction: 0 };
+}
+
+/** Open, with the material's edge a quarter into the range of contacts. */
+function startOf(scene: Scene): Pose {
+  const [near, far] = scene.contact_m;
+  return { opening: scene.opening_rad[1], advance: -(near + 0.25 * (far - near)) };
+}
