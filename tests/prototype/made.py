@@ -1,4 +1,4 @@
-"""A small page, a server of it, a browser's socket, and recordings that grow while they are read."""
+"""A small page, its server, the socket of a browser, and recordings that grow meanwhile."""
 
 import asyncio
 import json
