@@ -29,6 +29,7 @@ ENVIRONMENT = {"SCISSORCAL_QUESTIONS": "pipe"}
 
 _PROGRESS = re.compile(r"^\s*\d+ %  ")
 _FIRST_LINES, _LAST_LINES = 100, 3
+_ASK_EVERY_s = 0.03
 LEFT_s = 2.0
 """For the last words of a command that has ended."""
 
@@ -181,7 +182,7 @@ class RigCommands:
             _each_line(process.stderr, self._heard),
         )
         try:
-            code = await process.wait()
+            code = await _ended(process)
             with contextlib.suppress(TimeoutError):  # a process that it left holds the pipes
                 await asyncio.wait_for(readers, LEFT_s)
         finally:
@@ -241,7 +242,7 @@ class RigCommands:
             self._patience_s, (signal.SIGTERM, signal.SIGKILL), strict=True
         ):
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(process.wait(), patience_s)
+                await asyncio.wait_for(_ended(process), patience_s)
                 return
             self._signal(number)
 
@@ -277,6 +278,13 @@ class RigCommands:
 def _keep(lines: list[str], line: str) -> None:
     if line.strip() and len(lines) < _FIRST_LINES:
         lines.append(line)
+
+
+async def _ended(process: asyncio.subprocess.Process) -> int:
+    """The exit code; ``process.wait()`` waits for who else holds the pipes, too."""
+    while process.returncode is None:
+        await asyncio.sleep(_ASK_EVERY_s)
+    return process.returncode
 
 
 async def _each_line(stream: asyncio.StreamReader, take: Callable[[str], None]) -> None:

@@ -138,7 +138,7 @@ class _Followed:
     def _looked(
         self, now_s: float, pose: tuple[float, ...] | None = None, sentence: str = ""
     ) -> Look:
-        rows = self._playout.take(now_s)
+        rows = self._playout.take(now_s).reshape(-1, len(COLUMNS))
         lost, self._playout.lost = self._playout.lost, 0
         return Look(rows, lost, pose, self.name, sentence)
 

@@ -73,6 +73,11 @@ class PrototypeServer:
         """The address of the page; who has it may use the page."""
         return f"http://{ADDRESS}:{self._guard.port}/?token={self._guard.token}"
 
+    @property
+    def watching(self) -> int:
+        """How many pages watch."""
+        return len(self._watchers)
+
     async def __aenter__(self) -> "PrototypeServer":
         """Raises InputError where the port is taken."""
         app = web.Application(middlewares=[self._guard.middleware()])
