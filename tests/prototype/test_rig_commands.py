@@ -132,8 +132,8 @@ def test_arming_another_command_takes_the_place_of_the_first(tmp_path: Path) -> 
 
 
 WAITS = """
-print('ready', file=sys.stderr, flush=True)
 try:
+    print('ready', file=sys.stderr, flush=True)
     time.sleep(60)
 except KeyboardInterrupt:
     print(' 50 %  half of it (3 s)', file=sys.stderr)

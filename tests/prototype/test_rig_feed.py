@@ -29,6 +29,18 @@ class Clock:
         return self.now_s
 
 
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def feed(tmp_path: Path, clock: Clock) -> Iterator[RigFeed]:
+    made = RigFeed(tmp_path / "captures", clock)
+    yield made
+    made.close()
+
+
 def looks(feed: RigFeed, clock: Clock, seconds: float) -> Iterator[Look]:
     """Look forty times a second."""
     for _ in range(round(40 * seconds)):
@@ -45,9 +57,9 @@ def rows_of(found: list[Look]) -> dict[str, "np.ndarray[tuple[int]]"]:
     return dict(zip(COLUMNS, both.T, strict=True))
 
 
-def test_a_rendering_is_followed_from_its_first_sample_to_its_end(tmp_path: Path) -> None:
-    clock = Clock()
-    feed = RigFeed(tmp_path / "captures", clock)
+def test_a_rendering_is_followed_from_its_first_sample_to_its_end(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     assert not said(list(looks(feed, clock, 0.5)))
     found = []
     with a_writer(tmp_path) as writer:
@@ -66,9 +78,9 @@ def test_a_rendering_is_followed_from_its_first_sample_to_its_end(tmp_path: Path
     assert sum(look.lost for look in found) == 0
 
 
-def test_in_a_capture_the_torque_is_what_resists_motor_and_hand(tmp_path: Path) -> None:
-    clock = Clock()
-    feed = RigFeed(tmp_path / "captures", clock)
+def test_in_a_capture_the_torque_is_what_resists_motor_and_hand(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     with a_writer(tmp_path, "cut", "cut-1.mcap") as writer:
         samples = samples_of(0, 400)
         samples["handle_force"][200:] = np.nan  # no sensor
@@ -86,8 +98,7 @@ def test_in_a_capture_the_torque_is_what_resists_motor_and_hand(tmp_path: Path) 
     assert np.isfinite(np.concatenate(list(shown.values()))).all()
 
 
-def test_a_long_recording_is_joined_at_its_end(tmp_path: Path) -> None:
-    clock = Clock()
+def test_a_long_recording_is_joined_at_its_end(tmp_path: Path, clock: Clock, feed: RigFeed) -> None:
     with a_writer(tmp_path) as writer:
         for number in range(600):
             writer.append(samples_of(100 * number, 100))
@@ -99,15 +110,14 @@ def test_a_long_recording_is_joined_at_its_end(tmp_path: Path) -> None:
             assert len(samples) < 6000
             assert not len(follower.read())
             assert follower.is_written
-        feed = RigFeed(tmp_path / "captures", clock)
         shown = rows_of(list(looks(feed, clock, 1.0)))
     assert shown["time_s"][-1] > 59.5
     assert np.all(np.diff(shown["time_s"]) > 0.0)
 
 
-def test_a_tracked_pose_is_shown_beside_the_samples(tmp_path: Path) -> None:
-    clock = Clock()
-    feed = RigFeed(tmp_path / "captures", clock)
+def test_a_tracked_pose_is_shown_beside_the_samples(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     row = np.zeros(1, POSE.dtype)
     row["quaternion"], row["translation"] = (1.0, 0.0, 0.0, 0.0), (0.01, 0.02, 0.03)
     with a_writer(tmp_path, "track", "track-1.mcap") as writer:
@@ -142,9 +152,9 @@ def another(tmp_path: Path) -> "subprocess.Popen[str]":
     return process
 
 
-def test_a_recording_of_another_process_is_followed_through_its_new_name(tmp_path: Path) -> None:
-    clock = Clock()
-    feed = RigFeed(tmp_path / "captures", clock)
+def test_a_recording_of_another_process_is_followed_through_its_new_name(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     with another(tmp_path) as process:
         found = list(looks(feed, clock, 1.0 + 2 * QUIET_s))
         assert said(found) == ["Following render-1.mcap."]
@@ -155,9 +165,9 @@ def test_a_recording_of_another_process_is_followed_through_its_new_name(tmp_pat
     assert (tmp_path / "captures" / "render-1.mcap").exists()
 
 
-def test_a_killed_writer_is_said_and_its_recording_is_still_recovered(tmp_path: Path) -> None:
-    clock = Clock()
-    feed = RigFeed(tmp_path / "captures", clock)
+def test_a_killed_writer_is_said_and_its_recording_is_still_recovered(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     with another(tmp_path) as process:
         found = list(looks(feed, clock, 1.0))
         process.kill()
@@ -171,15 +181,13 @@ def test_a_killed_writer_is_said_and_its_recording_is_still_recovered(tmp_path: 
 
 
 def test_an_interrupted_recording_of_before_is_not_followed_but_the_next_one_is(
-    tmp_path: Path,
+    tmp_path: Path, clock: Clock, feed: RigFeed
 ) -> None:
-    clock = Clock()
     with another(tmp_path) as process:
         process.kill()
         process.communicate(timeout=BOUND_s)
     old = tmp_path / "captures" / "render-1.mcap.part"
     os.utime(old, (time.time() - 100.0,) * 2)
-    feed = RigFeed(tmp_path / "captures", clock)
     assert not said(list(looks(feed, clock, 1.0)))
     with a_writer(tmp_path, name="render-2.mcap") as writer:
         writer.append(samples_of(0, 100))
@@ -187,8 +195,9 @@ def test_an_interrupted_recording_of_before_is_not_followed_but_the_next_one_is(
 
 
 @pytest.mark.parametrize("what", ["noise", "empty", "another format", "cut", "pipe", "folder"])
-def test_what_is_no_recording_does_not_end_the_looking(what: str, tmp_path: Path) -> None:
-    clock = Clock()
+def test_what_is_no_recording_does_not_end_the_looking(
+    what: str, tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
     captures = tmp_path / "captures"
     captures.mkdir()
     path = captures / "render-1.mcap"
@@ -205,7 +214,6 @@ def test_what_is_no_recording_does_not_end_the_looking(what: str, tmp_path: Path
         texts = {"noise": b"\x89MCAP0\r\n" + noise, "empty": b"", "cut": b"\x89MCAP0\r\n\x06"}
         held.write(texts.get(what, noise))
         held.flush()
-    feed = RigFeed(captures, clock)
     found = list(looks(feed, clock, 1.0))
     assert not sum(len(look.rows) for look in found)
     if what in ("noise", "another format"):

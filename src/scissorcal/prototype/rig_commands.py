@@ -126,6 +126,7 @@ class RigCommands:
             self._set(State(sentence="Nothing is running."))
         elif not self._stopped:
             self._stopped = True
+            self._lines.clear()
             self._set(replace(self.state, state="ending", sentence="Stopping.", request=None))
             if self._process is not None:
                 self._end(self._process)
@@ -183,10 +184,10 @@ class RigCommands:
         )
         try:
             code = await _ended(process)
-            with contextlib.suppress(TimeoutError):  # a process that it left holds the pipes
-                await asyncio.wait_for(readers, LEFT_s)
+            await asyncio.wait({readers}, timeout=LEFT_s)  # what it left may hold the pipes
         finally:
             self._signal(signal.SIGKILL)
+            await asyncio.wait({readers}, timeout=LEFT_s)
             readers.cancel()
             self._process = None
         self._set(State("idle", command.name, self._end_sentence(said, code), code))

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import socket as sockets
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -128,8 +129,7 @@ class PrototypeServer:
         self._sockets.add(socket)
         try:
             await socket.prepare(request)
-            if request.transport is not None:
-                request.transport.set_write_buffer_limits(_SOCKET_BUFFER)
+            _bound_buffers(request.transport)
             await self._attend(socket)
         finally:
             self._sockets.discard(socket)
@@ -189,6 +189,8 @@ class PrototypeServer:
             await asyncio.sleep(TICK_s)
 
     async def _close_sockets(self) -> None:
+        """Close the pages once they know how what ran has ended."""
+        await asyncio.gather(*(watcher.told() for watcher in self._watchers))
         for socket in list(self._sockets):
             await socket.close(code=1001, message=b"the server ends", drain=False)
 
@@ -203,6 +205,14 @@ def samples_message(look: Look) -> dict[str, Any]:
         "pose": None if look.pose is None else [round(one, DIGITS) for one in look.pose],
         "recording": look.recording,
     }
+
+
+def _bound_buffers(transport: asyncio.Transport | None) -> None:
+    """Have what a page does not take wait in its queue, where it is counted, and not on the way."""
+    if transport is not None:
+        transport.set_write_buffer_limits(_SOCKET_BUFFER)
+        line = transport.get_extra_info("socket")
+        line.setsockopt(sockets.SOL_SOCKET, sockets.SO_SNDBUF, _SOCKET_BUFFER)
 
 
 async def _cancelled(task: "asyncio.Task[None]") -> None:

@@ -1,6 +1,7 @@
 """One page that watches: what is sent to it, in a bounded queue, so that it delays nobody."""
 
 import asyncio
+import contextlib
 import json
 from collections import deque
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ MOST_WAITING = 20
 MOST_REFUSALS = 5
 SEND_TIMEOUT_s = 20.0
 """A page that takes nothing for so long is given up; it connects again when it is back."""
+LAST_WORDS_s = 0.5
 ALLOWED_A_s, ALLOWED_AT_ONCE = 10.0, 20.0
 """Messages that a page may send."""
 
@@ -62,6 +64,13 @@ class Watcher:
         self._allowed = min(self._allowed, ALLOWED_AT_ONCE) - 1.0
         self._counted_s = now_s
         return self._allowed >= 0.0
+
+    async def told(self) -> None:
+        """Wait until the newest state was taken to send, not for long."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(LAST_WORDS_s):
+                while self._state is not None:
+                    await asyncio.sleep(0.01)
 
     async def send_all(self) -> None:
         """Send what waits, for ever; closes the socket of a page that takes nothing."""
