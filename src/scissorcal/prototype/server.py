@@ -172,7 +172,12 @@ class PrototypeServer:
             watcher.tell(self._state())
 
     def _state(self) -> dict[str, Any]:
-        return {"kind": "state", **asdict(self.commands.state), "following": self._following}
+        return {
+            "kind": "state",
+            **asdict(self.commands.state),
+            "following": self._following,
+            "commands": list(self.commands.commands),
+        }
 
     async def _stream(self) -> None:
         """Look at the recording while somebody watches, and show all what is due."""
