@@ -18,9 +18,12 @@ import pytest
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.package import build_package
 from scissorcal.recording import read_recording
+from scissorcal.render.engine import REQUEST
 from scissorcal.workday.workspace import Workspace, create_workspace
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.made import ask, heard
+from tests.strange_device import StrangeDevice
+from tests.strange_device.terminal import serve_on_pty
 
 from .conftest import Cli
 
@@ -146,6 +149,29 @@ def test_an_unplugged_rig_is_told_in_a_sentence(packed: Workspace) -> None:
     assert said["code"] == 4
     assert "unplugged" in said["sentence"] or "lost" in said["sentence"]
     assert said["following"].startswith("render-")
+
+
+def test_nothing_moves_before_the_rigs_own_question_is_answered_on_the_page(
+    packed: Workspace,
+) -> None:
+    async def act(page: aiohttp.ClientWebSocketResponse) -> list[str]:
+        await ask(page, "arm", "render")
+        armed = await heard(page, lambda message: bool(message.get("request")))
+        await ask(page, "start", "render")
+        asked = await heard(
+            page, lambda message: message.get("state") == "running" and bool(message["request"])
+        )
+        await ask(page, "stop")
+        assert (await heard(page, ended))["code"] == 130
+        return [armed["request"], asked["request"]]
+
+    device = StrangeDevice(seed=3)
+    with serve_on_pty(device) as port, served(packed, "--device", port) as (_, url):
+        armed, asked = watch(url, act)
+    assert armed == REQUEST
+    assert asked.startswith("Take everything out from between the blades, let go")
+    assert device.largest_torque < 0.01
+    assert not packed.recordings("render")
 
 
 def test_what_another_terminal_started_is_followed_and_not_stopped_from_the_page(
