@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the C core, the prototype's page, and data that travel in the wheel.
+"""What pyproject.toml cannot say: the C core, the prototype's page, and data in the wheel.
 
 ``recipes/`` and ``data_schemas/`` stand at the top of the repository, where people look for them.
 Building copies them into the package, as ``scissorcal/recipes`` and ``scissorcal/data_schemas``; an
