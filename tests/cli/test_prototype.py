@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -200,6 +201,30 @@ def test_what_another_terminal_started_is_followed_and_not_stopped_from_the_page
         finally:
             other.send_signal(signal.SIGINT)
             other.wait(BOUND_s)
+
+
+@pytest.mark.parametrize("opens", [True, False])
+def test_the_browser_is_led_to_the_address_by_a_file_of_its_owner(
+    opens: bool, packed: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    led: list[tuple[str, str, int]] = []
+
+    def browser(uri: str) -> bool:
+        path = Path(uri.removeprefix("file://"))
+        led.append((uri, path.read_text(encoding="utf-8"), path.stat().st_mode & 0o777))
+        os.kill(os.getpid(), signal.SIGINT)
+        return opens
+
+    monkeypatch.setattr("webbrowser.open", browser)
+    said = cli("prototype", "--workspace", packed.root)
+    assert said.code == 0
+    ((uri, text, mode),) = led
+    address = said.err.split()[0]
+    assert f'url={address}"' in text
+    assert address.partition("=")[2] not in uri
+    assert mode == 0o600
+    assert ("open the address yourself" in said.err) != opens
+    assert not (packed.root / "prototype-address.html").exists()
 
 
 def test_a_page_needs_a_package_and_the_servers_library(

@@ -1,5 +1,7 @@
 """``scissorcal prototype``"""
 
+import os
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +10,14 @@ import typer
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Folder, PlateCamera
 from scissorcal.cli.output import Answer, command, note
+
+ADDRESS_FILE = "prototype-address.html"
+_OPENED_s = 1.0
+"""For a browser that is being opened while the server ends."""
+_LEADS_TO = (
+    '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+    '<meta http-equiv="refresh" content="0; url={url}"><a href="{url}">The page of the package</a>'
+)
 
 
 @command
@@ -54,18 +64,37 @@ def prototype(
         workspace, device=device, camera=camera, package_path=package_path, port=port
     )
 
+    opener = workspace.root / ADDRESS_FILE
+    opening: list[threading.Thread] = []
+
     def ready(url: str) -> None:
         note(f"{url}  (Ctrl-C ends it)")
-        if not no_open:
-            _open(url)
+        if not no_open:  # beside the server: a browser may ask for the page before it returns
+            opening.append(threading.Thread(target=_open, args=(url, opener), daemon=True))
+            opening[0].start()
 
-    address = serve(server, ready)
+    try:
+        address = serve(server, ready)
+    finally:
+        for thread in opening:
+            thread.join(_OPENED_s)
+            opener.unlink(missing_ok=True)
     return Answer({"address": address, "device": device}, "the page is closed")
 
 
-def _open(url: str) -> None:
-    """Open the browser; where there is none, the address was printed."""
+def _open(url: str, opener: Path) -> None:
+    """Open the browser by a file that leads to the address and that only its owner may read.
+
+    The words of a command, and with them the token, can be read by every user of a computer.
+    """
     import webbrowser
 
-    if not webbrowser.open(url):
-        note("No browser was found: open the address yourself.")
+    try:
+        opener.unlink(missing_ok=True)
+        with os.fdopen(os.open(opener, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(_LEADS_TO.format(url=url))
+        opened = webbrowser.open(opener.as_uri())
+    except OSError:  # such as a workspace that may not be written to
+        opened = False
+    if not opened:
+        note("No browser was opened: open the address yourself.")
