@@ -194,6 +194,26 @@ def test_an_interrupted_recording_of_before_is_not_followed_but_the_next_one_is(
         assert said(list(looks(feed, clock, 1.0))) == ["Following render-2.mcap."]
 
 
+def test_one_that_its_command_removed_is_said_and_the_next_one_is_followed(
+    tmp_path: Path, clock: Clock, feed: RigFeed
+) -> None:
+    found: list[Look] = []
+
+    def fail() -> None:
+        with a_writer(tmp_path):
+            found.extend(looks(feed, clock, 0.5))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    found += looks(feed, clock, 0.5)
+    assert said(found)[0] == "Following render-1.mcap."
+    assert "removed: its command ended before anything" in said(found)[1]
+    with a_writer(tmp_path, name="render-2.mcap") as writer:
+        writer.append(samples_of(0, 100))
+        assert said(list(looks(feed, clock, 1.0))) == ["Following render-2.mcap."]
+
+
 @pytest.mark.parametrize("what", ["noise", "empty", "another format", "cut", "pipe", "folder"])
 def test_what_is_no_recording_does_not_end_the_looking(
     what: str, tmp_path: Path, clock: Clock, feed: RigFeed

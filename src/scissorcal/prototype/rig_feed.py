@@ -4,6 +4,7 @@ Neither the loop nor its supervisor knows of a page: the file that they write an
 command can be followed, from whichever terminal it was started.
 """
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -30,6 +31,7 @@ RENDERED = ("render", "control")
 _INTERRUPTED = (
     "The command that wrote {name} ended without closing it; the next command recovers it."
 )
+_REMOVED = "{name} was removed: its command ended before anything was recorded."
 
 Array = NDArray[np.float64]
 
@@ -62,7 +64,7 @@ class RigFeed:
         self._folder = folder
         self._clock = clock
         self._now: _Followed | None = None
-        self._done: set[tuple[int, int]] = set()
+        self._done: set[str] = set()
         self._searched_s = -math.inf
 
     def look(self) -> Look:
@@ -75,12 +77,13 @@ class RigFeed:
                 sentence = f"{self._now.name} cannot be followed any more: {error}"
                 look = Look(_no_rows(), 0, None, self._now.name, sentence)
             if look.sentence:
-                self._done.add(self._now.follower.identity)
+                self._done.add(self._now.name)
                 self.close()
             return look
         if now_s - self._searched_s >= SEARCH_EVERY_s:
             self._searched_s = now_s
-            self._now = self._found(now_s)
+            with contextlib.suppress(OSError):  # of the folder; it is searched again
+                self._now = self._found(now_s)
         if self._now is None:
             return Look(_no_rows())
         return Look(_no_rows(), 0, None, self._now.name, f"Following {self._now.name}.")
@@ -94,15 +97,16 @@ class RigFeed:
     def _found(self, now_s: float) -> "_Followed | None":
         """The newest recording that is being written."""
         for path in _newest_first(self._folder):
+            if _name_of(path) in self._done:
+                continue
             try:
                 follower = RecordingFollower(path)
             except InputError:
                 continue  # it was renamed, or is no file: the next search finds out
-            if follower.identity not in self._done:
-                if follower.is_written:
-                    return _Followed(follower, now_s)
-                if follower.age_s > QUIET_s:  # else its writer may have been about to lock it
-                    self._done.add(follower.identity)
+            if follower.is_written:
+                return _Followed(follower, now_s)
+            if follower.age_s > QUIET_s:  # else its writer may have been about to lock it
+                self._done.add(_name_of(path))
             follower.close()
         return None
 
@@ -112,7 +116,7 @@ class _Followed:
 
     def __init__(self, follower: RecordingFollower, now_s: float) -> None:
         self.follower = follower
-        self.name = follower.path.name.removesuffix(layout.PART_SUFFIX)
+        self.name = _name_of(follower.path)
         self._playout = Playout()
         self._size = -1
         self._grew_s = now_s
@@ -122,6 +126,8 @@ class _Followed:
         """What is due; with a sentence where that was all."""
         follower, pose = self.follower, None
         size = follower.size
+        if follower.is_removed:
+            return self._looked(now_s, sentence=_REMOVED.format(name=self.name))
         if size != self._size:
             self._size, self._grew_s = size, now_s
             self._playout.add(self._rows(follower.read()), now_s)
@@ -163,6 +169,11 @@ class _Followed:
             torque, force = radius * np.where(np.isfinite(hand), hand, 0.0) - motor, -force
         rows = np.stack([time_s, samples["opening"], samples["advance"], torque, force], axis=1)
         return np.asarray(rows[np.isfinite(rows).all(axis=1)])
+
+
+def _name_of(path: Path) -> str:
+    """The name that a recording has once it is complete; each has another."""
+    return path.name.removesuffix(layout.PART_SUFFIX)
 
 
 def _newest_first(folder: Path) -> list[Path]:

@@ -81,10 +81,9 @@ class RecordingFollower:
         return os.fstat(self._stream.fileno()).st_size
 
     @property
-    def identity(self) -> tuple[int, int]:
-        """Device and number of the file, which stay where it is renamed."""
-        facts = os.fstat(self._stream.fileno())
-        return facts.st_dev, facts.st_ino
+    def is_removed(self) -> bool:
+        """Whether the file has no name any more, as one that its writer removed."""
+        return os.fstat(self._stream.fileno()).st_nlink == 0
 
     @property
     def age_s(self) -> float:
