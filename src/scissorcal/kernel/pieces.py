@@ -235,9 +235,9 @@ def largest_overlap(
             sum(
                 amount
                 for piece, amount in zip(pieces, amounts, strict=True)
-                if piece.end_m >= start and piece.begin_m <= start + reach_m
+                if piece.begin_m <= far.begin_m <= piece.end_m + reach_m
             )
-            for start in (near.begin_m for near in pieces)
+            for far in pieces
         ),
         default=0.0,
     )
