@@ -55,8 +55,7 @@ def test_a_plate_with_a_hole_on_the_virtual_rig(kappa: float) -> None:
     """The commands are those of the pieces along the recorded way; the hole is felt as none."""
     tables = make_tables(kappa=kappa, moving_blades=2)
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    config = CONFIG
-    with open_motion(link, config, tables, pieces=PLATE) as motion:
+    with open_motion(link, CONFIG, tables, pieces=PLATE) as motion:
         samples = strokes(motion, 12.0, 3)
         report = motion.report()
     steps, model = replayed(tables, samples)
@@ -84,11 +83,14 @@ def test_a_plate_with_a_hole_on_the_virtual_rig(kappa: float) -> None:
 
 def test_a_hand_feels_pieces_over_a_port_as_in_lockstep() -> None:
     tables = make_tables()
-    with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
-        with open_motion(link, CONFIG, tables, pieces=PLATE) as motion:
-            assert isinstance(motion, PortMotion)
-            samples = strokes(motion, 5.0, 1)
-            report = motion.report()
+    with (
+        SimProcess("office-paper", seed=1) as sim,
+        open_link(sim.port) as link,
+        open_motion(link, CONFIG, tables, pieces=PLATE) as motion,
+    ):
+        assert isinstance(motion, PortMotion)
+        samples = strokes(motion, 5.0, 1)
+        report = motion.report()
     assert report.stop_reason == 0
     steps, _ = replayed(tables, samples)
     on = (samples["torque_command"] != 0.0) & (np.arange(len(samples)) > 200)

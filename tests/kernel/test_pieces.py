@@ -42,6 +42,7 @@ from tests.kernel.golden_pieces import (
 from tests.kernel.reference_pieces import PIECES_COLUMNS, ReferencePieces
 from tests.kernel.test_golden import same, titles
 from tests.kernel.test_loop import Device, Loop
+from tests.kernel.test_model import nicked_edge
 from tests.kernel.zoo import line_edge, make_tables, power_response, straight
 
 ENABLED = int(StateFlag.MOTOR_ENABLED)
@@ -140,6 +141,38 @@ def test_bonded_strips_of_equal_energy_are_one(name: str, border: tuple[float, .
         most = np.abs(wanted[column]).max()
         assert np.abs(found[column] - wanted[column]).max() <= allowed * most + 2e-8, column
     np.testing.assert_array_equal(found["flags"], wanted["flags"])
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "over the tip"])
+def test_bonded_strips_are_one_also_where_a_step_holds_many_ripples(name: str) -> None:
+    """A hand that leaps: whole ripples before a border and behind it fall into one step."""
+    tables = make_tables(**MODELS[name])
+    whole = replace(ENDLESS, upper_face_m=tables.upper_face)
+    strips = tuple(Strip(0.004 * (k + 1), 0.6) for k in range(20))
+    one, more = PiecesModel(tables, [whole]), PiecesModel(tables, [replace(whole, strips=strips)])
+    wanted, found = one.step_many(*strokes(40)), more.step_many(*strokes(40))
+    assert more.cracks == pytest.approx(one.cracks, abs=1e-7)
+    for column in ("torque", "stored_J", "fracture_J", "arrest_J"):
+        most = np.abs(wanted[column]).max()
+        np.testing.assert_allclose(found[column], wanted[column], atol=2e-4 * most, err_msg=column)
+    assert wanted["fracture_J"].max() > 5e-4
+
+
+def test_along_a_nick_a_crack_stops_at_its_first_place() -> None:
+    """Whether a run may look its end up is found for each piece: by its face and its energies."""
+    tables = make_tables(edge=nicked_edge(6e-4), kappa=0.7)
+    energies = (0.6, 0.2, 1.0, 0.4)
+    strips = tuple(Strip(0.008 * (k + 1), energy) for k, energy in enumerate(energies))
+    found = PiecesModel(tables, [Piece(0.0, FACE, 1.0, strips)])
+    scanned = PiecesModel(tables, [Piece(0.0, FACE, 1.0, strips)])
+    assert not found._config.piece[0].release_falls
+    assert PiecesModel(make_tables(), LAYER)._config.piece[1].release_falls
+    scanned._config.piece[0].release_falls = 0
+    columns = strokes()
+    assert found.step_many(*columns).tobytes() == scanned.step_many(*columns).tobytes()
+    # a face so low, and an energy so small, that the nick lies over no place where a crack stops
+    low = PiecesModel(tables, [Piece(0.0, FACE, 1.0, (Strip(1.0, 0.0),))])
+    assert low._config.piece[0].release_falls == 1
 
 
 @pytest.mark.parametrize("scale", [0.25, 4.0])

@@ -51,7 +51,7 @@ int sc_pieces_are_sound(const sc_pieces_config *config)
     for (int32_t i = 0; i < config->count; i++) {
         const sc_plate_piece *const piece = &config->piece[i];
         if (!sc_piece_is_sound(piece) || piece->first < 0 || piece->count < 1 ||
-            piece->first > SC_STRIPS_MAX || piece->count > SC_STRIPS_MAX - piece->first ||
+            piece->count > SC_STRIPS_MAX - piece->first ||
             !strips_are_sound(piece, &config->strip[piece->first])) {
             return 0;
         }
@@ -265,7 +265,6 @@ static void pass_through(const sc_pieces_config *config, hand *by, sc_pieces *pi
         }
     }
     sc_crack nothing = pieces->of[pieces->shown].crack;
-    nothing.detached = 1;
     by->sheet.upper_face = config->piece[pieces->shown].upper_face;
     by->sheet.fracture_energy = 0.0f;
     sc_model_step(&by->sheet, &nothing, by->opening, by->rate, by->advance, &one);
