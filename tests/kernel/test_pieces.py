@@ -1,4 +1,4 @@
-"""A plate made of pieces: exact cases, a reference of its own, its books, servo and loop."""
+"""A plate made of pieces: exact cases, an independent reference, books, servo and loop."""
 
 import json
 import math
@@ -323,7 +323,7 @@ energies = st.floats(0.02, 2.0)
 
 @st.composite
 def plates(draw: st.DrawFn) -> list[Piece]:
-    """Up to 6 pieces of up to 5 strips, anywhere along the cut, with faces of their own."""
+    """Up to 6 pieces of up to 5 strips, anywhere along the cut, at various heights."""
     pieces = []
     for _ in range(draw(st.integers(1, 6))):
         begin = draw(st.floats(-0.005, 0.02))

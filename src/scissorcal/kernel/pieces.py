@@ -1,6 +1,6 @@
 """A plate made of pieces along the line of the cut: holes, layers, changes of toughness.
 
-A piece is a stretch of material without a gap, with a crack of its own; its response is ``scale``
+A piece is a stretch of material without a gap, with one crack; its response is ``scale``
 times the model's, its energies are per strip. What one feels is the sum over the pieces.
 """
 

@@ -111,7 +111,7 @@ static void set_off(const hand *by, const sc_crack *crack, float end, run *made,
         (void)sc_run_out(sheet, by->turn, falls, kept, &stop);
         const float length = stop.point.x - start->point.x;
         if (length > SC_SHORTEST_RUN) {
-            const float runs = floorf((end - contact) / length);
+            const float runs = -ceilf((contact - end) / length); /* whole ones */
             const float lost = start->stored - stop.stored - kept * length;
             made->share = sheet->kappa;
             made->from = fminf(contact + runs * length, end);
