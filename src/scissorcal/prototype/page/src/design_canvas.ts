@@ -154,12 +154,13 @@ export class DesignCanvas {
     for (let x = Math.ceil(left / step); x * step <= right; x++) {
       const [at] = this.at([x * step, 0]);
       group.append(svg("path", { d: `M${at} 0V${this.size[1]}` }));
-      group.append(svg("text", { x: at + 3, y: this.size[1] - 5 }, String(Number((x * step).toFixed(1)))));
+      if (at < this.size[0] - 50) group.append(svg("text", { x: at + 3, y: this.size[1] - 5 }, String(Number((x * step).toFixed(1)))));
     }
     for (let y = Math.ceil(bottom / step); y * step <= top; y++) {
       const [, at] = this.at([0, y * step]);
       group.append(svg("path", { d: `M0 ${at}H${this.size[0]}` }));
-      if (at < this.size[1] - 24) group.append(svg("text", { x: 4, y: at - 3 }, `${Number((y * step).toFixed(1))}`));
+      const isFree = at < this.size[1] - 24 && Math.abs(at - this.at([0, this.design.drawn.cut_line_mm])[1]) > 14;
+      if (isFree) group.append(svg("text", { x: 4, y: at - 3 }, `${Number((y * step).toFixed(1))}`));
     }
     group.append(svg("text", { x: this.size[0] - 5, y: this.size[1] - 5, "text-anchor": "end" }, "mm"));
     return group;
@@ -186,7 +187,7 @@ export class DesignCanvas {
       }
     });
     group.append(svg("path", { class: "design-arrow", d: `M6 ${y - 5}l9 5l-9 5z` }));
-    group.append(svg("text", { x: 20, y: y - 6 }, "cut"));
+    group.append(svg("text", { x: 20, y: y - 6 }, `cut, y = ${cut_line_mm}`));
     return group;
   }
 

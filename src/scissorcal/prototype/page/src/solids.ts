@@ -11,42 +11,88 @@ export interface Slab {
   high: number;
 }
 
-/** How far (mm) the plate stands off at a place, on the left of the cut (side 1) or right (-1). */
-export type Bend = (x: number, y: number, side: 1 | -1) => number;
-
-const COLUMN_mm = 2;
-const MOST_COLUMNS = 160;
-
-export class Solid {
+/** Vertices that stand somewhere at rest, and move up and down from there. */
+class Bending {
   readonly geometry = new BufferGeometry();
   private readonly rest: number[] = []; // x, y, z of each vertex
   private readonly sides: (1 | -1)[] = [];
-  private readonly places: BufferAttribute;
+  private places: BufferAttribute | null = null;
 
+  bend(by: Bend): void {
+    const { rest, sides } = this;
+    if (!this.places) {
+      this.places = new BufferAttribute(new Float32Array(rest), 3);
+      this.places.setUsage(DynamicDrawUsage);
+      this.geometry.setAttribute("position", this.places);
+      this.geometry.computeBoundingSphere();
+      if (this.geometry.boundingSphere) this.geometry.boundingSphere.radius += MOST_BENT_mm;
+    }
+    const array = this.places.array;
+    for (let i = 0; i < sides.length; i++) array[3 * i + 2] = rest[3 * i + 2] + by(rest[3 * i], rest[3 * i + 1], sides[i]);
+    this.places.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.geometry.dispose();
+  }
+
+  protected vertex(x: number, y: number, z: number, side: 1 | -1): void {
+    this.rest.push(x, y, z);
+    this.sides.push(side);
+  }
+}
+
+/** Lines every 10 mm on the upper face of a slab: they show its size and how it bends. */
+export class Grid extends Bending {
+  constructor(slab: Slab, cut: number) {
+    super();
+    const turned = (outline: Outline): Outline => outline.map(([x, y]): Point => [y, x]);
+    const lines = (outline: Outline, holes: Outline[], draw: (at: number, from: number, to: number) => void): void => {
+      const ys = outline.map(([, y]) => y);
+      const step = GRID_mm * Math.ceil((Math.max(...ys) - Math.min(...ys)) / (GRID_mm * MOST_LINES));
+      for (let y = step * Math.ceil(Math.min(...ys) / step); y <= Math.max(...ys); y += step) {
+        const material = without(stretches(outline, y), holes.flatMap((hole) => stretches(hole, y)));
+        for (const [from, to] of material) draw(y, from, to);
+      }
+    };
+    const z = slab.high + 0.08;
+    const step = (from: number, to: number): number => (to - from) / Math.max(Math.ceil((to - from) / COLUMN_mm), 1);
+    lines(slab.outline, slab.holes, (y, from, to) => {
+      if (Math.abs(y - cut) < 1e-6) return; // where the cut itself is drawn
+      const d = step(from, to);
+      for (let x = from; x < to - 0.5 * d; x += d) {
+        for (const at of [x, x + d]) this.vertex(at, y, z, y > cut ? 1 : -1);
+      }
+    });
+    lines(turned(slab.outline), slab.holes.map(turned), (x, from, to) => {
+      for (const [low, high] of [[from, Math.min(to, cut)], [Math.max(from, cut), to]]) {
+        const d = step(low, high);
+        for (let y = low; y < high - 0.5 * d; y += d) {
+          for (const at of [y, y + d]) this.vertex(x, at, z, high > cut ? 1 : -1);
+        }
+      }
+    });
+  }
+}
+
+/** How far (mm) the plate stands off at a place, on the left of the cut (side 1) or right (-1). */
+export type Bend = (x: number, y: number, side: 1 | -1) => number;
+
+const GRID_mm = 10;
+const COLUMN_mm = 2;
+const MOST_COLUMNS = 160;
+const MOST_LINES = 40;
+const MOST_BENT_mm = 40;
+
+export class Solid extends Bending {
   constructor(slab: Slab, private readonly cut: number) {
+    super();
     const turned = (outline: Outline, way: 1 | -1): Outline => (way * areaOf(outline) < 0 ? [...outline].reverse() : outline);
     const rings = [turned(slab.outline, 1), ...slab.holes.map((hole) => turned(hole, -1))];
     const columns = columnsOf(slab.outline);
     this.faces(rings, columns, slab);
     for (const ring of rings) ring.forEach((from, i) => this.wall(from, ring[(i + 1) % ring.length], columns, slab));
     this.cutFaces(slab, columns);
-    this.places = new BufferAttribute(new Float32Array(this.rest), 3);
-    this.places.setUsage(DynamicDrawUsage);
-    this.geometry.setAttribute("position", this.places);
-    this.geometry.computeBoundingSphere();
-    const sphere = this.geometry.boundingSphere;
-    if (sphere) sphere.radius += 40; // it bends
-  }
-
-  bend(by: Bend): void {
-    const { rest, sides, places } = this;
-    const array = places.array;
-    for (let i = 0; i < sides.length; i++) array[3 * i + 2] = rest[3 * i + 2] + by(rest[3 * i], rest[3 * i + 1], sides[i]);
-    places.needsUpdate = true;
-  }
-
-  dispose(): void {
-    this.geometry.dispose();
   }
 
   private faces(rings: Outline[], columns: number[], { low, high }: Slab): void {
@@ -68,11 +114,6 @@ export class Solid {
 
   private triangle(corners: Point[], z: number, side: 1 | -1): void {
     for (const [x, y] of corners) this.vertex(x, y, z, side);
-  }
-
-  private vertex(x: number, y: number, z: number, side: 1 | -1): void {
-    this.rest.push(x, y, z);
-    this.sides.push(side);
   }
 
   /** The wall under one side of an outline, which runs with the material on its left. */

@@ -2,7 +2,7 @@
 
 import {
   AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
-  LineBasicMaterial, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
+  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
 import { coloursOf, heightOver, View as PlainView } from "./drawing";
@@ -10,7 +10,7 @@ import { Table } from "./kernel";
 import { Orbit } from "./orbit";
 import { rectangle } from "./outline";
 import { Drawn, Piece } from "./pieces";
-import { Bend, Solid } from "./solids";
+import { Bend, Grid, Solid } from "./solids";
 import { slabsOf, Tinted } from "./slabs";
 
 /** What is drawn; without pieces the sheet is uniform. `drawn` is what the pieces were made of. */
@@ -35,10 +35,11 @@ export class View3d {
   private readonly resizes: ResizeObserver | null = null;
   private readonly note = document.createElement("p");
   private readonly materials = {
-    steel: new MeshStandardMaterial({ metalness: 0.35, roughness: 0.38 }),
+    steel: new MeshStandardMaterial({ metalness: 0.15, roughness: 0.4 }),
     handle: new MeshStandardMaterial({ roughness: 0.6 }),
     ghost: new MeshStandardMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
     upperEdge: new LineBasicMaterial(), lowerEdge: new LineBasicMaterial(), crack: new LineBasicMaterial(),
+    grid: new LineBasicMaterial({ transparent: true, opacity: 0.35 }),
     contact: new MeshLambertMaterial(),
     sheet: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
     second: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
@@ -48,7 +49,7 @@ export class View3d {
   private readonly contact = new Mesh(new SphereGeometry(0.9, 16, 12), this.materials.contact);
   private readonly cracks: Line[] = [];
   private blades: { of: Table; blades: Blades } | null = null;
-  private solids: { of: string; solids: Solid[] } | null = null;
+  private solids: { of: string; solids: (Solid | Grid)[] } | null = null;
   private theme = "";
   private view: View | null = null;
 
@@ -97,7 +98,7 @@ export class View3d {
     renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     renderer.setSize(width, height, false);
     const length = 1e3 * view.scene.blade_length_m;
-    orbit.aim(new Vector3(0.28 * length, 0, 0), 0.86 * length, width / height);
+    orbit.aim(new Vector3(0.28 * length, 0, 0), 0.74 * length, width / height);
     renderer.render(this.world, orbit.camera);
     this.tell(view);
   }
@@ -144,13 +145,14 @@ export class View3d {
     };
     const { ink, muted, paper, blue, vermillion } = colours;
     const { materials } = this;
-    const steel = read(muted).lerp(new Color(0xffffff), 0.45);
+    const steel = read(muted).lerp(new Color(0xffffff), 0.72);
     materials.steel.color = steel;
     materials.handle.color = read(muted).lerp(read(ink), 0.35);
     materials.ghost.color = read(blue);
     materials.upperEdge.color = read(blue);
     materials.lowerEdge.color = read(ink);
     materials.crack.color = read(ink);
+    materials.grid.color = read(ink);
     materials.contact.color = read(blue);
     materials.sheet.color = read(vermillion).lerp(read(paper), 0.25);
     materials.second.color = read(vermillion).lerp(read(paper), 0.55);
@@ -176,12 +178,13 @@ export class View3d {
     const of = JSON.stringify([slabs, cut]);
     if (this.solids?.of === of) return;
     this.solids?.solids.forEach((solid) => solid.dispose());
-    this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh));
+    this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh || one instanceof LineSegments));
     const base = scene.moving_blades === 2 ? 0.5 * Math.max(...slabs.map((slab) => slab.high), 0) : 0;
-    const solids = slabs.map((slab) => {
-      const solid = new Solid({ ...slab, low: slab.low - base, high: slab.high - base }, cut);
-      this.plate.add(new Mesh(solid.geometry, this.materials[slab.tint]));
-      return solid;
+    const solids = slabs.flatMap((slab) => {
+      const own = { ...slab, low: slab.low - base, high: slab.high - base };
+      const [solid, grid] = [new Solid(own, cut), new Grid(own, cut)];
+      this.plate.add(new Mesh(solid.geometry, this.materials[slab.tint]), new LineSegments(grid.geometry, this.materials.grid));
+      return [solid, grid];
     });
     this.solids = { of, solids };
   }
