@@ -64,7 +64,7 @@ class Designer {
     container.replaceChildren(
       html("p", {}, `Plates from above; thickness and toughness are compared with what was calibrated (${calibratedText(this.calibrated)}).`),
       html("div", { class: "row" }, html("label", { class: "field" }, "The next shape is ", this.kinds()), this.tools),
-      this.files(), html("div", { class: "design-both" }, paper, this.side), this.status,
+      this.files(), this.status, html("div", { class: "design-both" }, paper, this.side),
     );
     this.canvas.fit();
     this.tables();

@@ -209,13 +209,14 @@ export class DesignCanvas {
     if (outline.length > MOST_HANDLES || this.tool !== "move") return group;
     const between = outline.map((point, i) => middle(point, outline[(i + 1) % outline.length]));
     if (part.kind === "edge") between.pop();
-    between.forEach((point) => {
+    const isClose = this.reach < NEAR_px;
+    for (const point of isClose ? [] : between) {
       const [cx, cy] = this.at(point);
       group.append(svg("circle", { class: "design-between", cx, cy, r: 3 }));
-    });
+    }
     outline.forEach((point, i) => {
       const [cx, cy] = this.at(point);
-      group.append(svg("circle", { class: i === corner ? "design-corner is-chosen" : "design-corner", cx, cy, r: i === corner ? 7 : 5 }));
+      group.append(svg("circle", { class: i === corner ? "design-corner is-chosen" : "design-corner", cx, cy, r: i === corner ? 7 : isClose ? 2 : 5 }));
     });
     return group;
   }
@@ -249,9 +250,10 @@ export class DesignCanvas {
     const { design } = this;
     const { outline, part } = design;
     const most = outline.length <= MOST_HANDLES ? outline.length : 0;
-    const corner = outline.slice(0, most).findIndex((point) => this.isNear(px, point));
+    const { reach } = this;
+    const corner = outline.slice(0, most).findIndex((point) => this.isNear(px, point, reach));
     const last = part.kind === "edge" ? most - 1 : most;
-    const between = outline.slice(0, Math.max(last, 0))
+    const between = reach < NEAR_px ? -1 : outline.slice(0, Math.max(last, 0))
       .findIndex((point, i) => this.isNear(px, middle(point, outline[(i + 1) % outline.length])));
     if (corner >= 0) {
       design.choose(part, corner);
@@ -354,8 +356,18 @@ export class DesignCanvas {
     else this.say("A polygon needs three corners.");
   }
 
-  private isNear(px: Point, mm: Point): boolean {
+  private isNear(px: Point, mm: Point, reach = NEAR_px): boolean {
     const [x, y] = this.at(mm);
-    return Math.hypot(px[0] - x, px[1] - y) <= NEAR_px;
+    return Math.hypot(px[0] - x, px[1] - y) <= reach;
+  }
+
+  /** How near (px) a corner of the chosen outline is grabbed: less where they stand close, as on a circle. */
+  private get reach(): number {
+    const { outline } = this.design;
+    const shortest = outline.reduce((least, [x, y], i) => {
+      const [x2, y2] = outline[(i + 1) % outline.length];
+      return Math.min(least, Math.hypot(x2 - x, y2 - y));
+    }, Infinity);
+    return Math.min(NEAR_px, Math.max(0.4 * shortest * this.scale, 3));
   }
 }

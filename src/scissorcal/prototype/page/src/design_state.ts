@@ -2,7 +2,7 @@
 
 import { canFit, edgeThrough } from "./blade_edge";
 import { Outline, rectangle } from "./outline";
-import { Calibrated, Drawn, Layer } from "./pieces";
+import { Calibrated, Drawn, Layer, layerName } from "./pieces";
 
 export type Kind = "outline" | "hole" | "region" | "edge";
 
@@ -150,8 +150,9 @@ export function withAdded(
   if (kind === "edge") return { drawn: withEdge(drawn, outline), part: { kind, layer: 0, index: 0 } };
   const own = drawn.layers[layer];
   if (kind === "outline" || !own) {
+    const names = drawn.layers.map((one) => one.name);
     const added: Layer = {
-      name: `layer ${drawn.layers.length + 1}`, thickness_mm, toughness_ratio: 1, outline, holes: [], regions: [],
+      name: layerName(`layer ${drawn.layers.length + 1}`, names, "layer"), thickness_mm, toughness_ratio: 1, outline, holes: [], regions: [],
     };
     return { drawn: { ...drawn, layers: [...drawn.layers, added] }, part: { kind: "outline", layer: drawn.layers.length, index: 0 } };
   }

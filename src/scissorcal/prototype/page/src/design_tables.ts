@@ -5,9 +5,9 @@ import { Design, Kind, nameOf, Part, withAdded, withLayer, withoutPart } from ".
 import { addCorner, removeCorner } from "./design_keys";
 import { html, numberField } from "./elements";
 import { boundsOf, crossesItself, moved, Outline, Point, resized } from "./outline";
-import { Calibrated, Drawn, Edge, Layer, Piece } from "./pieces";
+import { Calibrated, Drawn, Edge, Layer, layerName, Piece } from "./pieces";
 
-const ROWS = 24;
+const ROWS = 12;
 const MOST_CHECKED = 400; // corners of an outline that is looked at for sides that cross
 
 type Say = (sentence: string) => void;
@@ -29,7 +29,11 @@ function layerFields(design: Design, layer: Layer, i: number, isChosen: boolean)
   const choose = (kind: Kind, index = 0): void => design.choose({ kind, layer: i, index });
   const name = html("input", {
     type: "text", value: layer.name, maxlength: 60, "aria-label": `Name of layer ${i + 1}`, "data-key": `name${i}`,
-    change: () => change({ name: name.value.trim() || layer.name }),
+    change: () => {
+      const others = drawn.layers.filter((_, k) => k !== i).map((one) => one.name);
+      name.value = layerName(name.value, others, layer.name);
+      if (name.value !== layer.name) change({ name: name.value });
+    },
   });
   const swap = (j: number): void => {
     const layers = [...drawn.layers];
@@ -51,7 +55,7 @@ function layerFields(design: Design, layer: Layer, i: number, isChosen: boolean)
       small("×", "Remove", () => design.replace(withoutPart(drawn, { kind: "outline", layer: i, index: 0 })))),
     html("div", { class: "row" },
       numberField("Thickness", layer.thickness_mm, { key: `h${i}`, unit: "mm", least: 1e-4, most: 100 }, (value) => change({ thickness_mm: value })),
-      numberField("Toughness", layer.toughness_ratio, { key: `j${i}`, unit: "× calibrated", least: 1e-3, most: 1e3 }, (value) => change({ toughness_ratio: value }))),
+      numberField("Toughness", layer.toughness_ratio, { key: `j${i}`, unit: "× calibrated", least: 0.01, most: 100 }, (value) => change({ toughness_ratio: value }))),
     ...layer.holes.map((_, k) => partRow(design, { kind: "hole", layer: i, index: k })),
     ...layer.regions.map((_, k) => partRow(design, { kind: "region", layer: i, index: k })));
 }
@@ -67,7 +71,7 @@ function partRow(design: Design, part: Part): HTMLElement {
     html("button", {
       type: "button", class: "small", "aria-pressed": String(isChosen), "data-key": `choose${key}`, click: () => design.choose(part),
     }, `${isChosen ? "●" : "○"} ${name.replace(` of ${layer.name}`, "")}`),
-    ratio === null ? null : numberField("Toughness", ratio, { key: `j${key}`, unit: "×", least: 1e-3, most: 1e3 }, (value) =>
+    ratio === null ? null : numberField("Toughness", ratio, { key: `j${key}`, unit: "×", least: 0.01, most: 100 }, (value) =>
       design.replace(withLayer(drawn, part.layer, (own) => ({
         ...own, regions: own.regions.map((one, k) => (k === part.index ? { ...one, toughness_ratio: value } : one)),
       })))),
@@ -150,11 +154,9 @@ export function pieceTable(pieces: Piece[] | null, refusal: string): HTMLElement
     ];
     return html("tr", {}, html("th", { scope: "row" }, String(i + 1)), ...texts.map((text) => html("td", {}, text)));
   }));
-  const isEmpty = pieces !== null && !rows.length;
   return html("section", { class: "design-panel" },
     html("h3", {}, "What the blades meet along the cut"),
     refusal ? html("p", { class: "warning", role: "alert" }, refusal) : null,
-    isEmpty ? html("p", { class: "warning" }, "Nothing: no plate lies on the line of the cut.") : null,
     rows.length ? html("table", {},
       html("thead", {}, html("tr", {}, ...heads.map((head) => html("th", { scope: "col" }, head)))),
       html("tbody", {}, ...rows)) : null);

@@ -8,7 +8,7 @@ interface Place {
   distance: number; // as a multiple of what shows all
 }
 
-const HOME: Place = { round: 0.62, up: 0.5, distance: 1 };
+const HOME: Place = { round: 0.45, up: 0.6, distance: 1 };
 const KEY_rad = 0.1;
 const TURN_rad_per_px = 0.008;
 const HIGHEST_rad = 1.5;

@@ -4,11 +4,15 @@ import { parse, TomlTableWithoutBigInt } from "smol-toml";
 import { AT } from "./kernel";
 import { edgeOfTable } from "./blade_edge";
 import { Outline, Point } from "./outline";
-import { Calibrated, Drawn, Edge, Layer, Region } from "./pieces";
+import { Calibrated, Drawn, Edge, Layer, layerName, Region } from "./pieces";
 import { Scene, unpack } from "./scene";
 
 const MOST_CHARACTERS = 1_000_000;
-const NUMBERS_OF_A_LINE = 8;
+const POINTS_OF_A_LINE = 8;
+// What scissorcal.recipe.plate_layers takes.
+const MOST_CORNERS = 2000;
+const MOST_OF_OUTLINE = 1000;
+const MOST_PARTS = 64;
 
 type Toml = TomlTableWithoutBigInt;
 
@@ -28,12 +32,14 @@ export function calibratedOf(scene: Scene): Calibrated {
  * page knows of the scene. Raises Error where the base is a recipe in which nothing can be replaced.
  */
 export function recipeText(drawn: Drawn, scene: Scene, base: string | null): string {
+  refuseTooMany(drawn);
   let text = base ?? recipeOf(scene, drawn.edge);
   if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge));
   text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
   const known = parsed(text);
   const plate = (known.plate ?? {}) as Toml;
-  if (drawn.cut_line_mm !== Number(plate.cut_line_mm ?? 0)) text = withCutLine(text, drawn.cut_line_mm);
+  const line = drawn.layers.length ? drawn.cut_line_mm : 0;
+  if (line !== Number(plate.cut_line_mm ?? 0)) text = withCutLine(text, line);
   const layers = drawn.layers.map(layerText).join("\n");
   const whole = layers ? `${text.trimEnd()}\n\n${layers}` : text;
   const back = drawnFromRecipe(whole);
@@ -56,6 +62,19 @@ export function drawnFromRecipe(text: string): Drawn {
     edge: edge === undefined ? null : edgeOf(table(edge, "rig.edge")),
     edge_points: [],
   };
+}
+
+function refuseTooMany({ layers }: Drawn): void {
+  const outlines = layers.flatMap((layer) => [layer.outline, ...layer.holes, ...layer.regions.map((region) => region.outline)]);
+  const count = outlines.reduce((sum, outline) => sum + outline.length, 0);
+  if (count > MOST_CORNERS || outlines.some((outline) => outline.length > MOST_OF_OUTLINE)) {
+    throw new Error(
+      `A recipe holds ${MOST_CORNERS} corners, ${MOST_OF_OUTLINE} of one outline, and this drawing has ${count}: save drawing.svg and name its `
+      + 'shapes in the recipe, with outline = "drawing.svg" and id = "layer-1".');
+  }
+  if (layers.some((layer) => layer.holes.length > MOST_PARTS || layer.regions.length > MOST_PARTS)) {
+    throw new Error(`A layer of a recipe has up to ${MOST_PARTS} holes and ${MOST_PARTS} parts: draw fewer.`);
+  }
 }
 
 function layerText(layer: Layer): string {
@@ -180,7 +199,7 @@ function layerOf(value: unknown, place: string): Layer {
     throw new Error(`${place} takes its outline from the file ${String(layer.outline)}: load that SVG file instead.`);
   }
   return {
-    name: String(layer.name ?? "plate"),
+    name: layerName(String(layer.name ?? ""), [], "plate"),
     thickness_mm: positive(layer.thickness_mm, `${place}.thickness_mm`),
     toughness_ratio: positive(layer.toughness_ratio ?? 1, `${place}.toughness_ratio`),
     outline: outlineOf(layer.outline_mm, `${place}.outline_mm`),
@@ -239,7 +258,7 @@ function positive(value: unknown, place: string): number {
 function pointsText(outline: Outline): string {
   const points = outline.map(([x, y]) => `[${shown(x)}, ${shown(y)}]`);
   const lines: string[] = [];
-  for (let i = 0; i < points.length; i += NUMBERS_OF_A_LINE) lines.push(points.slice(i, i + NUMBERS_OF_A_LINE).join(", "));
+  for (let i = 0; i < points.length; i += POINTS_OF_A_LINE) lines.push(points.slice(i, i + POINTS_OF_A_LINE).join(", "));
   return lines.length === 1 ? `[${lines[0]}]` : `[\n  ${lines.join(",\n  ")},\n]`;
 }
 

@@ -1,7 +1,7 @@
 // What the 3-D view shows of pieces: the drawn layers, or each piece as a strip of its own length.
 
 import { Outline, rectangle } from "./outline";
-import { Drawn, Piece } from "./pieces";
+import { Drawn, Layer, materialOf, Piece, SMALLEST_mm } from "./pieces";
 import { Scene } from "./scene";
 import { Slab } from "./solids";
 
@@ -23,13 +23,19 @@ export function slabsOf({ scene, pieces, drawn }: Shown, halfWidth: number): Tin
 }
 
 function ofLayers(drawn: Drawn): Tinted[] {
-  let low = 0;
-  return drawn.layers.flatMap((layer, i) => {
+  const found: Tinted[] = [];
+  const tops: number[] = [];
+  drawn.layers.forEach((layer, i) => {
+    const own = materialOf(layer, drawn.cut_line_mm);
+    const isOver = (below: Layer): boolean => materialOf(below, drawn.cut_line_mm)
+      .some(([from, to]) => own.some(([begin, end]) => Math.min(to, end) - Math.max(from, begin) >= SMALLEST_mm));
+    const low = drawn.layers.slice(0, i).reduce((most, below, k) => (isOver(below) ? Math.max(most, tops[k]) : most), 0);
     const high = low + Math.max(layer.thickness_mm, THINNEST_mm);
-    const own: Tinted = { outline: layer.outline, holes: layer.holes, low, high, tint: i % 2 ? "second" : "sheet" };
-    low = high;
-    return [own, ...layer.regions.map((region) => coat(region.outline, high, region.toughness_ratio, layer.toughness_ratio))];
+    tops.push(high);
+    found.push({ outline: layer.outline, holes: layer.holes, low, high, tint: i % 2 ? "second" : "sheet" });
+    found.push(...layer.regions.map((region) => coat(region.outline, high, region.toughness_ratio, layer.toughness_ratio)));
   });
+  return found;
 }
 
 function ofPieces(scene: Scene, pieces: readonly Piece[], halfWidth: number): Tinted[] {

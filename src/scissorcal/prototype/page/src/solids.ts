@@ -11,41 +11,80 @@ export interface Slab {
   high: number;
 }
 
+/** Depth (mm) to which a flap is pressed at a place x (mm) of the cut; 0 ahead of the crack. */
+export type Depth = (x: number) => number;
+
 /** Vertices that stand somewhere at rest, and move up and down from there. */
 class Bending {
   readonly geometry = new BufferGeometry();
   private readonly rest: number[] = []; // x, y, z of each vertex
-  private readonly sides: (1 | -1)[] = [];
-  private places: BufferAttribute | null = null;
+  private readonly facing: number[] = []; // its normal at rest
+  private readonly columns = new Map<number, number>(); // x of the vertices, each once
+  private readonly column: number[] = [];
+  private readonly shares: number[] = []; // of the depth, below 0 on the side that is pressed down
+  private readonly falls: number[] = []; // and its derivative along y
+  private made: [BufferAttribute, BufferAttribute] | null = null;
 
-  bend(by: Bend): void {
-    const { rest, sides } = this;
-    if (!this.places) {
-      this.places = new BufferAttribute(new Float32Array(rest), 3);
-      this.places.setUsage(DynamicDrawUsage);
-      this.geometry.setAttribute("position", this.places);
-      this.geometry.computeBoundingSphere();
-      if (this.geometry.boundingSphere) this.geometry.boundingSphere.radius += MOST_BENT_mm;
+  constructor(protected readonly cut: number) {}
+
+  /** Bend both flaps, or only the one on the left of the cut. */
+  bend(depth: Depth, isBoth: boolean): void {
+    const { rest, facing, shares, falls, column } = this;
+    this.made ??= this.attributes();
+    const [places, normals] = this.made.map((one) => one.array);
+    const xs = [...this.columns.keys()];
+    const depths = xs.map(depth);
+    const slopes = xs.map((x, i) => (depths[i] ? (depth(x + STEP_mm) - depth(x - STEP_mm)) / (2 * STEP_mm) : 0));
+    for (let i = 0; i < shares.length; i++) {
+      const share = isBoth || shares[i] < 0 ? shares[i] : 0;
+      const down = depths[column[i]];
+      places[3 * i + 2] = rest[3 * i + 2] + share * down;
+      const up = facing[3 * i + 2];
+      if (up) {
+        const [x, y] = [share * slopes[column[i]], (share ? falls[i] : 0) * down];
+        const size = up / Math.sqrt(1 + x * x + y * y);
+        normals[3 * i] = -x * size;
+        normals[3 * i + 1] = -y * size;
+        normals[3 * i + 2] = size;
+      }
     }
-    const array = this.places.array;
-    for (let i = 0; i < sides.length; i++) array[3 * i + 2] = rest[3 * i + 2] + by(rest[3 * i], rest[3 * i + 1], sides[i]);
-    this.places.needsUpdate = true;
+    for (const one of this.made) one.needsUpdate = true;
   }
 
   dispose(): void {
     this.geometry.dispose();
   }
 
-  protected vertex(x: number, y: number, z: number, side: 1 | -1): void {
+  protected vertex(x: number, y: number, z: number, side: 1 | -1, normal: readonly [number, number, number]): void {
     this.rest.push(x, y, z);
-    this.sides.push(side);
+    this.facing.push(...normal);
+    const known = this.columns.get(x);
+    this.column.push(known ?? this.columns.size);
+    if (known === undefined) this.columns.set(x, this.columns.size);
+    const away = (Math.abs(y - this.cut) - BESIDE_mm) / (BENT_mm - BESIDE_mm);
+    const isBetween = away > 0 && away < 1;
+    this.shares.push(-side * (0.5 + 0.5 * Math.cos(Math.PI * Math.min(Math.max(away, 0), 1))));
+    this.falls.push(isBetween ? (0.5 * Math.PI * Math.sin(Math.PI * away)) / (BENT_mm - BESIDE_mm) : 0);
+  }
+
+  private attributes(): [BufferAttribute, BufferAttribute] {
+    const made: [BufferAttribute, BufferAttribute] = [
+      new BufferAttribute(new Float32Array(this.rest), 3), new BufferAttribute(new Float32Array(this.facing), 3),
+    ];
+    ["position", "normal"].forEach((name, i) => {
+      made[i].setUsage(DynamicDrawUsage);
+      this.geometry.setAttribute(name, made[i]);
+    });
+    this.geometry.computeBoundingSphere();
+    if (this.geometry.boundingSphere) this.geometry.boundingSphere.radius += BENT_mm;
+    return made;
   }
 }
 
 /** Lines every 10 mm on the upper face of a slab: they show its size and how it bends. */
 export class Grid extends Bending {
   constructor(slab: Slab, cut: number) {
-    super();
+    super(cut);
     const turned = (outline: Outline): Outline => outline.map(([x, y]): Point => [y, x]);
     const lines = (outline: Outline, holes: Outline[], draw: (at: number, from: number, to: number) => void): void => {
       const ys = outline.map(([, y]) => y);
@@ -61,32 +100,36 @@ export class Grid extends Bending {
       if (Math.abs(y - cut) < 1e-6) return; // where the cut itself is drawn
       const d = step(from, to);
       for (let x = from; x < to - 0.5 * d; x += d) {
-        for (const at of [x, x + d]) this.vertex(at, y, z, y > cut ? 1 : -1);
+        for (const at of [x, x + d]) this.vertex(at, y, z, y > cut ? 1 : -1, UP);
       }
     });
     lines(turned(slab.outline), slab.holes.map(turned), (x, from, to) => {
       for (const [low, high] of [[from, Math.min(to, cut)], [Math.max(from, cut), to]]) {
         const d = step(low, high);
         for (let y = low; y < high - 0.5 * d; y += d) {
-          for (const at of [y, y + d]) this.vertex(x, at, z, high > cut ? 1 : -1);
+          for (const at of [y, y + d]) this.vertex(x, at, z, high > cut ? 1 : -1, UP);
         }
       }
     });
   }
 }
 
-/** How far (mm) the plate stands off at a place, on the left of the cut (side 1) or right (-1). */
-export type Bend = (x: number, y: number, side: 1 | -1) => number;
-
 const GRID_mm = 10;
 const COLUMN_mm = 2;
-const MOST_COLUMNS = 160;
+const MOST_COLUMNS = 100;
+/** Distances from the cut (mm) between which a flap is straight. */
+const ROWS_mm = [2.6, 6, 11, 17, 23, 30];
 const MOST_LINES = 40;
-const MOST_BENT_mm = 40;
+const STEP_mm = 0.5;
+/** A flap lies on the blade so far from the cut, and comes back to the plate out here. */
+const BESIDE_mm = 2.6;
+const BENT_mm = 30;
+const UP = [0, 0, 1] as const;
+const DOWN = [0, 0, -1] as const;
 
 export class Solid extends Bending {
-  constructor(slab: Slab, private readonly cut: number) {
-    super();
+  constructor(slab: Slab, cut: number) {
+    super(cut);
     const turned = (outline: Outline, way: 1 | -1): Outline => (way * areaOf(outline) < 0 ? [...outline].reverse() : outline);
     const rings = [turned(slab.outline, 1), ...slab.holes.map((hole) => turned(hole, -1))];
     const columns = columnsOf(slab.outline);
@@ -102,24 +145,27 @@ export class Solid extends Bending {
       const corners = triangle.map((i) => points[i]);
       for (const side of [1, -1] as const) {
         const half = clipped(corners, 1, this.cut, side);
-        for (const part of half.length ? inColumns(half, columns) : []) {
+        const rows = ROWS_mm.map((row) => this.cut + side * row).sort((a, b) => a - b);
+        const parts = half.length ? split(half, 0, columns).flatMap((part) => split(part, 1, rows)) : [];
+        for (const part of parts) {
           for (let i = 1; i + 1 < part.length; i++) {
-            this.triangle([part[0], part[i], part[i + 1]], high, side);
-            this.triangle([part[0], part[i + 1], part[i]], low, side);
+            this.triangle([part[0], part[i], part[i + 1]], high, side, UP);
+            this.triangle([part[0], part[i + 1], part[i]], low, side, DOWN);
           }
         }
       }
     }
   }
 
-  private triangle(corners: Point[], z: number, side: 1 | -1): void {
-    for (const [x, y] of corners) this.vertex(x, y, z, side);
+  private triangle(corners: Point[], z: number, side: 1 | -1, normal: typeof UP | typeof DOWN): void {
+    for (const [x, y] of corners) this.vertex(x, y, z, side, normal);
   }
 
   /** The wall under one side of an outline, which runs with the material on its left. */
   private wall(from: Point, to: Point, columns: number[], { low, high }: Slab): void {
     const along = (axis: 0 | 1, at: number): number => (at - from[axis]) / (to[axis] - from[axis]);
-    const shares = [...columns.map((x) => along(0, x)), along(1, this.cut)].filter((share) => share > 0 && share < 1);
+    const rows = [0, ...ROWS_mm, ...ROWS_mm.map((row) => -row)].map((row) => this.cut + row);
+    const shares = [...columns.map((x) => along(0, x)), ...rows.map((y) => along(1, y))].filter((share) => share > 0 && share < 1);
     const places = [0, ...shares.sort((a, b) => a - b), 1];
     for (let i = 0; i + 1 < places.length; i++) {
       const [a, b] = [places[i], places[i + 1]].map((t): Point => [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])]);
@@ -128,8 +174,10 @@ export class Solid extends Bending {
   }
 
   private quad(a: Point, b: Point, low: number, high: number, side: 1 | -1): void {
+    const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+    const normal = [(b[1] - a[1]) / length, (a[0] - b[0]) / length, 0] as const;
     for (const [[x, y], z] of [[a, low], [b, low], [b, high], [a, low], [b, high], [a, high]] as [Point, number][]) {
-      this.vertex(x, y, z, side);
+      this.vertex(x, y, z, side, normal);
     }
   }
 
@@ -171,16 +219,17 @@ function clipped(polygon: Point[], axis: 0 | 1, at: number, side: 1 | -1): Point
   return found.length >= 3 ? found : [];
 }
 
-function inColumns(polygon: Point[], columns: number[]): Point[][] {
-  const xs = polygon.map(([x]) => x);
-  const [low, high] = [Math.min(...xs), Math.max(...xs)];
+/** A convex polygon in parts, between ascending places along an axis. */
+function split(polygon: Point[], axis: 0 | 1, places: readonly number[]): Point[][] {
+  const along = polygon.map((point) => point[axis]);
+  const [low, high] = [Math.min(...along), Math.max(...along)];
   const found: Point[][] = [];
   let rest = polygon;
-  for (const x of columns) {
-    if (x <= low || x >= high) continue;
-    const left = clipped(rest, 0, x, -1);
-    if (left.length) found.push(left);
-    rest = clipped(rest, 0, x, 1);
+  for (const at of places) {
+    if (at <= low || at >= high) continue;
+    const before = clipped(rest, axis, at, -1);
+    if (before.length) found.push(before);
+    rest = clipped(rest, axis, at, 1);
     if (!rest.length) break;
   }
   if (rest.length) found.push(rest);

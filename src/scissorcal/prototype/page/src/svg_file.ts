@@ -3,7 +3,7 @@
 import { SVGPathData } from "svg-pathdata";
 import { flattened, nested, Outline, Point } from "./outline";
 import { withEdge } from "./design_state";
-import { Drawn, Layer } from "./pieces";
+import { Drawn, Layer, layerName } from "./pieces";
 
 const MOST_CHARACTERS = 2_000_000;
 const MOST_SHAPES = 400;
@@ -67,10 +67,11 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
   const ours = shapes.filter((shape) => KINDS.has(shape.marks.kind));
   if (!ours.length) {
     const plates = nested(shapes.flatMap((shape) => shape.outlines).filter((outline) => outline.length >= 3));
-    drawn.layers = plates.map((plate, i) => ({
-      name: nameOf(shapes, plate.outline) || `plate ${i + 1}`, thickness_mm, toughness_ratio: 1, ...plate, regions: [],
+    plates.forEach((plate, i) => drawn.layers.push({
+      name: layerName(nameOf(shapes, plate.outline), drawn.layers.map((one) => one.name), `plate ${i + 1}`),
+      thickness_mm, toughness_ratio: 1, ...plate, regions: [],
     }));
-    drawn.edge_points = shapes[0].outlines[0];
+    if (!drawn.layers.length) drawn.edge_points = shapes[0].outlines[0];
     return drawn;
   }
   drawn.isOurs = true;
@@ -80,7 +81,7 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
     if (kind === "edge") Object.assign(drawn, withEdge(drawn, outlines[0], marks.family === "arc" ? "arc" : "line"));
     if (kind === "outline") {
       drawn.layers.push({
-        name: layer ?? "plate", thickness_mm: positive(thickness, thickness_mm), toughness_ratio: positive(ratio, 1),
+        name: layerName(layer ?? "", drawn.layers.map((one) => one.name), "plate"), thickness_mm: positive(thickness, thickness_mm), toughness_ratio: positive(ratio, 1),
         outline: outlines[0], holes: [], regions: [],
       });
     }

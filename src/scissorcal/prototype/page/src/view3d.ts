@@ -1,7 +1,7 @@
 // The 3-D look: blades, sheet or drawn plates with their crack, the plate in its pose.
 
 import {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
+  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
   LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
@@ -10,7 +10,7 @@ import { Table } from "./kernel";
 import { Orbit } from "./orbit";
 import { rectangle } from "./outline";
 import { Drawn, Piece } from "./pieces";
-import { Bend, Grid, Solid } from "./solids";
+import { Depth, Grid, Solid } from "./solids";
 import { slabsOf, Tinted } from "./slabs";
 
 /** What is drawn; without pieces the sheet is uniform. `drawn` is what the pieces were made of. */
@@ -21,9 +21,12 @@ export type View = PlainView & {
   drawn?: Drawn | null;
 };
 
-const HALF_WIDTH_mm = 30; // of a plate that nobody drew, and over which a flap comes back to the plate
+const HALF_WIDTH_mm = 30; // of a plate that nobody drew
+const CLEAR_mm = 0.3;
 const MOST_BEND_mm = 14;
 const CRACK_POINTS = 64;
+// Lines on a face are in front of it.
+const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
 const HELP = "Drag or arrow keys turn the view, + and − zoom, Home sets it back.";
 const NONE = "This browser has no WebGL, which the 3-D view needs; the plain drawing shows the same.";
 
@@ -41,15 +44,16 @@ export class View3d {
     upperEdge: new LineBasicMaterial(), lowerEdge: new LineBasicMaterial(), crack: new LineBasicMaterial(),
     grid: new LineBasicMaterial({ transparent: true, opacity: 0.35 }),
     contact: new MeshLambertMaterial(),
-    sheet: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
-    second: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
-    tougher: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
-    weaker: new MeshLambertMaterial({ side: DoubleSide, flatShading: true }),
+    sheet: new MeshLambertMaterial(PLATE),
+    second: new MeshLambertMaterial(PLATE),
+    tougher: new MeshLambertMaterial(PLATE),
+    weaker: new MeshLambertMaterial(PLATE),
   };
   private readonly contact = new Mesh(new SphereGeometry(0.9, 16, 12), this.materials.contact);
   private readonly cracks: Line[] = [];
   private blades: { of: Table; blades: Blades } | null = null;
-  private solids: { of: string; solids: (Solid | Grid)[] } | null = null;
+  private solids: { of: unknown[]; solids: (Solid | Grid)[] } | null = null;
+  private bent: unknown[] = [];
   private theme = "";
   private view: View | null = null;
 
@@ -123,11 +127,11 @@ export class View3d {
   }
 
   private light(): void {
-    const key = new DirectionalLight(0xffffff, 2.1);
-    key.position.set(-0.4, -1, 1.6);
+    const key = new DirectionalLight(0xffffff, 2.6);
+    key.position.set(-0.9, -0.7, 1.3);
     const rim = new DirectionalLight(0xffffff, 0.9);
     rim.position.set(0.8, 1, 0.3);
-    this.world.add(new HemisphereLight(0xffffff, 0x8f8a84, 1.3), new AmbientLight(0xffffff, 0.25), key, rim);
+    this.world.add(new HemisphereLight(0xffffff, 0x8f8a84, 1), key, rim);
   }
 
   /** Take the page's colours where the theme changed. */
@@ -172,11 +176,11 @@ export class View3d {
     }
     const thickness = 1e3 * scene.upper_face_m * scene.moving_blades;
     const reach = length * (1 + Math.ceil((1e3 * view.pose.advance) / length + 1));
+    const of = [view.drawn, view.pieces, scene, view.drawn || view.pieces ? 0 : reach];
+    if (this.solids && of.every((one, i) => one === this.solids?.of[i])) return;
     const plain = { outline: rectangle([0, -HALF_WIDTH_mm], [reach, HALF_WIDTH_mm]), holes: [], low: 0, high: thickness, tint: "sheet" as const };
     const slabs: Tinted[] = slabsOf(view, HALF_WIDTH_mm) ?? [plain];
     const cut = view.drawn?.cut_line_mm ?? 0;
-    const of = JSON.stringify([slabs, cut]);
-    if (this.solids?.of === of) return;
     this.solids?.solids.forEach((solid) => solid.dispose());
     this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh || one instanceof LineSegments));
     const base = scene.moving_blades === 2 ? 0.5 * Math.max(...slabs.map((slab) => slab.high), 0) : 0;
@@ -199,42 +203,33 @@ export class View3d {
     const turn = at ? new Vector3(...at.rotation_vector_rad) : new Vector3();
     this.plate.setRotationFromAxisAngle(turn.clone().normalize(), turn.length());
     const crack = Math.max(view.crack, ...startedCracks(view));
-    const bend = this.bendOf(view, crack, cut);
-    this.solids?.solids.forEach((solid) => solid.bend(bend));
-    this.crackLines(crack, cut, bend);
+    this.bend(view, crack);
     const contact = crack - pose.advance;
     this.contact.visible = view.step.response > 0 && contact > 0;
     this.contact.position.set(1e3 * contact, 0, 1e3 * heightOver(view, Math.max(contact, 0)));
   }
 
   /** Behind the crack the upper edge presses one flap down, and the lower lifts the other. */
-  private bendOf(view: View, crack: number, cut: number): Bend {
+  private bend(view: View, crack: number): void {
     const { pose, scene } = view;
+    const now = [this.solids, this.blades, pose.opening, pose.advance, crack, view.drawn?.cut_line_mm];
+    if (now.every((one, i) => one === this.bent[i])) return;
+    this.bent = now;
     const face = 1e3 * scene.upper_face_m;
-    const heights = new Map<number, number>();
-    const depthAt = (x_mm: number): number => {
-      let found = heights.get(x_mm);
-      if (found === undefined) {
-        const place = Math.max(1e-3 * x_mm - pose.advance, 0);
-        found = Math.min(Math.max(face - 1e3 * heightOver(view, place), 0), MOST_BEND_mm);
-        heights.set(x_mm, found);
-      }
-      return found;
+    const depth: Depth = (x) => {
+      if (x >= 1e3 * crack) return 0;
+      const place = Math.max(1e-3 * x - pose.advance, 0);
+      const found = Math.min(Math.max(face - 1e3 * heightOver(view, place), 0), MOST_BEND_mm);
+      return found + Math.min(found, CLEAR_mm);
     };
-    return (x, y, side) => {
-      if (x >= 1e3 * crack || (side === -1 && scene.moving_blades === 1)) return 0;
-      const share = 0.5 + 0.5 * Math.cos(Math.PI * Math.min(Math.abs(y - cut) / HALF_WIDTH_mm, 1));
-      return -side * share * depthAt(x);
-    };
-  }
-
-  private crackLines(crack: number, cut: number, bend: Bend): void {
+    const isBoth = scene.moving_blades === 2;
+    this.solids?.solids.forEach((solid) => solid.bend(depth, isBoth));
     this.cracks.forEach((line, i) => {
-      const side = i === 0 ? 1 : -1;
+      const share = i === 0 ? -1 : isBoth ? 1 : 0;
       const places = line.geometry.getAttribute("position") as BufferAttribute;
       for (let k = 0; k < CRACK_POINTS; k++) {
         const x = (1e3 * crack * k) / (CRACK_POINTS - 1);
-        places.setXYZ(k, x, cut, 0.15 + bend(x, cut, side));
+        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, 0.15 + share * depth(x));
       }
       places.needsUpdate = true;
       line.visible = crack > 0;
