@@ -42,10 +42,10 @@ export function recipeText(drawn: Drawn, scene: Scene, base: string | null): str
   if (line !== Number(plate.cut_line_mm ?? 0)) text = withCutLine(text, line);
   const layers = drawn.layers.map(layerText).join("\n");
   const whole = layers ? `${text.trimEnd()}\n\n${layers}` : text;
-  const back = drawnFromRecipe(whole);
-  if (back.layers.length !== drawn.layers.length) {
-    throw new Error("This recipe has its layers on one line (inline tables), which cannot be replaced: write [[plate.layers]].");
+  if (known.plate && (known.plate as Toml).layers !== undefined) {
+    throw new Error("This recipe has its plate on one line (inline tables), which cannot be replaced: write [plate] and [[plate.layers]].");
   }
+  drawnFromRecipe(whole); // what is saved can be loaded
   return whole;
 }
 

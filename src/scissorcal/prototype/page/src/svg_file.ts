@@ -11,6 +11,10 @@ const MOST_POINTS = 4000; // of one outline, and never more than 20,000 of a fil
 const MOST_POINTS_OF_FILE = 20_000;
 const FLAT_mm = 0.02;
 const PIXEL_mm = 25.4 / 96;
+/** By SVGLength's numbers: none, px, cm, mm, in, pt, pc. */
+const UNITS_mm: Record<number, number | undefined> = {
+  1: PIXEL_mm, 5: PIXEL_mm, 6: 10, 7: 1, 8: 25.4, 9: 25.4 / 72, 10: 25.4 / 6,
+};
 
 const NAMESPACE = "http://www.w3.org/2000/svg";
 const DRAWN = new Set(["path", "rect", "circle", "ellipse", "polygon", "polyline"]);
@@ -135,9 +139,9 @@ export function svgOf(drawn: Drawn): string {
 function unitOf(root: SVGSVGElement): number {
   const width = root.width.baseVal;
   const box = root.viewBox.baseVal;
-  if (!box || !box.width) return PIXEL_mm;
-  const isRelative = width.unitType === SVGLength.SVG_LENGTHTYPE_PERCENTAGE || !root.hasAttribute("width");
-  return isRelative || !(width.value > 0) ? PIXEL_mm : (PIXEL_mm * width.value) / box.width;
+  const unit = root.hasAttribute("width") ? UNITS_mm[width.unitType] : undefined;
+  if (!box || !box.width || unit === undefined || !(width.valueInSpecifiedUnits > 0)) return PIXEL_mm;
+  return (unit * width.valueInSpecifiedUnits) / box.width;
 }
 
 function outlinesOf(element: SVGGeometryElement, unit: number): Outline[] {
@@ -165,10 +169,12 @@ function outlinesOf(element: SVGGeometryElement, unit: number): Outline[] {
   return found.map(settled);
 }
 
-/** Without points that stand on the one before, nor the first one again at the end. */
+/** To 0.1 um, without points that stand on the one before, nor the first one again at the end. */
 function settled(outline: Outline): Outline {
-  const apart = (a: Point, b: Point): boolean => Math.hypot(a[0] - b[0], a[1] - b[1]) > 1e-6;
-  const kept = outline.filter((point, i) => i === 0 || apart(point, outline[i - 1]));
+  const round = (value: number): number => Math.round(value * 1e4) / 1e4 + 0;
+  const points = outline.map(([x, y]): Point => [round(x), round(y)]);
+  const apart = (a: Point, b: Point): boolean => a[0] !== b[0] || a[1] !== b[1];
+  const kept = points.filter((point, i) => i === 0 || apart(point, points[i - 1]));
   while (kept.length > 1 && !apart(kept[0], kept[kept.length - 1])) kept.pop();
   return kept;
 }
