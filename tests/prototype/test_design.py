@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe
+from tests.browser import open_browser
 from tests.prototype.design_bed import EDGE, ENERGY_J_PER_M, THICKNESS_MM, Bed, open_bed
 
 SHEET = [[0, -30], [80, -30], [80, 30], [0, 30]]
@@ -31,8 +33,14 @@ def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
 
 
 @pytest.fixture(scope="module")
-def bed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bed]:
-    with open_bed(tmp_path_factory.mktemp("design")) as found:
+def browser() -> Iterator[Browser]:
+    with open_browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def bed(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bed]:
+    with open_bed(browser, tmp_path_factory.mktemp("design")) as found:
         yield found
 
 
@@ -178,8 +186,10 @@ def test_curves_and_arcs_are_followed_closely(bed: Bed) -> None:
     <path d="M0 0C10 30 40 30 50 0Z"/></svg>"""
     shapes = bed.run("(text) => readSvg(text)", text)
     outlines = [np.array(shape["outlines"][0]) for shape in shapes]
-    areas = [0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) for x, y in
-             (outline.T for outline in outlines)]
+    areas = [
+        0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        for x, y in (outline.T for outline in outlines)
+    ]
     assert areas[0] == pytest.approx(800 - (4 - np.pi) * 25, rel=2e-3)
     assert areas[1] == pytest.approx(200 * np.pi, rel=2e-3)
     t = np.linspace(0, 1, 20001)[:, None]
@@ -291,7 +301,10 @@ def test_a_recipe_that_was_loaded_keeps_all_but_the_drawing(bed: Bed) -> None:
     ("base", "words"),
     [
         ("format = ", "no recipe"),
-        ("plate = { layers = [{ thickness_mm = 1, outline_mm = [[0, 0], [1, 0], [1, 1]] }] }", "inline"),
+        (
+            "plate = { layers = [{ thickness_mm = 1, outline_mm = [[0, 0], [1, 0], [1, 1]] }] }",
+            "inline",
+        ),
     ],
 )
 def test_recipes_in_which_nothing_can_be_replaced_are_refused(

@@ -50,6 +50,7 @@ class Designer {
   private base: string | null;
   private pieces: Piece[] | null = null;
   private refusal = "";
+  private timer = 0;
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly apply: Apply) {
     this.calibrated = calibratedOf(scene);
@@ -67,6 +68,7 @@ class Designer {
       this.files(), this.status, html("div", { class: "design-both" }, paper, this.side),
     );
     this.canvas.fit();
+    this.meet();
     this.tables();
   }
 
@@ -78,7 +80,8 @@ class Designer {
   private changed(isDone: boolean): void {
     this.canvas.redraw();
     if (!isDone && this.canvas.isDragging) return;
-    this.tables();
+    this.meet();
+    this.refresh();
     if (!isDone) return;
     this.cuts.checked = true;
     this.told();
@@ -89,15 +92,25 @@ class Designer {
     else if (this.pieces) this.apply(this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge });
   }
 
-  private tables(): void {
-    const { design } = this;
+  /** What the blades meet of the drawing, or why the kernel does not take it. */
+  private meet(): void {
     this.pieces = null;
     this.refusal = "";
     try {
-      this.pieces = piecesOf(design.drawn, this.calibrated);
+      this.pieces = piecesOf(this.design.drawn, this.calibrated);
     } catch (error) {
       this.refusal = (error as Error).message;
     }
+  }
+
+  /** Show the tables anew once the focus has moved on, so that it stays where it went. */
+  private refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.tables());
+  }
+
+  private tables(): void {
+    const { design } = this;
     refilled(this.side,
       layerList(design), pieceTable(this.pieces, this.refusal),
       cornerTable(design, (sentence) => this.say(sentence)), edgePanel(design, this.fitted));

@@ -115,8 +115,9 @@ export class View3d {
     this.cracks.forEach((line) => line.geometry.dispose());
     this.contact.geometry.dispose();
     Object.values(this.materials).forEach((material) => material.dispose());
-    this.renderer?.dispose();
     this.renderer?.domElement.remove();
+    this.renderer?.dispose();
+    this.renderer?.forceContextLoss(); // a browser keeps few, and takes away the oldest
     this.note.remove();
     this.container.classList.remove("view3d");
     this.view = null;
