@@ -224,7 +224,7 @@ def test_a_saved_drawing_is_loaded_as_it_was(bed: Bed) -> None:
         layer(SHEET, holes=[box(30, -5, 40, 5)], name="a & b", toughness_ratio=0.5),
         layer(box(20, -5, 50, 5), 0.25, name="patch",
               regions=[{"toughness_ratio": 3.0, "outline": box(25, -2, 30, 2)}]),
-        cut=1.5, edge_points=[[0, -8], [40, -7], [75, -5]],
+        cut=1.5, edge_points=[[-4, -8], [40, -7], [75, -5]],
     )  # fmt: skip
     given["edge"] = bed.run("(points) => edgeThrough(points, 'arc')", given["edge_points"])
     text = bed.run("(given) => svgOf(given)", given)

@@ -185,6 +185,27 @@ def test_a_file_that_is_no_drawing_changes_nothing(bed: Bed, tmp_path: Path) -> 
     assert bed.told == []
 
 
+def test_a_file_gives_holes_or_an_edge_where_these_are_drawn(bed: Bed, tmp_path: Path) -> None:
+    page, file = bed.page, tmp_path / "part.svg"
+    head = 'xmlns="http://www.w3.org/2000/svg" width="80mm" height="20mm" viewBox="0 -5 80 20"'
+    file.write_text(
+        f'<svg {head}><rect x="60" y="-5" width="8" height="3"/></svg>', encoding="utf-8"
+    )
+    page.locator("select").first.select_option("hole")
+    page.set_input_files("input[type=file]", file)
+    page.wait_for_function("() => told.length === 1")
+    assert spans(bed) == [(0, 60), (68, 120)]
+    assert "moved onto the line" in bed.said
+    blade = '<path d="M0 3 L70 0 L70 -1 L0 -4z"/>'
+    file.write_text(f"<svg {head}>{blade}</svg>", encoding="utf-8")
+    page.locator("select").first.select_option("edge")
+    page.set_input_files("input[type=file]", file)
+    page.wait_for_function("() => told.length === 2")
+    edge = bed.told[-1]["applied"]["edge"]
+    assert (edge["offset_mm"], edge["length_mm"]) == pytest.approx((-8, 70))  # 5 mm below the top
+    assert edge["taper_deg"] == pytest.approx(2.454, abs=1e-3)
+
+
 def test_an_edge_is_drawn_and_goes_into_the_recipe(bed: Bed, tmp_path: Path) -> None:
     page = bed.page
     page.get_by_role("button", name="Draw another edge").click()

@@ -1,7 +1,7 @@
 // Files of a drawing: what was loaded becomes a drawing, what is saved goes to the person's disk.
 
 import { Kind, Part, withAdded } from "./design_state";
-import { boundsOf, moved, Outline, Point } from "./outline";
+import { boundsOf, moved, Outline, Point, stretches } from "./outline";
 import { Drawn, materialOf } from "./pieces";
 import { pointsOf } from "./design_tables";
 import { drawnFromRecipe } from "./recipe_text";
@@ -42,11 +42,16 @@ export function openDrawing(name: string, text: string, present: Drawn, wanted: 
     const added = withAdded(present, "edge", 0, points, wanted.thickness_mm);
     return { ...added, sentence: `${name}: an edge through ${points.length} points.` };
   }
+  if (!outlines.length) throw new Error(`${name} has no closed outline with an area.`);
+  const line = present.cut_line_mm;
+  const { low, high } = boundsOf(outlines.flat());
+  const up = outlines.some((outline) => stretches(outline, line).length) ? 0 : line - 0.5 * (low[1] + high[1]);
   let [now, part] = [present, FIRST];
   for (const outline of outlines) {
-    ({ drawn: now, part } = withAdded(now, wanted.kind, wanted.layer, outline, wanted.thickness_mm));
+    ({ drawn: now, part } = withAdded(now, wanted.kind, wanted.layer, moved(outline, 0, up), wanted.thickness_mm));
   }
-  return { drawn: now, part, sentence: `${name}: ${outlines.length} outline${outlines.length === 1 ? "" : "s"} added.` };
+  const added = `${name}: ${outlines.length} outline${outlines.length === 1 ? "" : "s"} added`;
+  return { drawn: now, part, sentence: `${added}${up ? ", moved onto the line of the cut" : ""}.` };
 }
 
 /** Offer text as a file to save. */

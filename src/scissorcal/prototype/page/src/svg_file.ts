@@ -33,8 +33,9 @@ export interface Shape {
  * The shapes of an SVG file: paths, rectangles, circles, ellipses, polygons and polylines.
  *
  * Curves become points within 0.02 mm. Nothing of the file is shown or run: scripts, styles, texts,
- * pictures and references are passed over. Its x stays x and y turns up; units are those of the
- * width and the viewBox, a pixel (1/96 inch) where it states none. Raises Error with a sentence.
+ * pictures and references are passed over. Places are from the upper left corner of the page, y up
+ * and so below 0; units are those of the width and the viewBox, a pixel (1/96 inch) where it states
+ * none. Raises Error with a sentence.
  */
 export function readSvg(text: string): Shape[] {
   if (text.length > MOST_CHARACTERS) throw new Error("This SVG file is larger than 2 MB: simplify it first.");
@@ -44,13 +45,15 @@ export function readSvg(text: string): Shape[] {
   if (page.querySelector("parsererror") || root.namespaceURI !== NAMESPACE || root.localName !== "svg") {
     throw new Error("This is no SVG file: it does not parse as one.");
   }
-  const unit = unitOf(root as unknown as SVGSVGElement);
+  const svg = root as unknown as SVGSVGElement;
+  const [unit, box] = [unitOf(svg), svg.viewBox.baseVal];
+  const corner: Point = box ? [box.x, box.y] : [0, 0];
   const found: Shape[] = [];
   let points = 0;
   for (const element of root.querySelectorAll<SVGGeometryElement>("*")) {
     if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN)) continue;
     if (found.length === MOST_SHAPES) throw new Error(`This SVG file has more than ${MOST_SHAPES} shapes.`);
-    const outlines = outlinesOf(element, unit).filter((outline) => outline.length >= 2);
+    const outlines = outlinesOf(element, unit, corner).filter((outline) => outline.length >= 2);
     points += outlines.reduce((sum, one) => sum + one.length, 0);
     if (points > MOST_POINTS_OF_FILE || outlines.some((one) => one.length > MOST_POINTS)) {
       throw new Error(`This SVG file has an outline of more than ${MOST_POINTS} points, or ${MOST_POINTS_OF_FILE} in all.`);
@@ -79,9 +82,14 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
     return drawn;
   }
   drawn.isOurs = true;
-  for (const { outlines, marks } of ours) {
+  const cut = ours.find((shape) => shape.marks.kind === "cut");
+  const begin = cut?.outlines[0][0] ?? [0, 0];
+  drawn.cut_line_mm = Number(cut?.marks.y) || 0;
+  const settle = (outline: Outline): Outline =>
+    outline.map(([x, y]): Point => [round(x - begin[0]), round(y - begin[1] + drawn.cut_line_mm)]);
+  for (const { outlines: found, marks } of ours) {
     const { kind, layer, ratio, thickness } = marks;
-    if (kind === "cut") drawn.cut_line_mm = outlines[0][0][1];
+    const outlines = found.map(settle);
     if (kind === "edge") Object.assign(drawn, withEdge(drawn, outlines[0], marks.family === "arc" ? "arc" : "line"));
     if (kind === "outline") {
       drawn.layers.push({
@@ -98,12 +106,15 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
   return drawn;
 }
 
-/** A drawing as an SVG file in mm, which `drawnFromSvg` reads back; each outline has an id. */
+/**
+ * A drawing as an SVG file in mm, which `drawnFromSvg` reads back; each outline has an id. Where no
+ * place is below x = 0, x counts from the left of the page. The cut's mark begins at x = 0.
+ */
 export function svgOf(drawn: Drawn): string {
   const points = [...drawn.layers.flatMap((layer) => layer.outline), ...drawn.edge_points];
   const xs = points.map(([x]) => x).concat(0);
   const ys = points.map(([, y]) => -y).concat(-drawn.cut_line_mm);
-  const [left, top] = [Math.min(...xs) - 2, Math.min(...ys) - 2];
+  const [left, top] = [Math.min(...xs), Math.min(...ys) - 2];
   const [width, height] = [Math.max(...xs) + 2 - left, Math.max(...ys) + 2 - top];
   const shape = (tag: string, outline: Outline, attributes: Record<string, string>): string => {
     const named = Object.entries(attributes).map(([key, value]) => `${key}="${escaped(value)}"`).join(" ");
@@ -121,8 +132,10 @@ export function svgOf(drawn: Drawn): string {
     })),
     "  </g>",
   ].join("\n"));
-  const cut: Outline = [[left, drawn.cut_line_mm], [left + width, drawn.cut_line_mm]];
-  const lines = [shape("polyline", cut, { id: "cut", "data-kind": "cut", stroke: "red", "stroke-width": "0.2" })];
+  const cut: Outline = [[0, drawn.cut_line_mm], [left + width, drawn.cut_line_mm]];
+  const lines = [shape("polyline", cut, {
+    id: "cut", "data-kind": "cut", "data-y": String(drawn.cut_line_mm), stroke: "red", "stroke-width": "0.2",
+  })];
   if (drawn.edge_points.length) {
     lines.push(shape("polyline", drawn.edge_points, {
       id: "edge", "data-kind": "edge", "data-family": drawn.edge?.family ?? "line", stroke: "blue", fill: "none", "stroke-width": "0.3",
@@ -144,11 +157,11 @@ function unitOf(root: SVGSVGElement): number {
   return (unit * width.valueInSpecifiedUnits) / box.width;
 }
 
-function outlinesOf(element: SVGGeometryElement, unit: number): Outline[] {
+function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Point): Outline[] {
   const found: Outline[] = [];
   const matrix = placeOf(element);
   const place = (x: number, y: number): Point => [
-    unit * (matrix.a * x + matrix.c * y + matrix.e), -unit * (matrix.b * x + matrix.d * y + matrix.f),
+    unit * (matrix.a * x + matrix.c * y + matrix.e - left), -unit * (matrix.b * x + matrix.d * y + matrix.f - top),
   ];
   let data: SVGPathData;
   try {
@@ -171,12 +184,15 @@ function outlinesOf(element: SVGGeometryElement, unit: number): Outline[] {
 
 /** To 0.1 um, without points that stand on the one before, nor the first one again at the end. */
 function settled(outline: Outline): Outline {
-  const round = (value: number): number => Math.round(value * 1e4) / 1e4 + 0;
   const points = outline.map(([x, y]): Point => [round(x), round(y)]);
   const apart = (a: Point, b: Point): boolean => a[0] !== b[0] || a[1] !== b[1];
   const kept = points.filter((point, i) => i === 0 || apart(point, points[i - 1]));
   while (kept.length > 1 && !apart(kept[0], kept[kept.length - 1])) kept.pop();
   return kept;
+}
+
+function round(value: number): number {
+  return Math.round(value * 1e4) / 1e4 + 0;
 }
 
 /** All transforms from the file's root down to an element. */
