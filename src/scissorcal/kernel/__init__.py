@@ -51,6 +51,7 @@ from scissorcal.kernel.messages import (
 )
 from scissorcal.kernel.modes import Mode
 from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
+from scissorcal.kernel.pieces import Piece, PiecesModel, Strip, largest_overlap
 from scissorcal.kernel.plate import PlacedModel, PlateConfig, Pull, Section
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.rates import estimated_rates
@@ -111,6 +112,8 @@ __all__ = [
     "ModelTables",
     "NormalLaw",
     "PassivityConfig",
+    "Piece",
+    "PiecesModel",
     "PlacedModel",
     "PlateConfig",
     "Pull",
@@ -125,6 +128,7 @@ __all__ = [
     "StepFlag",
     "StepOutput",
     "StopReason",
+    "Strip",
     "Table",
     "Table16",
     "WatchConfig",
@@ -138,6 +142,7 @@ __all__ = [
     "encode_frame",
     "estimated_rates",
     "hybrid_inputs",
+    "largest_overlap",
     "lock_memory",
     "presliding_path",
     "run_loop",

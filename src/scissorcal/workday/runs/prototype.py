@@ -17,7 +17,8 @@ from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.prototype.rig_commands import RigCommand
-    from scissorcal.prototype.scene import Hand, Scene
+    from scissorcal.prototype.parts import Hand
+    from scissorcal.prototype.scene import Scene
     from scissorcal.prototype.server import PrototypeServer
     from scissorcal.recording import Recording
 
@@ -87,7 +88,7 @@ def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
 
 def _hand(recording: "Recording") -> "Hand | None":
     from scissorcal.prototype.arrays import Numbers
-    from scissorcal.prototype.scene import Hand
+    from scissorcal.prototype.parts import Hand
 
     samples = recording.samples
     numbers = [stroke.index for stroke in recording.strokes if stroke.sheet <= 0]
@@ -154,7 +155,7 @@ def prototype_server(
     `workspace_scene` raises.
     """
     _require_aiohttp()
-    from scissorcal.prototype.document import POLICY, page_of
+    from scissorcal.prototype.document import page_of, policy_of
     from scissorcal.prototype.server import PrototypeServer
 
     if camera != NONE and device == NONE:
@@ -164,7 +165,7 @@ def prototype_server(
     if device != NONE:
         commands = rig_commands(workspace, device, camera=camera, package_path=package_path)
     return PrototypeServer(
-        lambda socket: (page_of(scene, socket=socket), POLICY),
+        lambda socket: (page_of(scene, socket=socket), policy_of(served=True)),
         workspace.captures_dir,
         workspace.root,
         commands,

@@ -48,6 +48,11 @@ export interface Hand {
   advance: Packed;
 }
 
+export interface PlatePose {
+  position_m: [number, number, number];
+  rotation_vector_rad: [number, number, number];
+}
+
 export interface Scene {
   format: string;
   name: string;
@@ -74,6 +79,10 @@ export interface Scene {
   bands: Band[];
   strokes: Stroke[];
   hands: Hand[];
+  /** Text of the recipe that the package was built from, where it is known. */
+  recipe?: string | null;
+  /** Where the plate stands in the frame of the pivot, where a pose is known. */
+  plate_pose?: PlatePose | null;
 }
 
 const FORMAT = "scissorcal-prototype/1";
