@@ -75,7 +75,7 @@ setup kernel: $(READY)
 # The prototype's page, which the install builds too; a changed source of it is only bundled again.
 page: $(READY)
 
-$(BUILT): $(wildcard $(PAGE)/src/* $(PAGE)/*.json $(PAGE)/build.mjs) | $(STAMP)
+$(BUILT): $(wildcard $(PAGE)/src/* $(PAGE)/*.json $(PAGE)/*.mjs) | $(STAMP)
 	$(RUN)/python src/scissorcal/prototype/build_page.py $@
 
 # The C core is built by the install itself; a changed source installs again.

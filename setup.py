@@ -22,7 +22,7 @@ DATA_FOLDERS = ("recipes", "data_schemas")
 KERNEL = ROOT / "src/scissorcal/kernel"
 PAGE = ROOT / "src/scissorcal/prototype/page"
 WEB_SOURCES = (KERNEL / "build_web.py", *KERNEL.glob("c/*"), KERNEL / "web/sc_web.c")
-PAGE_SOURCES = (PAGE / "package-lock.json", PAGE / "build.mjs", *PAGE.glob("src/*"))
+PAGE_SOURCES = (PAGE / "package-lock.json", *PAGE.glob("*.mjs"), *PAGE.glob("src/*"))
 BUILT = {
     KERNEL / "web/sc_web.wasm": (KERNEL / "build_web.py", WEB_SOURCES),
     PAGE.parent / "built/page.html": (PAGE.parent / "build_page.py", PAGE_SOURCES),

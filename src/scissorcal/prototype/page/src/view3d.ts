@@ -2,7 +2,7 @@
 
 import {
   BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
-  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
+  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshPhongMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
 import { coloursOf, heightOver, View as PlainView } from "./drawing";
@@ -38,9 +38,9 @@ export class View3d {
   private readonly resizes: ResizeObserver | null = null;
   private readonly note = document.createElement("p");
   private readonly materials = {
-    steel: new MeshStandardMaterial({ metalness: 0.15, roughness: 0.4 }),
-    handle: new MeshStandardMaterial({ roughness: 0.6 }),
-    ghost: new MeshStandardMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
+    steel: new MeshPhongMaterial({ specular: 0x666666, shininess: 45 }),
+    handle: new MeshPhongMaterial({ specular: 0x222222, shininess: 25 }),
+    ghost: new MeshPhongMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
     upperEdge: new LineBasicMaterial(), lowerEdge: new LineBasicMaterial(), crack: new LineBasicMaterial(),
     grid: new LineBasicMaterial({ transparent: true, opacity: 0.35 }),
     contact: new MeshLambertMaterial(),
