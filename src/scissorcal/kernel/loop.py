@@ -332,7 +332,7 @@ def _store_tables(block: Any, tables: ModelTables, pieces: Sequence[Piece] | Non
     block.model.flattest, block.model.steepest = model.flattest, model.steepest
     block.model.release_falls = lib.sc_model_release_falls(model)
     if pieces is not None:
-        fill_pieces(block.config.pieces, pieces, model)
+        fill_pieces(ffi.addressof(block.config, "pieces"), pieces, model)
 
 
 def _store_table(store: Any, table: Table) -> None:

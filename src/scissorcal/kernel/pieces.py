@@ -1,6 +1,6 @@
 """A plate made of pieces along the line of the cut: holes, layers, changes of toughness.
 
-A piece is a stretch of material without a gap, with a crack of its own; its response is ``scale``
+A piece is a stretch of material without a gap, with one crack; its response is ``scale``
 times the model's, its energies are per strip. What one feels is the sum over the pieces.
 """
 
@@ -235,9 +235,9 @@ def largest_overlap(
             sum(
                 amount
                 for piece, amount in zip(pieces, amounts, strict=True)
-                if piece.end_m >= start and piece.begin_m <= start + reach_m
+                if piece.begin_m <= far.begin_m <= piece.end_m + reach_m
             )
-            for start in (near.begin_m for near in pieces)
+            for far in pieces
         ),
         default=0.0,
     )

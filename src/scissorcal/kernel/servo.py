@@ -243,7 +243,7 @@ class Servo(ServoView):
         self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
         if pieces is not None:
             refuse_pieces(pieces, tables is not None, config.plate.is_estimated)
-            fill_pieces(self._config.pieces, pieces, self._model)
+            fill_pieces(ffi.addressof(self._config, "pieces"), pieces, self._model)
         self._orders = ffi.new("sc_orders *")
         self._reference = ffi.new("sc_reference *")
         if self.control is not None:

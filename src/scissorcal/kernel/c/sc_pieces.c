@@ -51,7 +51,7 @@ int sc_pieces_are_sound(const sc_pieces_config *config)
     for (int32_t i = 0; i < config->count; i++) {
         const sc_plate_piece *const piece = &config->piece[i];
         if (!sc_piece_is_sound(piece) || piece->first < 0 || piece->count < 1 ||
-            piece->first > SC_STRIPS_MAX || piece->count > SC_STRIPS_MAX - piece->first ||
+            piece->count > SC_STRIPS_MAX - piece->first ||
             !strips_are_sound(piece, &config->strip[piece->first])) {
             return 0;
         }
@@ -111,7 +111,7 @@ static void set_off(const hand *by, const sc_crack *crack, float end, run *made,
         (void)sc_run_out(sheet, by->turn, falls, kept, &stop);
         const float length = stop.point.x - start->point.x;
         if (length > SC_SHORTEST_RUN) {
-            const float runs = floorf((end - contact) / length);
+            const float runs = -ceilf((contact - end) / length); /* whole ones */
             const float lost = start->stored - stop.stored - kept * length;
             made->share = sheet->kappa;
             made->from = fminf(contact + runs * length, end);
@@ -265,7 +265,6 @@ static void pass_through(const sc_pieces_config *config, hand *by, sc_pieces *pi
         }
     }
     sc_crack nothing = pieces->of[pieces->shown].crack;
-    nothing.detached = 1;
     by->sheet.upper_face = config->piece[pieces->shown].upper_face;
     by->sheet.fracture_energy = 0.0f;
     sc_model_step(&by->sheet, &nothing, by->opening, by->rate, by->advance, &one);

@@ -1,6 +1,6 @@
 /* A plate made of pieces: stretches of material without a gap along the line of the cut.
  *
- * Each piece has a crack of its own, which begins at its near edge, and strips bonded to one another,
+ * Each piece has one crack, which begins at its near edge, and strips bonded to one another,
  * each up to its end with a fracture energy. A hole is a gap between two pieces, a layer a piece that
  * overlaps another. Torque, force and energies are the sums over the pieces; friction counts once.
  *
