@@ -25,6 +25,7 @@ const HALF_WIDTH_mm = 30; // of a plate that nobody drew
 const CLEAR_mm = 0.3;
 const MOST_BEND_mm = 14;
 const CRACK_POINTS = 64;
+const MOST_RATIO = 2; // pixels of a screen to one of the page
 // Lines on a face are in front of it.
 const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
 const HELP = "Drag or arrow keys turn the view, + and − zoom, Home sets it back.";
@@ -55,6 +56,7 @@ export class View3d {
   private solids: { of: unknown[]; solids: (Solid | Grid)[] } | null = null;
   private bent: unknown[] = [];
   private theme = "";
+  private sized = "";
   private view: View | null = null;
 
   constructor(private readonly container: HTMLElement) {
@@ -99,8 +101,7 @@ export class View3d {
     this.colour();
     this.shape(view);
     this.place(view);
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-    renderer.setSize(width, height, false);
+    this.size(width, height);
     const length = 1e3 * view.scene.blade_length_m;
     orbit.aim(new Vector3(0.28 * length, 0, 0), 0.74 * length, width / height);
     renderer.render(this.world, orbit.camera);
@@ -121,6 +122,16 @@ export class View3d {
     this.note.remove();
     this.container.classList.remove("view3d");
     this.view = null;
+  }
+
+  /** A canvas is cleared by each new size, also by the same. */
+  private size(width: number, height: number): void {
+    const ratio = Math.min(window.devicePixelRatio || 1, MOST_RATIO);
+    const size = [width, height, ratio].join();
+    if (size === this.sized) return;
+    this.sized = size;
+    this.renderer?.setPixelRatio(ratio);
+    this.renderer?.setSize(width, height, false);
   }
 
   private again(): void {
