@@ -23,6 +23,7 @@ export type View = PlainView & {
 
 const HALF_WIDTH_mm = 30; // of a plate that nobody drew
 const CLEAR_mm = 0.3;
+const THIN_mm = 1;
 const MOST_BEND_mm = 14;
 const CRACK_POINTS = 64;
 const MOST_RATIO = 2; // pixels of a screen to one of the page
@@ -55,6 +56,8 @@ export class View3d {
   private blades: { of: Table; blades: Blades } | null = null;
   private solids: { of: unknown[]; solids: (Solid | Grid)[] } | null = null;
   private bent: unknown[] = [];
+  /** Of the line along the crack; a thick plate shows the crack by its faces. */
+  private crackHeight: number | null = null;
   private theme = "";
   private sized = "";
   private view: View | null = null;
@@ -195,7 +198,9 @@ export class View3d {
     const cut = view.drawn?.cut_line_mm ?? 0;
     this.solids?.solids.forEach((solid) => solid.dispose());
     this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh || one instanceof LineSegments));
-    const base = scene.moving_blades === 2 ? 0.5 * Math.max(...slabs.map((slab) => slab.high), 0) : 0;
+    const height = Math.max(...slabs.map((slab) => slab.high), 0);
+    const base = scene.moving_blades === 2 ? 0.5 * height : -CLEAR_mm; // a blade that stands lies under it
+    this.crackHeight = height < THIN_mm ? height - base + 0.1 : null;
     const solids = slabs.flatMap((slab) => {
       const own = { ...slab, low: slab.low - base, high: slab.high - base };
       const [solid, grid] = [new Solid(own, cut), new Grid(own, cut)];
@@ -241,10 +246,10 @@ export class View3d {
       const places = line.geometry.getAttribute("position") as BufferAttribute;
       for (let k = 0; k < CRACK_POINTS; k++) {
         const x = (1e3 * crack * k) / (CRACK_POINTS - 1);
-        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, 0.15 + share * depth(x));
+        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, (this.crackHeight ?? 0) + share * depth(x));
       }
       places.needsUpdate = true;
-      line.visible = crack > 0;
+      line.visible = crack > 0 && this.crackHeight !== null;
     });
   }
 
