@@ -50,6 +50,11 @@ class Seen:
     errors: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
 
+    def note(self, kind: str, text: str) -> None:
+        # graphics without a graphics card are slow, which the browser says
+        if kind in ("error", "warning") and "GL Driver Message" not in text:
+            self.errors.append(text)
+
     @property
     def elsewhere(self) -> list[str]:
         inside = ("data:", "blob:", "file:", "http://127.0.0.1:", "ws://127.0.0.1:")
@@ -84,10 +89,7 @@ def watch(page: Page) -> Seen:
     """Keep what a page does from here on."""
     seen = Seen()
     page.on("pageerror", lambda error: seen.errors.append(str(error)))
-    page.on(
-        "console",
-        lambda line: seen.errors.append(line.text) if line.type in ("error", "warning") else None,
-    )
+    page.on("console", lambda line: seen.note(line.type, line.text))
     page.on("request", lambda request: seen.requests.append(request.url))
     return seen
 
