@@ -16,8 +16,12 @@ PAGE = Path(__file__).parents[1] / "src/scissorcal/prototype/page"
 BUNDLE = """
 const text = require("fs").readFileSync(0, "utf8");
 const stdin = { contents: text, resolveDir: ".", loader: "ts" };
-const made = require("esbuild").buildSync({ stdin, bundle: true, format: "iife", write: false });
-process.stdout.write(made.outputFiles[0].text);
+import("./lean_three.mjs").then(async ({ leanThree }) => {
+  const plugins = [leanThree];
+  const made = await require("esbuild").build(
+    { stdin, bundle: true, format: "iife", write: false, plugins });
+  process.stdout.write(made.outputFiles[0].text);
+});
 """
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
