@@ -42,13 +42,13 @@ def policy_of(*, served: bool) -> str:
     ``'wasm-unsafe-eval'`` lets the kernel's WebAssembly run, which the page holds itself. A served
     page may open sockets to where it came from, an offline page to nowhere.
     """
-    page = _template()
+    page, opens = _template(), "'self'" if served else "'none'"
     return "; ".join(
         (
             "default-src 'none'",
             f"script-src {_hash(_SCRIPT, page)} 'wasm-unsafe-eval'",
             f"style-src {_hash(_STYLE, page)}",
-            f"connect-src {"'self'" if served else "'none'"}",
+            f"connect-src {opens}",
             "img-src data:",
             "base-uri 'none'",
             "form-action 'none'",

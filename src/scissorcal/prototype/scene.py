@@ -38,7 +38,7 @@ NODES = 17
 WIDE = 2.0
 """A slider reaches from half to twice the fitted value, or as far as the posterior does."""
 POSTERIOR_SDS = 8.0
-MOST_DRAWS = 200
+MOST_DRAWS = 100
 
 OPENINGS, CONTACTS = 61, 13
 """Grid of the band over the scene's openings and contacts."""

@@ -16,8 +16,8 @@ from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.prototype.rig_commands import RigCommand
     from scissorcal.prototype.parts import Hand
+    from scissorcal.prototype.rig_commands import RigCommand
     from scissorcal.prototype.scene import Scene
     from scissorcal.prototype.server import PrototypeServer
     from scissorcal.recording import Recording

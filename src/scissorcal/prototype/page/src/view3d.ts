@@ -2,7 +2,7 @@
 
 import {
   BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
-  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
+  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshPhongMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
 import { coloursOf, heightOver, View as PlainView } from "./drawing";
@@ -23,8 +23,10 @@ export type View = PlainView & {
 
 const HALF_WIDTH_mm = 30; // of a plate that nobody drew
 const CLEAR_mm = 0.3;
+const THIN_mm = 1;
 const MOST_BEND_mm = 14;
 const CRACK_POINTS = 64;
+const MOST_RATIO = 2; // pixels of a screen to one of the page
 // Lines on a face are in front of it.
 const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
 const HELP = "Drag or arrow keys turn the view, + and − zoom, Home sets it back.";
@@ -38,9 +40,9 @@ export class View3d {
   private readonly resizes: ResizeObserver | null = null;
   private readonly note = document.createElement("p");
   private readonly materials = {
-    steel: new MeshStandardMaterial({ metalness: 0.15, roughness: 0.4 }),
-    handle: new MeshStandardMaterial({ roughness: 0.6 }),
-    ghost: new MeshStandardMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
+    steel: new MeshPhongMaterial({ specular: 0x666666, shininess: 45 }),
+    handle: new MeshPhongMaterial({ specular: 0x222222, shininess: 25 }),
+    ghost: new MeshPhongMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
     upperEdge: new LineBasicMaterial(), lowerEdge: new LineBasicMaterial(), crack: new LineBasicMaterial(),
     grid: new LineBasicMaterial({ transparent: true, opacity: 0.35 }),
     contact: new MeshLambertMaterial(),
@@ -54,7 +56,10 @@ export class View3d {
   private blades: { of: Table; blades: Blades } | null = null;
   private solids: { of: unknown[]; solids: (Solid | Grid)[] } | null = null;
   private bent: unknown[] = [];
+  /** Of the line along the crack; a thick plate shows the crack by its faces. */
+  private crackHeight: number | null = null;
   private theme = "";
+  private sized = "";
   private view: View | null = null;
 
   constructor(private readonly container: HTMLElement) {
@@ -99,8 +104,7 @@ export class View3d {
     this.colour();
     this.shape(view);
     this.place(view);
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-    renderer.setSize(width, height, false);
+    this.size(width, height);
     const length = 1e3 * view.scene.blade_length_m;
     orbit.aim(new Vector3(0.28 * length, 0, 0), 0.74 * length, width / height);
     renderer.render(this.world, orbit.camera);
@@ -121,6 +125,16 @@ export class View3d {
     this.note.remove();
     this.container.classList.remove("view3d");
     this.view = null;
+  }
+
+  /** A canvas is cleared by each new size, also by the same. */
+  private size(width: number, height: number): void {
+    const ratio = Math.min(window.devicePixelRatio || 1, MOST_RATIO);
+    const size = [width, height, ratio].join();
+    if (size === this.sized) return;
+    this.sized = size;
+    this.renderer?.setPixelRatio(ratio);
+    this.renderer?.setSize(width, height, false);
   }
 
   private again(): void {
@@ -184,7 +198,9 @@ export class View3d {
     const cut = view.drawn?.cut_line_mm ?? 0;
     this.solids?.solids.forEach((solid) => solid.dispose());
     this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh || one instanceof LineSegments));
-    const base = scene.moving_blades === 2 ? 0.5 * Math.max(...slabs.map((slab) => slab.high), 0) : 0;
+    const height = Math.max(...slabs.map((slab) => slab.high), 0);
+    const base = scene.moving_blades === 2 ? 0.5 * height : -CLEAR_mm; // a blade that stands lies under it
+    this.crackHeight = height < THIN_mm ? height - base + 0.1 : null;
     const solids = slabs.flatMap((slab) => {
       const own = { ...slab, low: slab.low - base, high: slab.high - base };
       const [solid, grid] = [new Solid(own, cut), new Grid(own, cut)];
@@ -230,10 +246,10 @@ export class View3d {
       const places = line.geometry.getAttribute("position") as BufferAttribute;
       for (let k = 0; k < CRACK_POINTS; k++) {
         const x = (1e3 * crack * k) / (CRACK_POINTS - 1);
-        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, 0.15 + share * depth(x));
+        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, (this.crackHeight ?? 0) + share * depth(x));
       }
       places.needsUpdate = true;
-      line.visible = crack > 0;
+      line.visible = crack > 0 && this.crackHeight !== null;
     });
   }
 
