@@ -59,8 +59,8 @@ class Scene(Part):
     TABLE_NAMES and MODEL_NUMBERS. ``mean_energy`` (3, knots) and ``levels`` are those of the
     average torque; without a ripple there are none. ``cut`` and ``friction`` are as fitted on the
     knots, from which sliders and draws differ. ``notes`` are sentences about the package that do
-    not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the text
-    that a drawn plate is written into.
+    not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the
+    text that a drawn plate is written into.
     """
 
     format: Literal["scissorcal-prototype/1"] = FORMAT

@@ -10,9 +10,11 @@ import numpy as np
 
 import scissorcal
 from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
