@@ -129,7 +129,7 @@ export class Rig {
   get crackMost(): number {
     const kernel = this.kernels[this.active];
     if (!this.pieces) return kernel.crack;
-    const cracks = kernel.cracks(this.pieces.length).filter((at, i) => at > this.pieces![i].begin_m);
+    const cracks = kernel.cracks(this.pieces.length).filter((at, i) => at > this.pieces![i].begin_m + 1e-6); // float32
     return Math.max(0, ...cracks);
   }
 
