@@ -1,0 +1,272 @@
+"""The page of a package, opened from disk: what it draws, and how a person works it."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+from scissorcal.package import build_package, open_package
+from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.variations import central_values, variations
+from scissorcal.prototype.document import page_of
+from scissorcal.prototype.scene import scene_of
+from tests.browser import Seen, open_browser, open_file
+from tests.package.fits import cut_fit, friction_fit, recipe
+from tests.prototype.test_scene import read
+
+MOST_BYTES = 1_000_000
+WAIT_S = 30.0
+UNNAMED = """() => [...document.querySelectorAll("input, button, select, textarea, canvas.plain")]
+  .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
+    || [...(one.labels || [])].some((label) => label.textContent.trim())))
+  .map((one) => one.outerHTML)"""
+LAW = """() => { const plain = (law) => ({ numbers: law.numbers, tables: Object.fromEntries(
+    Object.entries(law.tables).map(([name, t]) => [name, [[...t.y], [...t.slope]]])) });
+  return [plain(scissorcal.laws.fitted), plain(scissorcal.laws.whatIf)]; }"""
+
+
+@dataclass
+class Shown:
+    """A package and its page; ``seen`` is what the page must not have done."""
+
+    package: ModelPackage
+    scene: Any
+    page: Page
+    seen: Seen
+
+    def run(self, script: str, *given: Any) -> Any:
+        return self.page.evaluate(script, *given)
+
+    def until(self, script: str) -> None:
+        """Wait until an expression of the app `a` is true; the page's policy forbids eval in it."""
+        end = time.monotonic() + WAIT_S
+        while not self.run(f"() => {{ const a = scissorcal; return {script}; }}"):
+            assert time.monotonic() < end, f"waited in vain until {script}"
+            self.page.wait_for_timeout(30)
+
+    def stroke(self) -> None:
+        """One stroke by the key, to its end."""
+        self.page.locator("canvas.plain").focus()
+        self.page.keyboard.press("Space")
+        assert self.run("() => scissorcal.rig.plays")
+        self.until("!a.rig.plays")
+
+    def part(self, name: str, is_on: bool) -> None:
+        self.page.locator(f"[data-part={name}]").set_checked(is_on)
+
+    def torque(self, opening: Any, rate: float, contact: float) -> Any:
+        script = "([openings, rate, contact]) => scissorcal.torqueAt(openings, rate, contact)"
+        return np.array(self.run(script, [list(opening), rate, contact]))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with open_browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[ModelPackage, Any, Path]:
+    chosen, folder = recipe(), tmp_path_factory.mktemp("page")
+    cut = cut_fit(chosen, kappa=0.75)
+    path = folder / "paper.zip"
+    build_package(chosen, friction_fit(), cut, path, np.random.default_rng(3))
+    package = open_package(path, warn=False)
+    told = {"made_utc": "2026-11-24T00:00:00Z", "version": "1", "warnings": ("The rig is old.",)}
+    scene = scene_of(package, **told)
+    (folder / "paper.html").write_text(page_of(scene), encoding="utf-8")
+    return package, scene, folder / "paper.html"
+
+
+def opened(browser: Browser, built: Any, **context: Any) -> Iterator[Shown]:
+    package, scene, path = built
+    page, seen = open_file(browser, path, **context)
+    shown = Shown(package, scene, page, seen)
+    page.wait_for_selector("canvas.plain")
+    shown.until("a && a.frames.count > 2")
+    yield shown
+    page.context.close()
+    assert seen.errors == []
+
+
+@pytest.fixture
+def shown(browser: Browser, built: Any) -> Iterator[Shown]:
+    yield from opened(browser, built, viewport={"width": 1280, "height": 900})
+
+
+@pytest.fixture
+def phone(browser: Browser, built: Any) -> Iterator[Shown]:
+    context = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    yield from opened(browser, built, color_scheme="dark", **context)
+
+
+def test_the_file_alone_is_the_page(shown: Shown, built: Any) -> None:
+    path = built[2]
+    assert path.stat().st_size < MOST_BYTES
+    assert [url for url in shown.seen.requests if not url.startswith("data:")] == [path.as_uri()]
+    told = shown.page.locator("header .warning").all_inner_texts()
+    assert told == ["The rig is old.", *shown.package.warnings]
+    assert shown.page.locator("h1").inner_text() == shown.package.manifest.name
+
+
+def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
+    box = shown.page.locator("canvas.plain").bounding_box()
+    assert box is not None
+    before = shown.run("() => scissorcal.rig.crackMost")
+    mouse, x = shown.page.mouse, box["x"] + 0.5 * box["width"]
+    mouse.move(x, box["y"] + 30)
+    mouse.down()
+    mouse.move(x, box["y"] + box["height"] - 10, steps=12)
+    shown.until("a.rig.wanted.opening < 0.5 * a.scene.opening_rad[1]")
+    mouse.up()
+    shown.until("a.rig.isStill")
+    after = shown.run("() => scissorcal.rig.crackMost")
+    assert after > before + 0.005
+    shown.page.wait_for_timeout(300)
+    number = shown.page.locator("[data-number=crack] dd").inner_text()
+    assert float(number.split()[0]) == pytest.approx(1e3 * after, abs=0.06)
+    assert shown.run("() => scissorcal.rig.pose.opening") < shown.scene.opening_rad[1] - 0.1
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_torque_drawn_is_that_of_the_package(shown: Shown, sign: float) -> None:
+    openings = np.linspace(*shown.scene.opening_rad, 61).astype(np.float32).astype(float)
+    rate = sign * 0.5 * sum(shown.scene.opening_rate_rad_per_s)
+    for contact in np.linspace(*shown.scene.contact_m, 3):
+        own = shown.package.torque(openings, rate, contact)
+        found = shown.torque(openings, rate, contact)
+        assert np.ptp(own) > 1e-3
+        np.testing.assert_allclose(found, own, rtol=0, atol=1e-5 * np.abs(own).max() + 1e-7)
+
+
+def test_parts_of_the_law_can_be_left_out(shown: Shown) -> None:
+    openings = np.linspace(*shown.scene.opening_rad, 31)
+    near, far = shown.scene.contact_m
+    whole = shown.torque(openings, -0.3, near)
+    shown.part("friction", False)
+    material = shown.torque(openings, -0.3, near)
+    shown.part("response", False)
+    assert np.all(shown.torque(openings, -0.3, near) == 0.0)
+    shown.part("friction", True)
+    friction = shown.torque(openings, -0.3, near)
+    assert friction.min() > 0.0
+    assert np.all(shown.torque(openings, 0.3, near) < 0.0)
+    assert np.all(shown.torque(openings, -0.3, far) == friction)
+    np.testing.assert_allclose(material + friction, whole, atol=1e-6 * whole.max())
+
+
+def test_without_fracture_the_crack_stays(shown: Shown) -> None:
+    shown.part("fracture", False)
+    before = shown.run("() => scissorcal.rig.crackMost")
+    shown.stroke()
+    assert shown.run("() => scissorcal.rig.crackMost") == before
+    shown.part("fracture", True)
+    shown.stroke()
+    assert shown.run("() => scissorcal.rig.crackMost") > before + 0.005
+
+
+def test_energy_is_accounted_for_over_a_stroke(shown: Shown) -> None:
+    shown.stroke()
+    energy = shown.run("() => ({ ...scissorcal.rig.energy })")
+    spent = sum(energy[name] for name in ("stored", "fracture", "arrest", "friction"))
+    assert energy["hand"] > 1e-3
+    assert energy["fracture"] > 0.0
+    assert energy["friction"] > 0.0
+    assert abs(energy["hand"] - spent) < 0.02 * energy["hand"]
+
+
+@pytest.mark.parametrize("name", ["response_force", "fracture_energy", "coulomb"])
+def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) -> None:
+    slider = next(one for one in shown.scene.sliders if one.name == name)
+    nodes = read(slider.nodes).astype(float)
+    shown.stroke()
+    shown.page.locator(f"[data-slider={name}]").evaluate(
+        "(one, at) => { one.value = String(at * Number(one.max)); one.dispatchEvent(new Event('input')); }",
+        (nodes[12] - nodes[0]) / (nodes[-1] - nodes[0]),
+    )
+    cut, friction = central_values(shown.package)
+    assert friction is not None
+    both = np.tile(np.concatenate([cut, friction]), (2, 1))
+    both[1, slider.column] = nodes[12]
+    law = variations(shown.package, both[:, : len(cut)], both[:, len(cut) :])
+    fitted, what_if = shown.run(LAW)
+    for table in fitted["tables"]:
+        moved = np.array(what_if["tables"][table]) - np.array(fitted["tables"][table])
+        wanted = np.diff(law.rows[table], axis=0)[0] if table in law.rows else 0.0 * moved
+        largest = np.abs(what_if["tables"][table]).max(axis=1, keepdims=True)
+        assert np.all(np.abs(moved - wanted) <= 2e-6 * largest), table
+    assert np.isclose(law.fracture_energy[1], what_if["numbers"], rtol=1e-6).any()
+    changed = name == "fracture_energy" or not np.array_equal(
+        [*fitted["tables"].values()][0], None
+    )
+    assert changed
+
+
+def test_the_law_that_is_felt_changes_the_torque(shown: Shown) -> None:
+    assert shown.run("() => scissorcal.rig.active") == "fitted"
+    shown.page.locator("[data-slider=coulomb]").evaluate(
+        "(one) => { one.value = one.max; one.dispatchEvent(new Event('input')); }"
+    )
+    moving = "() => { const k = scissorcal.rig.kernels[scissorcal.rig.active];"
+    moving += " return k.step(scissorcal.rig.pose.opening, -0.3, scissorcal.rig.pose.advance).torque; }"
+    before = shown.run(moving)
+    shown.page.get_by_label("what if", exact=True).check()
+    assert shown.run("() => scissorcal.rig.active") == "whatIf"
+    assert shown.run(moving) > before + 1e-3
+
+
+def test_a_draw_sets_the_sliders(shown: Shown) -> None:
+    values = read(shown.scene.draws.values)
+    for draw in (0, 1):
+        shown.page.get_by_role("button", name="Next draw").click()
+        assert shown.run("() => scissorcal.controls.choices.draw") == draw
+        chosen = shown.run("() => Object.fromEntries(scissorcal.controls.choices.values)")
+        for slider in shown.scene.sliders:
+            nodes = read(slider.nodes)
+            own = values[draw, slider.column]
+            assert chosen[slider.name] == own
+            at = float(shown.page.locator(f"[data-slider={slider.name}]").input_value())
+            assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
+
+
+def test_keys_alone_work_the_page(shown: Shown) -> None:
+    reached: set[str] = set()
+    for _ in range(80):
+        shown.page.keyboard.press("Tab")
+        reached.add(
+            shown.run("() => document.activeElement.tagName + ' ' + document.activeElement.textContent")
+        )
+        if any(one.startswith("SUMMARY Draw") for one in reached):
+            break
+    wanted = {"CANVAS ", "BUTTON One stroke", "BUTTON Fresh sheet", "BUTTON Next draw"}
+    assert wanted <= reached
+    shown.page.locator("canvas.plain").focus()
+    before = shown.run("() => scissorcal.rig.pose")
+    shown.page.keyboard.press("ArrowDown")
+    shown.page.keyboard.press("Shift+ArrowRight")
+    shown.until(f"a.rig.pose.opening < {before['opening']} - 0.02")
+    shown.until(f"a.rig.pose.advance > {before['advance']} + 0.003")
+    assert shown.run(UNNAMED) == []
+
+
+def test_a_phone_shows_all_without_scrolling_sideways(phone: Shown) -> None:
+    width = phone.run("() => [document.documentElement.scrollWidth, window.innerWidth]")
+    assert width == [390, 390]
+    background = "() => getComputedStyle(document.body).backgroundColor"
+    dark = phone.run(background)
+    phone.page.emulate_media(color_scheme="light")
+    assert (dark, phone.run(background)) == ("rgb(20, 23, 26)", "rgb(255, 255, 255)")
+
+
+def test_the_solid_view_and_the_designer_open(shown: Shown) -> None:
+    shown.page.get_by_label("3-D").check()
+    shown.page.locator(".solid canvas").first.wait_for(state="visible")
+    assert shown.page.locator("canvas.plain").is_hidden()
+    shown.page.get_by_text("Draw plates and blades").click()
+    shown.page.locator(".design button").first.wait_for(state="visible")
+    assert shown.run(UNNAMED) == []
