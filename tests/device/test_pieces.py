@@ -1,5 +1,6 @@
 """A plate with a hole and a layer, rendered on the virtual rig: in lockstep and over a port."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,21 +83,21 @@ def test_a_plate_with_a_hole_on_the_virtual_rig(kappa: float) -> None:
 
 
 def test_a_hand_feels_pieces_over_a_port_as_in_lockstep() -> None:
-    tables = make_tables()
-    with (
-        SimProcess("office-paper", seed=1) as sim,
-        open_link(sim.port) as link,
-        open_motion(link, CONFIG, tables, pieces=PLATE) as motion,
-    ):
-        assert isinstance(motion, PortMotion)
-        samples = strokes(motion, 5.0, 1)
-        report = motion.report()
-    assert report.stop_reason == 0
+    """A busy computer may leave frames unanswered: what is answered is the pieces' torque."""
+    tables = make_tables(fracture_energy=0.1)  # a uniform sheet would be a sixth as tough
+    patient = replace(CONFIG, supervisor_ms=5000, fault_clearings=100)
+    with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
+        link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)  # a busy machine is not what is tested
+        with open_motion(link, patient, tables, pieces=PLATE) as motion:
+            assert isinstance(motion, PortMotion)
+            samples = strokes(motion, 5.0, 1)
+            ledger = motion.report().ledger
     steps, _ = replayed(tables, samples)
-    on = (samples["torque_command"] != 0.0) & (np.arange(len(samples)) > 200)
-    assert np.count_nonzero(on) > 100
-    off = np.abs(steps["torque"] - samples["torque_command"])[on]
-    assert np.quantile(off, 0.9) < 1e-5, "late frames aside"
+    answered = (samples["torque_command"] != 0.0) & (samples["latency_ns"] > 0)
+    assert np.count_nonzero(answered) > 100
+    off = np.abs(steps["torque"] - samples["torque_command"])[answered]
+    assert np.median(off) < 1e-6
+    assert ledger.fracture_J > 1e-3
 
 
 def test_pieces_and_a_tracked_plate_are_refused_before_anything_moves() -> None:

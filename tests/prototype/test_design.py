@@ -313,6 +313,22 @@ def test_recipes_in_which_nothing_can_be_replaced_are_refused(
     assert words in recipe_of(bed, drawn(layer(SHEET), layer(SHEET)), base)["refused"]
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (drawn(layer([[0, 0], [10, 0], [20, 0]])), "no area"),
+        (drawn(layer([[0.01 * i, (i % 2)] for i in range(1001)])), "1000 of one outline"),
+        (drawn(*[layer([[i, -1], [i + 1, 2 * j], [i, 9]]) for i in range(9) for j in range(75)]),
+         "holds 2000 corners"),
+        (drawn(layer(SHEET, holes=[SHEET] * 65)), "64 holes"),
+    ],
+)  # fmt: skip
+def test_what_a_recipe_does_not_hold_is_refused(
+    bed: Bed, given: dict[str, Any], words: str
+) -> None:
+    assert words in recipe_of(bed, given)["refused"]
+
+
 def test_an_edge_goes_through_drawn_points(bed: Bed) -> None:
     stations = np.array([0.0, 5.0, 8.0, 30.0, 55.0, 80.0])
     offsets = -6.0 + stations * np.tan(np.radians(1.5)) + 0.5e-3 * 0.8 * stations**2

@@ -87,13 +87,39 @@ def test_pieces_without_a_drawing_are_shown_as_long_as_they_are(bed: Bed) -> Non
     assert differ(one, strips) > 1500
 
 
+def test_a_piece_that_nothing_touched_is_not_cut(bed: Bed) -> None:
+    """Its crack is where it begins, which float32 may put beyond it."""
+    pieces = [
+        {
+            "begin_m": begin,
+            "upper_face_m": 5e-5,
+            "scale": 1.0,
+            "strips": [{"end_m": begin + 0.02, "fracture_energy_J_per_m": 0.4}],
+        }
+        for begin in (0.0, 0.0331, 0.0661)
+    ]
+    begun = [float(np.float32(one["begin_m"])) for one in pieces]
+    assert begun[1] > 0.0331
+    whole = picture(bed, pieces=pieces, crack=0.0)
+    assert differ(whole, picture(bed, pieces=pieces, cracks=begun, crack=0.07)) == 0
+    assert differ(whole, picture(bed, pieces=pieces, cracks=[0.02, *begun[1:]])) > 100
+
+
 def test_the_plate_stands_in_its_pose(bed: Bed) -> None:
+    """A pose is the rig's, whose y is up: a plate without a tilt is turned by -90 degrees there."""
+
+    def pose(height_m: float, turn_rad: float) -> Picture:
+        bed.run(
+            "([y, turn]) => { scene.plate_pose = { position_m: [0.03, y, 0.01],"
+            " rotation_vector_rad: [turn, 0, 0] }; }",
+            [height_m, turn_rad],
+        )
+        return picture(bed)
+
     flat = picture(bed)
-    bed.run(
-        "() => { scene.plate_pose = { position_m: [0, 0, -0.01],"
-        " rotation_vector_rad: [0.3, 0, 0] }; }"
-    )
-    assert differ(flat, picture(bed)) > 3000
+    assert differ(flat, pose(0.0, -0.5 * np.pi)) < 20
+    assert differ(flat, pose(0.0, -0.5 * np.pi + 0.3)) > 3000
+    assert differ(flat, pose(-0.01, -0.5 * np.pi)) > 1000
     bed.run("() => { delete scene.plate_pose; }")
     assert differ(flat, picture(bed)) == 0
 

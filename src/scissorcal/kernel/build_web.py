@@ -4,6 +4,7 @@ The compiler is Zig's clang, which installs as a package (ziglang) and brings th
 module is a reactor without imports: any host runs it.
 """
 
+import importlib.util
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,8 @@ FLAGS = (
 
 def build_web(target: Path) -> None:
     """Write the module to ``target``, whole or not at all; RuntimeError if it fails."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise RuntimeError("The package ziglang, which compiles WebAssembly, is not installed.")
     sources = [KERNEL / "web" / "sc_web.c", *(KERNEL / "c" / f"sc_{name}.c" for name in CORE)]
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=target.parent) as folder:
@@ -30,8 +33,12 @@ def build_web(target: Path) -> None:
         )
         if ran.returncode:
             raise RuntimeError(f"The C core does not compile to WebAssembly: {ran.stderr[-2000:]}")
+        made.chmod(0o644)
         made.replace(target)
 
 
 if __name__ == "__main__":
-    build_web(Path(sys.argv[1]))
+    try:
+        build_web(Path(sys.argv[1]))
+    except RuntimeError as error:
+        sys.exit(str(error))

@@ -30,11 +30,11 @@ SLOW_STROKE_rad_per_s = 0.5
 _TIMEOUT_s = 300.0
 
 _CORE = ("table", "table16", "turn", "edge", "fracture", "release", "model")
-_WARNINGS = ("-std=c99", "-Wall", "-Wextra")
-_HOST = ("cc", *_WARNINGS, "-D_POSIX_C_SOURCE=200809L", "-O3", "-fno-math-errno")
+_COMMON = ("-std=c99", "-Wall", "-Wextra", "-fno-math-errno", "-ffp-contract=off")
+_HOST = ("cc", *_COMMON, "-D_POSIX_C_SOURCE=200809L", "-O3")
 _CORTEX = (
     *("arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"),
-    *(*_WARNINGS, "-O2", "-fno-math-errno", "--specs=rdimon.specs", "-nostartfiles"),
+    *(*_COMMON, "-O2", "--specs=rdimon.specs", "-nostartfiles"),
 )
 # qemu gives each instruction 1024 ns of its time, which the program's clock counts
 _QEMU = (

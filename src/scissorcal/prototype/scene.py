@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from scissorcal.kernel.web_module import web_numbers
 from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
 from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
-from scissorcal.package.manifest import Parameter, PlateRecord
+from scissorcal.package.manifest import Manifest, Parameter, PlateRecord
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.arrays import Numbers, Part
@@ -31,14 +31,14 @@ from scissorcal.report.numbers import shown_unit
 
 Array = NDArray[np.float64]
 
-FORMAT = "scissorcal-prototype/1"
+FORMAT: Final = "scissorcal-prototype/1"
 
 NODES = 17
 """Places of a slider at which the law was evaluated; between them its tables change linearly."""
 WIDE = 2.0
 """A slider reaches from half to twice the fitted value, or as far as the posterior does."""
 POSTERIOR_SDS = 8.0
-MOST_DRAWS = 200
+MOST_DRAWS = 100
 
 OPENINGS, CONTACTS = 61, 13
 """Grid of the band over the scene's openings and contacts."""
@@ -58,9 +58,9 @@ class Scene(Part):
     ``tables`` (3, knots) and ``numbers`` are what the kernel evaluates, in the orders of
     TABLE_NAMES and MODEL_NUMBERS. ``mean_energy`` (3, knots) and ``levels`` are those of the
     average torque; without a ripple there are none. ``cut`` and ``friction`` are as fitted on the
-    knots, from which sliders and draws differ. ``notes`` are sentences about the package that do not
-    warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the text
-    that a drawn plate is written into.
+    knots, from which sliders and draws differ. ``notes`` are sentences about the package that do
+    not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the
+    text that a drawn plate is written into.
     """
 
     format: Literal["scissorcal-prototype/1"] = FORMAT
@@ -142,6 +142,7 @@ def scene_of(
         bands=tuple(_bands(package)),
         strokes=tuple(stroke for fit in fits if fit.what == "cut" for stroke in _strokes(fit)),
         hands=tuple(hands),
+        pieces=_pieces(manifest),
         recipe=recipe,
         plate_pose=_plate_pose(manifest.plate),
     )
@@ -280,6 +281,12 @@ def _cut_draws(package: ModelPackage) -> FitDraws:
     record = package.manifest.provenance.cut
     names = tuple(parameter.name for parameter in record.parameters)
     return FitDraws(record.structure.model_dump(), names, package.arrays["draws/cut.npy"])
+
+
+def _pieces(manifest: Manifest) -> tuple[PiecePart, ...] | None:
+    if manifest.pieces is None:
+        return None
+    return tuple(PiecePart.model_validate(piece.model_dump()) for piece in manifest.pieces)
 
 
 def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 PART = "summary"
 LEAST_SHARE = 0.5
-"""Of a stroke's travel; in a smaller range no length of cut is told apart."""
+"""Of a stroke's travel; below it no work per length is stated."""
 LOOKS: dict[str, Look] = {"closing": "closing", "opening": "opening"}
 
 

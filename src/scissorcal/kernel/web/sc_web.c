@@ -176,6 +176,7 @@ void EXPORT(sc_web_reset)(float at)
     crack.crack = at;
 }
 
+/* With pieces, that of the piece which the last step showed. */
 float EXPORT(sc_web_crack)(void)
 {
     return crack.crack;
@@ -229,8 +230,8 @@ void EXPORT(sc_web_steps)(int32_t count)
     }
 }
 
-/* Settled torques at the places: each into `torque` of its result; not a number where a step would be
- * INVALID. */
+/* Settled torques of the uniform sheet at the places: each into `torque` of its result; not a number
+ * where a step would be INVALID. */
 void EXPORT(sc_web_settled)(int32_t count)
 {
     for (int32_t i = 0; i < count && i < BATCH; i++) {

@@ -10,9 +10,11 @@ import numpy as np
 
 import scissorcal
 from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -58,12 +60,16 @@ def workspace_scene(
         raise MissingError(f"There is no package to show yet: run '{command}' first.")
     engine = Engine.of(workspace)
     fits = [load_result(engine, what) for what in available(engine, ("cut", "friction"))]
+    package = open_package(path, warn=False)
+    said = package_warnings(workspace, package_path)
     return scene_of(
-        open_package(path, warn=False),
+        package,
         made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
         version=scissorcal.__version__,
         fits=fits,
         hands=workspace_hands(workspace),
+        warnings=[sentence for sentence in said if sentence not in package.warnings],
+        recipe=None if package_path else read_text(workspace.recipe_path),
     )
 
 

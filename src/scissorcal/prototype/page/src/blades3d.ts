@@ -2,7 +2,7 @@
 
 import {
   BufferGeometry, CylinderGeometry, ExtrudeGeometry, Float32BufferAttribute, Group, Line, LineBasicMaterial, Mesh,
-  MeshStandardMaterial, Shape, TorusGeometry, Vector2,
+  MeshPhongMaterial, Shape, TorusGeometry, Vector2,
 } from "three";
 import { heldValue } from "./law";
 import { Table } from "./kernel";
@@ -12,9 +12,9 @@ const BLADE_mm = 2.2;
 const BEVEL_mm = 0.35;
 
 export interface BladeMaterials {
-  steel: MeshStandardMaterial;
-  handle: MeshStandardMaterial;
-  ghost: MeshStandardMaterial;
+  steel: MeshPhongMaterial;
+  handle: MeshPhongMaterial;
+  ghost: MeshPhongMaterial;
   upperEdge: LineBasicMaterial;
   lowerEdge: LineBasicMaterial;
 }
@@ -71,7 +71,7 @@ export class Blades {
   }
 
   /** Behind the pivot, on the other side of the centreline. */
-  private handle(side: 1 | -1, material: MeshStandardMaterial): Group {
+  private handle(side: 1 | -1, material: MeshPhongMaterial): Group {
     const reach = 0.5 * this.length;
     const [radius, width] = [0.15 * this.length, 0.034 * this.length];
     const drop = 0.1 * this.length;
@@ -90,7 +90,7 @@ export class Blades {
   }
 
   /** A profile in the blade's plane, thick away from the other blade. */
-  private extruded(profile: Vector2[], side: 1 | -1, material: MeshStandardMaterial): Group {
+  private extruded(profile: Vector2[], side: 1 | -1, material: MeshPhongMaterial): Group {
     const shape = new Shape(profile.map(({ x, y }) => new Vector2(x, side * y)));
     const geometry = new ExtrudeGeometry(shape, {
       depth: BLADE_mm - 2 * BEVEL_mm, bevelEnabled: true, bevelSegments: 2, bevelSize: BEVEL_mm, bevelThickness: BEVEL_mm,

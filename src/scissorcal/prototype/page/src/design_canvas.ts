@@ -3,13 +3,14 @@
 import { Design, Kind, nameOf, outlineAt, Part, withAdded } from "./design_state";
 import { svg } from "./elements";
 import { HELP, keysOf } from "./design_keys";
-import { boundsOf, circle, middle, moved, Outline, Point, rectangle } from "./outline";
+import { areaOf, boundsOf, circle, middle, moved, Outline, Point, rectangle } from "./outline";
 import { Calibrated, Layer, materialOf } from "./pieces";
 
 export type Tool = "move" | "polygon" | "rectangle" | "circle";
 
 const MARGIN_px = 34;
 const NEAR_px = 14;
+const SMALLEST_mm2 = 1e-4;
 const MOST_HANDLES = 160;
 const SHAPE_mm = 10; // of a shape that Enter adds
 const GRIDS_mm = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
@@ -111,6 +112,7 @@ export class DesignCanvas {
   }
 
   private add(outline: Outline): void {
+    if (this.draws !== "edge" && Math.abs(areaOf(outline)) < SMALLEST_mm2) return this.say("This outline encloses no area.");
     const { drawn, part } = this.design;
     const added = withAdded(drawn, this.draws, part.layer, outline, 1e3 * this.calibrated.thickness_m);
     this.begun = [];

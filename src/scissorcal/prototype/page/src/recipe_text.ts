@@ -3,7 +3,7 @@
 import { parse, TomlTableWithoutBigInt } from "smol-toml";
 import { AT } from "./kernel";
 import { edgeOfTable } from "./blade_edge";
-import { Outline, Point } from "./outline";
+import { areaOf, Outline, Point } from "./outline";
 import { Calibrated, Drawn, Edge, Layer, layerName, Region } from "./pieces";
 import { Scene, unpack } from "./scene";
 
@@ -13,6 +13,7 @@ const POINTS_OF_A_LINE = 8;
 const MOST_CORNERS = 2000;
 const MOST_OF_OUTLINE = 1000;
 const MOST_PARTS = 64;
+const SMALLEST_AREA_mm2 = 1e-4;
 
 type Toml = TomlTableWithoutBigInt;
 
@@ -32,7 +33,7 @@ export function calibratedOf(scene: Scene): Calibrated {
  * page knows of the scene. Raises Error where the base is a recipe in which nothing can be replaced.
  */
 export function recipeText(drawn: Drawn, scene: Scene, base: string | null): string {
-  refuseTooMany(drawn);
+  refuseUnfit(drawn);
   let text = base ?? recipeOf(scene, drawn.edge);
   if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge));
   text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
@@ -64,13 +65,16 @@ export function drawnFromRecipe(text: string): Drawn {
   };
 }
 
-function refuseTooMany({ layers }: Drawn): void {
+function refuseUnfit({ layers }: Drawn): void {
   const outlines = layers.flatMap((layer) => [layer.outline, ...layer.holes, ...layer.regions.map((region) => region.outline)]);
   const count = outlines.reduce((sum, outline) => sum + outline.length, 0);
   if (count > MOST_CORNERS || outlines.some((outline) => outline.length > MOST_OF_OUTLINE)) {
     throw new Error(
       `A recipe holds ${MOST_CORNERS} corners, ${MOST_OF_OUTLINE} of one outline, and this drawing has ${count}: save drawing.svg and name its `
       + 'shapes in the recipe, with outline = "drawing.svg" and id = "layer-1".');
+  }
+  if (outlines.some((outline) => Math.abs(areaOf(outline)) < SMALLEST_AREA_mm2)) {
+    throw new Error("An outline of this drawing encloses no area, which no recipe takes: remove it or give it one.");
   }
   if (layers.some((layer) => layer.holes.length > MOST_PARTS || layer.regions.length > MOST_PARTS)) {
     throw new Error(`A layer of a recipe has up to ${MOST_PARTS} holes and ${MOST_PARTS} parts: draw fewer.`);

@@ -1,8 +1,9 @@
 // The rig on the page: two laws (as fitted, what if) stepped by one hand at the loop's rate.
 
-import { Kernel, Step } from "./kernel";
+import { AT, Kernel, Step } from "./kernel";
 import { Coupling, Pose, Script } from "./hand";
 import { Law } from "./law";
+import { Piece } from "./pieces";
 import { Scene } from "./scene";
 
 export type Which = "fitted" | "whatIf";
@@ -21,6 +22,7 @@ export interface Sample {
   opening: number;
   torque: number;
   force: number;
+  friction: number;
 }
 
 const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
@@ -41,13 +43,14 @@ export class Rig {
   step: Step;
   beside: Step | null = null;
   energy: Energy = none();
-  /** Samples of the last seconds, and of the present stroke. */
+  /** Samples of the last seconds, and of the last closing stroke. */
   recent: Sample[] = [];
   stroke: Sample[] = [];
   strokeContact: number;
   sound: Record<Which, boolean> = { fitted: false, whatIf: false };
   /** Energy that cracks released since it was read last, for sound and rumble. */
   released = 0;
+  pieces: readonly Piece[] | null = null;
   private script: Script | null = null;
   private scriptBegan = 0;
   private tick = 0;
@@ -69,7 +72,7 @@ export class Rig {
   load(which: Which, law: Law, largestTorque: number): boolean {
     const kernel = this.kernels[which];
     const crack = kernel.crack;
-    const isSound = kernel.load(law.tables, law.numbers);
+    const isSound = kernel.load(law.tables, law.numbers) && kernel.cut(this.scaled(law));
     kernel.reset(crack);
     this.sound[which] = isSound;
     if (which === this.active && isSound) {
@@ -77,6 +80,21 @@ export class Rig {
       this.rest();
     }
     return isSound;
+  }
+
+  /** Cut a plate of pieces, null: the uniform sheet. The laws have to be loaded again. */
+  cut(pieces: readonly Piece[] | null): void {
+    this.pieces = pieces;
+  }
+
+  /** The pieces under a law whose fracture energy is not the fitted one: in the same ratio to it. */
+  private scaled(law: Law): Piece[] | null {
+    const fitted = this.scene.numbers[AT.fractureEnergy];
+    const share = fitted > 0 ? law.numbers[AT.fractureEnergy] / fitted : 1;
+    return this.pieces && this.pieces.map((piece) => ({
+      ...piece,
+      strips: piece.strips.map((strip) => ({ ...strip, fracture_energy_J_per_m: share * strip.fracture_energy_J_per_m })),
+    }));
   }
 
   freshSheet(): void {
@@ -105,6 +123,14 @@ export class Rig {
 
   get isClosing(): boolean {
     return this.closing;
+  }
+
+  /** Farthest place to which the active law has cut, m. */
+  get crackMost(): number {
+    const kernel = this.kernels[this.active];
+    if (!this.pieces) return kernel.crack;
+    const cracks = kernel.cracks(this.pieces.length).filter((at, i) => at > this.pieces![i].begin_m + 1e-6); // float32
+    return Math.max(0, ...cracks);
   }
 
   get plays(): boolean {
@@ -165,6 +191,7 @@ export class Rig {
   private keep(): void {
     const sample = {
       time: this.time, opening: this.pose.opening, torque: this.step.torque, force: this.step.force,
+      friction: this.step.friction_torque,
     };
     const way = this.closing ? 1 : -1;
     if (way * (this.pose.opening - this.turnedAt) < 0) this.turnedAt = this.pose.opening;
@@ -173,7 +200,7 @@ export class Rig {
       this.turnedAt = this.pose.opening;
       if (this.closing) this.beginStroke();
     }
-    if (this.stroke.length < MOST_SAMPLES) this.stroke.push(sample);
+    if (this.closing && this.stroke.length < MOST_SAMPLES) this.stroke.push(sample);
     this.recent.push(sample);
     while (this.recent[0].time < this.time - KEPT_s) this.recent.shift();
   }

@@ -1,4 +1,4 @@
-// What the 3-D view shows of pieces: the drawn layers, or each piece as a strip of its own length.
+// What the 3-D view shows of pieces: the drawn layers, or each piece as a strip as long as it is.
 
 import { Outline, rectangle } from "./outline";
 import { Drawn, Layer, materialOf, Piece, SMALLEST_mm } from "./pieces";

@@ -1,15 +1,15 @@
 // The 3-D look: blades, sheet or drawn plates with their crack, the plate in its pose.
 
 import {
-  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Line,
-  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
+  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group, HemisphereLight,
+  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshPhongMaterial, Quaternion, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
 import { coloursOf, heightOver, View as PlainView } from "./drawing";
 import { Table } from "./kernel";
 import { Orbit } from "./orbit";
-import { rectangle } from "./outline";
-import { Drawn, Piece } from "./pieces";
+import { Interval, rectangle } from "./outline";
+import { Drawn, materialOf, Piece } from "./pieces";
 import { Depth, Grid, Solid } from "./solids";
 import { slabsOf, Tinted } from "./slabs";
 
@@ -23,8 +23,14 @@ export type View = PlainView & {
 
 const HALF_WIDTH_mm = 30; // of a plate that nobody drew
 const CLEAR_mm = 0.3;
+const THIN_mm = 1;
 const MOST_BEND_mm = 14;
-const CRACK_POINTS = 64;
+const CRACK_POINTS = 600;
+const CRACK_STEP_mm = 1.5;
+const FLOAT_m = 1e-6; // places of the kernel are float32
+/** From the rig's frame (x along the cut, y up) to that of the view (y to the left of the cut, z up). */
+const UPRIGHT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.5 * Math.PI);
+const MOST_RATIO = 2; // pixels of a screen to one of the page
 // Lines on a face are in front of it.
 const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
 const HELP = "Drag or arrow keys turn the view, + and − zoom, Home sets it back.";
@@ -38,9 +44,9 @@ export class View3d {
   private readonly resizes: ResizeObserver | null = null;
   private readonly note = document.createElement("p");
   private readonly materials = {
-    steel: new MeshStandardMaterial({ metalness: 0.15, roughness: 0.4 }),
-    handle: new MeshStandardMaterial({ roughness: 0.6 }),
-    ghost: new MeshStandardMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
+    steel: new MeshPhongMaterial({ specular: 0x666666, shininess: 45 }),
+    handle: new MeshPhongMaterial({ specular: 0x222222, shininess: 25 }),
+    ghost: new MeshPhongMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
     upperEdge: new LineBasicMaterial(), lowerEdge: new LineBasicMaterial(), crack: new LineBasicMaterial(),
     grid: new LineBasicMaterial({ transparent: true, opacity: 0.35 }),
     contact: new MeshLambertMaterial(),
@@ -50,11 +56,14 @@ export class View3d {
     weaker: new MeshLambertMaterial(PLATE),
   };
   private readonly contact = new Mesh(new SphereGeometry(0.9, 16, 12), this.materials.contact);
-  private readonly cracks: Line[] = [];
+  private readonly cracks: LineSegments[] = [];
   private blades: { of: Table; blades: Blades } | null = null;
   private solids: { of: unknown[]; solids: (Solid | Grid)[] } | null = null;
   private bent: unknown[] = [];
+  /** Of the line along the crack; a thick plate shows the crack by its faces. */
+  private crackHeight: number | null = null;
   private theme = "";
+  private sized = "";
   private view: View | null = null;
 
   constructor(private readonly container: HTMLElement) {
@@ -84,7 +93,7 @@ export class View3d {
     for (const _ of [1, -1]) {
       const geometry = new BufferGeometry();
       geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * CRACK_POINTS), 3));
-      const line = new Line(geometry, this.materials.crack);
+      const line = new LineSegments(geometry, this.materials.crack);
       line.frustumCulled = false;
       this.cracks.push(line);
       this.plate.add(line);
@@ -99,8 +108,7 @@ export class View3d {
     this.colour();
     this.shape(view);
     this.place(view);
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-    renderer.setSize(width, height, false);
+    this.size(width, height);
     const length = 1e3 * view.scene.blade_length_m;
     orbit.aim(new Vector3(0.28 * length, 0, 0), 0.74 * length, width / height);
     renderer.render(this.world, orbit.camera);
@@ -121,6 +129,16 @@ export class View3d {
     this.note.remove();
     this.container.classList.remove("view3d");
     this.view = null;
+  }
+
+  /** A canvas is cleared by each new size, also by the same. */
+  private size(width: number, height: number): void {
+    const ratio = Math.min(window.devicePixelRatio || 1, MOST_RATIO);
+    const size = [width, height, ratio].join();
+    if (size === this.sized) return;
+    this.sized = size;
+    this.renderer?.setPixelRatio(ratio);
+    this.renderer?.setSize(width, height, false);
   }
 
   private again(): void {
@@ -183,8 +201,10 @@ export class View3d {
     const slabs: Tinted[] = slabsOf(view, HALF_WIDTH_mm) ?? [plain];
     const cut = view.drawn?.cut_line_mm ?? 0;
     this.solids?.solids.forEach((solid) => solid.dispose());
-    this.plate.remove(...this.plate.children.filter((one) => one instanceof Mesh || one instanceof LineSegments));
-    const base = scene.moving_blades === 2 ? 0.5 * Math.max(...slabs.map((slab) => slab.high), 0) : 0;
+    this.plate.remove(...this.plate.children.filter((one) => (one instanceof Mesh || one instanceof LineSegments) && !this.cracks.includes(one as LineSegments)));
+    const height = Math.max(...slabs.map((slab) => slab.high), 0);
+    const base = scene.moving_blades === 2 ? 0.5 * height : -CLEAR_mm; // a blade that stands lies under it
+    this.crackHeight = height < THIN_mm ? height - base + 0.1 : null;
     const solids = slabs.flatMap((slab) => {
       const own = { ...slab, low: slab.low - base, high: slab.high - base };
       const [solid, grid] = [new Solid(own, cut), new Grid(own, cut)];
@@ -197,13 +217,15 @@ export class View3d {
   private place(view: View): void {
     const { scene, pose, wanted } = view;
     this.blades?.blades.turn(pose.opening, wanted.opening);
-    const at = scene.plate_pose;
     const cut = view.drawn?.cut_line_mm ?? 0;
-    const [x, y, z] = at ? at.position_m.map((one) => 1e3 * one) : [0, 0, 0];
-    this.plate.position.set(x - 1e3 * pose.advance, y - cut, z);
+    const at = scene.plate_pose;
     const turn = at ? new Vector3(...at.rotation_vector_rad) : new Vector3();
-    this.plate.setRotationFromAxisAngle(turn.clone().normalize(), turn.length());
-    const crack = Math.max(view.crack, ...startedCracks(view));
+    this.plate.quaternion.setFromAxisAngle(turn.clone().normalize(), turn.length());
+    if (at) this.plate.quaternion.premultiply(UPRIGHT);
+    // Turned and raised as the pose says. Along and across, the model cuts it at its line of the cut.
+    const origin = new Vector3(0, -cut, 0).applyQuaternion(this.plate.quaternion);
+    this.plate.position.set(-1e3 * pose.advance, 0, at ? 1e3 * at.position_m[1] : 0).add(origin);
+    const crack = crackOf(view);
     this.bend(view, crack);
     const contact = crack - pose.advance;
     this.contact.visible = view.step.response > 0 && contact > 0;
@@ -225,28 +247,43 @@ export class View3d {
     };
     const isBoth = scene.moving_blades === 2;
     this.solids?.solids.forEach((solid) => solid.bend(depth, isBoth));
+    const material = materialUnder(view);
     this.cracks.forEach((line, i) => {
       const share = i === 0 ? -1 : isBoth ? 1 : 0;
       const places = line.geometry.getAttribute("position") as BufferAttribute;
-      for (let k = 0; k < CRACK_POINTS; k++) {
-        const x = (1e3 * crack * k) / (CRACK_POINTS - 1);
-        places.setXYZ(k, x, view.drawn?.cut_line_mm ?? 0, 0.15 + share * depth(x));
+      let count = 0;
+      for (const [from, to] of material) {
+        const end = Math.min(to, 1e3 * crack);
+        const steps = Math.ceil((end - from) / CRACK_STEP_mm);
+        for (let k = 0; k < steps && count + 2 <= places.count; k++) {
+          for (const x of [from + (k * (end - from)) / steps, from + ((k + 1) * (end - from)) / steps]) {
+            places.setXYZ(count++, x, view.drawn?.cut_line_mm ?? 0, (this.crackHeight ?? 0) + share * depth(x));
+          }
+        }
       }
       places.needsUpdate = true;
-      line.visible = crack > 0;
+      line.geometry.setDrawRange(0, count);
+      line.visible = this.crackHeight !== null;
     });
   }
 
   private tell(view: View): void {
     const degrees = Math.round((180 / Math.PI) * view.pose.opening);
-    const text = `3-D view of the scissors: opening ${degrees} degrees, ${Math.round(1e3 * view.crack)} mm cut. ${HELP}`;
+    const text = `3-D view of the scissors: opening ${degrees} degrees, ${Math.round(1e3 * crackOf(view))} mm cut. ${HELP}`;
     const canvas = this.renderer?.domElement;
     if (canvas && canvas.getAttribute("aria-label") !== text) canvas.setAttribute("aria-label", text);
   }
 }
 
-function startedCracks(view: View): number[] {
-  const { pieces, cracks } = view;
-  if (!pieces || !cracks) return [];
-  return cracks.filter((crack, i) => pieces[i] && crack > pieces[i].begin_m);
+/** The farthest place (m) to which something is cut; a piece that nothing touched has its crack at its begin. */
+function crackOf({ crack, pieces, cracks }: View): number {
+  if (!pieces || !cracks) return crack;
+  return cracks.reduce((most, one, i) => (pieces[i] && one > pieces[i].begin_m + FLOAT_m ? Math.max(most, one) : most), 0);
+}
+
+/** Where there is material along the cut, in mm. */
+function materialUnder({ drawn, pieces }: View): Interval[] {
+  if (drawn) return drawn.layers.flatMap((layer) => materialOf(layer, drawn.cut_line_mm));
+  if (pieces) return pieces.map((piece): Interval => [1e3 * piece.begin_m, 1e3 * piece.strips[piece.strips.length - 1].end_m]);
+  return [[0, Infinity]];
 }
