@@ -1,6 +1,6 @@
 """Felt lag of rendering and capture against a bare C loop, on a device that paces itself.
 
-    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy track]
+    python -m benchmarks.latency [--rates 1000 2000 4000] [--loads idle busy track page]
         [--seconds 10] [--rounds 3] [--no-rights]
 
 A device in C on a pseudo-terminal (benchmarks/latency_c/device.c) counts the lag in ticks by
@@ -9,7 +9,8 @@ on. Against it run, one after the other in each round: the shortest loop in C th
 (benchmarks/latency_c/echo.c), a rendering and a capture that are recorded, each idle and with a
 busy Python thread beside it: a thread of the same process for rendering and capture, a process
 for the bare loop. With ``track`` the thread follows a plate instead, by 100 contacts and 33 late
-pictures a second, and the bare loop is idle. Ratios are medians over the rounds of the figure over
+pictures a second, and with ``page`` a page follows the recording, served by another process, to
+a third; the bare loop is idle then. Ratios are medians over the rounds of the figure over
 the bare loop's of the same round. ``--no-rights`` takes real-time priority and locked memory from
 the loops (not from the device, which in a lab has a processor of its own).
 """
@@ -22,7 +23,8 @@ import sys
 import tempfile
 import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -121,16 +123,31 @@ def run_host(subject: str, port: str, seconds: float, load: str) -> None:
     from scissorcal.device.link import open_link
     from scissorcal.kernel import ConfigKey
 
-    if load != "idle":
+    if load in ("busy", "track"):
         threading.Thread(target={"busy": spin, "track": track}[load], daemon=True).start()
+    shown: dict[str, Any] = {}
     with open_link(port) as link, tempfile.TemporaryDirectory() as folder:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
         path = Path(folder) / "recording.mcap"
-        report = (render_on if subject == "render" else capture_on)(link, path, seconds)
+        with page_of(folder, shown) if load == "page" else nullcontext():
+            report = (render_on if subject == "render" else capture_on)(link, path, seconds)
     lag = report.lag
     ticks = [lag.ticks.p50, lag.ticks.p99, lag.ticks.p999, lag.ticks.worst]
     facts = {"lag": ticks, "held_share": lag.held_share, "transport_ms": lag.transport_ms}
-    print(json.dumps({**facts, "realtime": report.rights.realtime}))
+    print(json.dumps({**facts, "realtime": report.rights.realtime, "page": shown}))
+
+
+@contextmanager
+def page_of(folder: str, shown: dict[str, Any]) -> Iterator[None]:
+    """Serve a page of what is recorded into a folder; ``shown`` gets what the page got."""
+    words = [sys.executable, "-W", "ignore", "-m", "benchmarks.latency_page", folder]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline() == "ready\n"
+        yield
+        time.sleep(0.5)  # until the page has the last samples
+        shown.update(json.loads(server.communicate()[0]))
 
 
 def spin() -> None:
@@ -190,6 +207,9 @@ def print_ratios(found: list[dict[str, Any]], rate: int, load: str) -> None:
             ratio = [np.array(each[kind]) / base[each["round"]][kind] for each in mine]
             values = "".join(f"{value:10.2f}" for value in np.median(ratio, axis=0))
             print(f"{subject:8} {'x echo':12} {values}")
+    pages = [each["host"]["page"] for each in rows if each["host"].get("page")]
+    for page in pages:
+        print("page     " + ", ".join(f"{name} {value}" for name, value in page.items()))
     for subject in SUBJECTS:
         mine = [each for each in rows if each["subject"] == subject]
         shares = [100 * each["held"] / max(each["ticks"], 1) for each in mine]

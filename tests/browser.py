@@ -16,8 +16,12 @@ PAGE = Path(__file__).parents[1] / "src/scissorcal/prototype/page"
 BUNDLE = """
 const text = require("fs").readFileSync(0, "utf8");
 const stdin = { contents: text, resolveDir: ".", loader: "ts" };
-const made = require("esbuild").buildSync({ stdin, bundle: true, format: "iife", write: false });
-process.stdout.write(made.outputFiles[0].text);
+import("./lean_three.mjs").then(async ({ leanThree }) => {
+  const plugins = [leanThree];
+  const made = await require("esbuild").build(
+    { stdin, bundle: true, format: "iife", write: false, plugins });
+  process.stdout.write(made.outputFiles[0].text);
+});
 """
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
@@ -45,6 +49,11 @@ class Seen:
 
     errors: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
+
+    def note(self, kind: str, text: str) -> None:
+        # graphics without a graphics card are slow, which the browser says
+        if kind in ("error", "warning") and "GL Driver Message" not in text:
+            self.errors.append(text)
 
     @property
     def elsewhere(self) -> list[str]:
@@ -80,10 +89,7 @@ def watch(page: Page) -> Seen:
     """Keep what a page does from here on."""
     seen = Seen()
     page.on("pageerror", lambda error: seen.errors.append(str(error)))
-    page.on(
-        "console",
-        lambda line: seen.errors.append(line.text) if line.type in ("error", "warning") else None,
-    )
+    page.on("console", lambda line: seen.note(line.type, line.text))
     page.on("request", lambda request: seen.requests.append(request.url))
     return seen
 

@@ -1,10 +1,13 @@
 """The WebAssembly of the core computes what the native core computes, bit for bit."""
 
+import math
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.kernel import Kernel, PlacedModel, Section
+from scissorcal.kernel import Kernel, Piece, PiecesModel, PlacedModel, Section, Strip
+from tests.kernel.golden_pieces import HOLE, LAYER, STRIPS
 from tests.kernel.web import PLACE_DTYPE, WebModel
 from tests.kernel.zoo import arc_edge, line_edge, make_tables
 
@@ -79,3 +82,58 @@ def test_steps_on_a_plate_are_the_native_ones() -> None:
     assert sum(step.torque != 0.0 for step in wanted) > 500
     torque = np.array([step.torque for step in wanted], dtype=np.float32)
     np.testing.assert_allclose(found["torque"], torque, rtol=2e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("pieces", [HOLE, LAYER, STRIPS], ids=["hole", "layer", "strips"])
+@pytest.mark.parametrize("name", MODELS)
+def test_steps_of_pieces_are_the_native_ones_bit_for_bit(
+    name: str, pieces: tuple[Piece, ...]
+) -> None:
+    web, native = WebModel(MODELS[name]), PiecesModel(MODELS[name], pieces)
+    assert all(web.add(*pieces))
+    assert [web.piece_crack(i) for i in range(len(pieces))] == list(native.cracks)
+    felt = 0
+    for sheet in range(4):
+        places = random_places(STEPS, seed=sheet)
+        web.reset()
+        native.reset()
+        wanted = native.step_many(places["opening"], places["rate"], places["advance"])
+        felt += np.count_nonzero(wanted["stored_J"])
+        assert web.step_many(places).tobytes() == wanted.tobytes()
+        assert [web.piece_crack(i) for i in range(len(pieces))] == list(native.cracks)
+    assert felt > 200
+
+
+def test_pieces_that_are_not_sound_change_nothing() -> None:
+    web = WebModel(make_tables())
+    whole = Piece(0.0, 5e-5, 1.0, (Strip(0.02, 0.6), Strip(0.04, 0.3)))
+    assert not web.strip(0.02, 0.6), "a strip of no piece"
+    assert web.begin(0.0, 5e-5, 1.0)
+    assert not web.begin(0.0, 5e-5, 1.0), "the piece before has no strip"
+    assert not web.strip(-0.01, 0.6), "behind the near edge"
+    assert web.strip(0.02, 0.6)
+    assert not web.strip(0.02, 0.3), "no longer than the strip before"
+    assert not web.strip(0.03, -0.3), "an energy below 0"
+    assert web.strip(0.04, 0.3)
+    for wrong in ((math.nan, 5e-5, 1.0), (0.0, 0.0, 1.0), (0.0, 5e-5, 1001.0)):
+        assert not web.begin(*wrong)
+    assert not web.place(0.0, 1e-4, 0.0, 1.0, 1.0), "a plate of pieces has its place"
+    places = random_places(STEPS, seed=3)
+    columns = (places["opening"], places["rate"], places["advance"])
+    wanted = PiecesModel(make_tables(), [whole]).step_many(*columns)
+    assert web.step_many(places).tobytes() == wanted.tobytes()
+    assert math.isnan(web.piece_crack(1))
+    web.clear()
+    web.reset()
+    uniform = Kernel(make_tables()).step_many(*columns)
+    assert web.step_many(places).tobytes() == uniform.tobytes()
+    assert web.place(0.0, 1e-4, 0.0, 1.0, 1.0)
+    assert not web.begin(0.0, 5e-5, 1.0), "a plate that is placed has no pieces"
+
+
+def test_there_is_room_for_so_many_pieces_and_strips() -> None:
+    web = WebModel(make_tables())
+    strips = tuple(Strip(1e-3 * (k + 1), 0.6) for k in range(4))
+    assert all(web.add(*[Piece(0.0, 5e-5, 0.1, strips)] * 16))
+    assert not web.begin(0.0, 5e-5, 1.0)
+    assert not web.strip(0.1, 0.6)

@@ -6,7 +6,7 @@ import numpy as np
 import wasmtime
 from numpy.typing import NDArray
 
-from scissorcal.kernel import STEP_DTYPE, ModelTables
+from scissorcal.kernel import STEP_DTYPE, ModelTables, Piece
 from scissorcal.kernel.tables import TABLE_NAMES
 from scissorcal.kernel.web_module import MODEL_NUMBERS, web_module, web_numbers
 
@@ -48,6 +48,26 @@ class WebModel:
 
     def place(self, *section: float) -> bool:
         return bool(self._call("sc_web_place", *section))
+
+    def add(self, *pieces: Piece) -> list[bool]:
+        """Add pieces with their strips; what the module answered to each call."""
+        answers = []
+        for piece in pieces:
+            answers.append(self.begin(piece.begin_m, piece.upper_face_m, piece.scale))
+            answers += [self.strip(s.end_m, s.fracture_energy_J_per_m) for s in piece.strips]
+        return answers
+
+    def begin(self, *numbers: float) -> bool:
+        return bool(self._call("sc_web_piece_begin", *numbers))
+
+    def strip(self, *numbers: float) -> bool:
+        return bool(self._call("sc_web_piece_strip", *numbers))
+
+    def clear(self) -> None:
+        self._call("sc_web_pieces_clear")
+
+    def piece_crack(self, which: int) -> float:
+        return float(self._call("sc_web_piece_crack", which))
 
     def _batches(self, function: str, places: NDArray[np.void]) -> NDArray[np.void]:
         done = []

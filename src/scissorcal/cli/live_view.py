@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
+from scissorcal.cli import questions
 from scissorcal.cli.output import is_interactive
 from scissorcal.cli.progress import pace
 from scissorcal.cli.terminal import echo, printable
@@ -93,6 +94,9 @@ class LiveView:
         """
         if not self._ask:
             echo(f"{request} (--yes: taken as done)", err=True)
+            return
+        if questions.answers is not None:
+            questions.ask(request)
             return
         if not is_interactive():
             raise InputError(

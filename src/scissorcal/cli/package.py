@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
 _COMMANDS = {
     "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
+    "export": ("scissorcal.cli.package:export", "Write the package as a page that runs anywhere."),
     "check": ("scissorcal.cli.package:check", "Hold a package to what it states."),
 }
 
 
 @group(_COMMANDS)
 def package() -> None:
-    """Build or check the model package, the one file that a rig renders.
+    """Build, check or show the model package, the one file that a rig renders.
 
     \b
     Example:
@@ -109,6 +110,41 @@ def check(
     return Answer(
         _facts(manifest), f"{path}: {_contents(manifest)}", check_package(package, trusted)
     )
+
+
+@command
+def export(
+    html: Annotated[
+        Path,
+        typer.Option("--html", metavar="FILE", dir_okay=False, help="The page to write (.html)."),
+    ],
+    package_path: Annotated[
+        Path | None,
+        typer.Option("--package", help="The package to show; the workspace's if not given."),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace FILE if it exists.")
+    ] = False,
+    folder: Folder = None,
+) -> Answer:
+    """Write the package and the C core, compiled to WebAssembly, as one page.
+
+    It runs in any browser, from a disk or a web server, and fetches nothing. It computes what the
+    rig's loop computes.
+
+    \b
+    Example:
+      $ scissorcal package export --html paper.html
+      paper.html: 0.9 MB; open it in a browser, it needs no server and no network
+    """
+    from scissorcal.workday.runs.prototype import export_page
+
+    page = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+    text = (
+        f"{page.path}: {page.bytes / 1e6:.2g} MB; open it in a browser, it needs no server and no "
+        "network"
+    )
+    return Answer({"page": page.path, "bytes": page.bytes}, text, files=[page.path])
 
 
 def _contents(manifest: "Manifest") -> str:

@@ -34,6 +34,7 @@ _COMMANDS = {
     "report": ("scissorcal.cli.report:report", "Write, compare or sign the report."),
     "package": ("scissorcal.cli.package:package", "Build or check the model package."),
     "render": ("scissorcal.cli.render:render", "Render the cut on a rig."),
+    "prototype": ("scissorcal.cli.prototype:prototype", "See and try the package in a browser."),
     "control": ("scissorcal.cli.control:control", "Press on a plate and follow a path on it."),
     "track": ("scissorcal.cli.track:track", "Follow the plate's pose by camera and contact."),
     "device": ("scissorcal.cli.device:device", "Find, check or simulate a rig."),
@@ -87,7 +88,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     # no plugin is used, and looking for some reads the metadata of every installed distribution
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     given = list(sys.argv[1:] if arguments is None else arguments)
-    with patient_output(), _collecting_seldom():
+    with patient_output(), _collecting_seldom(), _asking():
         code = _run(given)
     sys.exit(code)
 
@@ -104,6 +105,15 @@ def _collecting_seldom() -> Iterator[None]:
         yield
     finally:
         gc.set_threshold(*before)
+
+
+def _asking() -> contextlib.AbstractContextManager[None]:
+    """Let another program answer the questions of a command, where the environment asks for it."""
+    if os.environ.pop("SCISSORCAL_QUESTIONS", "") != "pipe":
+        return contextlib.nullcontext()
+    from scissorcal.cli.questions import asked_by_pipe
+
+    return asked_by_pipe()
 
 
 def _run(given: list[str]) -> int:

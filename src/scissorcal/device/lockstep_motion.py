@@ -1,6 +1,6 @@
 """The servo in this process and in virtual time: one exchange, one tick."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
@@ -29,6 +29,7 @@ from scissorcal.kernel import (
     ControlTask,
     Mode,
     ModelTables,
+    Piece,
     Section,
     Servo,
     ServoConfig,
@@ -59,10 +60,11 @@ class LockstepMotion(Motion):
         tables: ModelTables | None,
         every_s: float = BLOCK_S,
         control: ControlConfig | None = None,
+        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._servo = Servo(tables, config, control)
+        self._servo = Servo(tables, config, control, pieces)
         self._control_rows: list[bytes] = []
         self._frame: bytes | None = None
         self._ticks = max(1, round(every_s / self.tick_s))

@@ -1,7 +1,7 @@
 """The servo on a port, in real time: a separate process runs it, this one supervises."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 from scissorcal.device.link import PortLink, check_echo
@@ -18,6 +18,7 @@ from scissorcal.kernel import (
     LoopBlock,
     Mode,
     ModelTables,
+    Piece,
     Section,
     ServoConfig,
     StopReason,
@@ -42,10 +43,13 @@ class PortMotion(Motion):
         capacity: int,
         every_s: float = BLOCK_S,
         control: ControlConfig | None = None,
+        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._block = LoopBlock.create(config, tables, control=control, reference_capacity=capacity)
+        self._block = LoopBlock.create(
+            config, tables, control=control, pieces=pieces, reference_capacity=capacity
+        )
         self._process = ServoProcess(link, self._block)
         self._drain_at = 0.0
         self._final: MotionReport | None = None

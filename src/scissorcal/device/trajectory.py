@@ -31,6 +31,7 @@ LEAST_RANGE_RAD = np.radians(3.0)
 
 SWING_BAND_HZ = (1.0, 15.0)
 SWING_ACCELERATION = 80.0
+EMPTY_REQUEST = "Take everything out from between the blades: this capture needs them empty."
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,7 @@ def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> P
     way, rate = multisine(capture.excitation_s, SWING_BAND_HZ, limits, tick_s)
     path.swing(way, rate, strokes.add("excitation"))
     path.rest(DWELL_S)
-    request = "Take everything out from between the blades: this capture needs them empty."
-    segment = Segment(path.reference(), "nothing", -1, request)
+    segment = Segment(path.reference(), "nothing", -1, EMPTY_REQUEST)
     return Plan((segment,), tuple(strokes.all), tick_s)
 
 

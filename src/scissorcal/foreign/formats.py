@@ -105,6 +105,16 @@ STATE = Format("a file of this workspace", 100 * _MB, "Remove it; it is made aga
 SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm, z_mm, one point a line.")
 """200,000 points of 25 characters."""
 
+DRAWING = Format(
+    "a drawing in SVG",
+    5 * _MB,
+    "Save it as plain SVG, its width and height in mm.",
+    memory_bytes=_GB,
+    processor_s=20,
+    wall_s=60.0,
+)
+"""5,000 shapes of a thousand characters; as points and segments of curves it takes 300 MB."""
+
 PATH = Format("a path", 5 * _MB, "Write x_mm and what else is stated, one point a line.")
 """200,000 points of 25 characters."""
 

@@ -51,6 +51,14 @@ from scissorcal.kernel.messages import (
 )
 from scissorcal.kernel.modes import Mode
 from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
+from scissorcal.kernel.pieces import (
+    MOST_PIECES,
+    MOST_STRIPS,
+    Piece,
+    PiecesModel,
+    Strip,
+    largest_overlap,
+)
 from scissorcal.kernel.plate import PlacedModel, PlateConfig, Pull, Section
 from scissorcal.kernel.presliding import presliding_path
 from scissorcal.kernel.rates import estimated_rates
@@ -73,6 +81,8 @@ __all__ = [
     "CONTROL_DTYPE",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
+    "MOST_PIECES",
+    "MOST_STRIPS",
     "PROTOCOL_VERSION",
     "SAMPLE_DTYPE",
     "SCHEMA_HASH",
@@ -111,6 +121,8 @@ __all__ = [
     "ModelTables",
     "NormalLaw",
     "PassivityConfig",
+    "Piece",
+    "PiecesModel",
     "PlacedModel",
     "PlateConfig",
     "Pull",
@@ -125,6 +137,7 @@ __all__ = [
     "StepFlag",
     "StepOutput",
     "StopReason",
+    "Strip",
     "Table",
     "Table16",
     "WatchConfig",
@@ -138,6 +151,7 @@ __all__ = [
     "encode_frame",
     "estimated_rates",
     "hybrid_inputs",
+    "largest_overlap",
     "lock_memory",
     "presliding_path",
     "run_loop",

@@ -23,6 +23,7 @@ HEADERS = (
     "sc_motion.h",
     "sc_passivity.h",
     "sc_plate.h",
+    "sc_pieces.h",
     "sc_lag.h",
     "sc_watch.h",
     "sc_servo.h",

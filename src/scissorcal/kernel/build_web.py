@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 KERNEL = Path(__file__).parent
-CORE = ("table", "turn", "edge", "fracture", "release", "model", "plate")
+CORE = ("table", "turn", "edge", "fracture", "release", "model", "plate", "pieces")
 FLAGS = (
     *("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wall", "-Wextra", "-Werror"),
     # no fused multiply-add and no reordering: the same bits as the core that a rig runs

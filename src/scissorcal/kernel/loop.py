@@ -9,6 +9,7 @@ import mmap
 import os
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -20,6 +21,7 @@ from scissorcal.kernel.control import ControlBlock, ControlConfig, path_arrays
 from scissorcal.kernel.layout import fill_struct
 from scissorcal.kernel.messages import ConfigEcho
 from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
+from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
 from scissorcal.kernel.plate import Section, placing
 from scissorcal.kernel.servo import SAMPLE_DTYPE, ServoConfig, ServoView
 from scissorcal.kernel.stop_reason import StopReason
@@ -129,15 +131,19 @@ class LoopBlock(ServoView):
         tables: ModelTables | None = None,
         *,
         control: ControlConfig | None = None,
+        pieces: Sequence[Piece] | None = None,
         reference_capacity: int = 0,
         silence_limit_ms: int = 1000,
     ) -> Self:
         """Create a block with everything the loop needs.
 
-        ``tables`` are needed to render, ``control`` to press on a surface.
+        ``tables`` are needed to render, ``control`` to press on a surface; ``pieces`` replace the
+        uniform sheet.
         ``reference_capacity``: longest reference or path in ticks that it will get.
         ``silence_limit_ms``: how long the device may send no STATE before the loop gives up.
         """
+        if pieces is not None:
+            refuse_pieces(pieces, tables is not None, config.plate.is_estimated)
         size = int(lib.sc_block_size(reference_capacity))
         fd = _anonymous_file()
         os.ftruncate(fd, size)
@@ -146,7 +152,7 @@ class LoopBlock(ServoView):
         block.pointer.silence_limit_ms = silence_limit_ms
         fill_struct(block.pointer.config, config)
         if tables is not None:
-            _store_tables(block.pointer, tables)
+            _store_tables(block.pointer, tables, pieces)
         if control is not None:
             fill_struct(block.pointer.control.config, control)
             block.pointer.control.has_config = 1
@@ -224,7 +230,10 @@ class LoopBlock(ServoView):
         lib.sc_block_set_reference_size(block, n)
 
     def fresh_sheet(self, crack: float = 0.0) -> None:
-        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
+        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0.
+
+        Cracks of pieces go to their near edges.
+        """
         lib.sc_block_fresh_sheet(self.pointer, crack)
 
     def place(self, section: Section, usable: bool = True, age_s: float = 0.0) -> None:
@@ -311,7 +320,7 @@ def _anonymous_file() -> int:
         return os.dup(file.fileno())
 
 
-def _store_tables(block: Any, tables: ModelTables) -> None:
+def _store_tables(block: Any, tables: ModelTables, pieces: Sequence[Piece] | None) -> None:
     fill_numbers(block.model, tables)
     for name in TABLE_NAMES:
         _store_table(getattr(block, name), getattr(tables, name))
@@ -322,6 +331,8 @@ def _store_tables(block: Any, tables: ModelTables) -> None:
     lib.sc_model_edge_slopes(model)
     block.model.flattest, block.model.steepest = model.flattest, model.steepest
     block.model.release_falls = lib.sc_model_release_falls(model)
+    if pieces is not None:
+        fill_pieces(ffi.addressof(block.config, "pieces"), pieces, model)
 
 
 def _store_table(store: Any, table: Table) -> None:

@@ -1,5 +1,6 @@
 """The servo from Python: one STATE in, one COMMAND out, by the same C function as in the loop."""
 
+from collections.abc import Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import IntFlag
 from typing import Any
@@ -14,6 +15,7 @@ from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
 from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
+from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
 from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
@@ -181,7 +183,7 @@ class ServoView:
 
     @property
     def crack(self) -> float:
-        """The rendered crack tip X (m, plate frame)."""
+        """The rendered crack tip X (m, plate frame), with pieces that of the piece shown."""
         return float(self._servo.crack.crack)
 
     @property
@@ -215,8 +217,8 @@ class ServoView:
 class Servo(ServoView):
     """The servo on its own, for lockstep runs, tests and other loops.
 
-    ``tables`` is needed for RENDER only, ``control`` for CONTROL. It starts in IDLE with a fresh
-    sheet (crack at 0).
+    ``tables`` is needed for RENDER only, ``control`` for CONTROL; ``pieces`` replace the uniform
+    sheet. It starts in IDLE with a fresh sheet (crack at 0).
 
     >>> servo = Servo(None, ServoConfig(torque_limit=1, torque_slew=200, force_limit=0,
     ...                                 force_slew=0, damping_Nm_s_per_rad=0.1))
@@ -232,12 +234,16 @@ class Servo(ServoView):
         tables: ModelTables | None,
         config: ServoConfig,
         control: ControlConfig | None = None,
+        pieces: Sequence[Piece] | None = None,
     ) -> None:
         self.config = config
         self.control = None if control is None else ControlTask(control)
         self._config = ffi.new("sc_servo_config *")
         fill_struct(self._config, config)
         self._model, self._keep = (ffi.NULL, ()) if tables is None else model_struct(tables)
+        if pieces is not None:
+            refuse_pieces(pieces, tables is not None, config.plate.is_estimated)
+            fill_pieces(ffi.addressof(self._config, "pieces"), pieces, self._model)
         self._orders = ffi.new("sc_orders *")
         self._reference = ffi.new("sc_reference *")
         if self.control is not None:
@@ -274,7 +280,10 @@ class Servo(ServoView):
         self._reference.size = len(arrays[0])
 
     def fresh_sheet(self, crack: float = 0.0) -> None:
-        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0."""
+        """Put the rendered crack at ``crack`` (m); a fresh sheet has it at 0.
+
+        Cracks of pieces go to their near edges.
+        """
         self._orders.crack = crack
         self._orders.sheet = (self._orders.sheet + 1) & U32
 

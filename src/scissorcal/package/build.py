@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +17,13 @@ from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.compile import scene_ranges
+from scissorcal.package.drawn_plate import piece_records
 from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
     CutRecord,
     CutStructure,
+    Fracture,
     FrictionRecord,
     FrictionStructure,
     Limits,
@@ -40,6 +42,7 @@ from scissorcal.recipe.schema import Edge, Recipe
 from scissorcal.verdicts import Verdict, failed
 
 if TYPE_CHECKING:
+    from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.simplest.model import Simplified
 
 MOST_DRAWS = 200
@@ -72,6 +75,7 @@ def build_package(
     tolerance: float | None = None,
     review: Review | None = None,
     plate: PlateFit | None = None,
+    drawn: Sequence["LayerPiece"] = (),
     inputs_hash: str = NO_IDENTITY,
     allow_failed: bool = False,
 ) -> PackageSummary:
@@ -85,9 +89,10 @@ def build_package(
     out, and the tables are the smallest whose bound fits; else they are those of a fixed fine
     tolerance. ``tolerance``, each table's as a share of its value, overrides both. ``review`` is
     the signature under the fits' report; it changes nothing else in the package. ``plate`` is
-    where the plate stands, stored as a pose with its covariance. ``inputs_hash`` is the identity
-    that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has another
-    one now, the package is stale.
+    where the plate stands, stored as a pose with its covariance. ``drawn`` are the pieces of the
+    recipe's drawn plate on the line of the cut, none for a uniform sheet. ``inputs_hash`` is the
+    identity that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has
+    another one now, the package is stale.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
@@ -128,6 +133,7 @@ def build_package(
             ),
             plate_pose=recipe.scene.plate_pose,
             plate=_plate_record(plate) if plate else None,
+            pieces=piece_records(recipe, drawn, _energy(compiled.mechanics.fracture)),
             simplification=simplified.record,
             review=review,
             content_hash=UNHASHED,
@@ -144,6 +150,10 @@ def build_package(
         warnings=package.warnings,
         simplified=simplified,
     )
+
+
+def _energy(fracture: Fracture | None) -> float:
+    return fracture.energy_J_per_m if fracture else 0.0
 
 
 def put_review(package: ModelPackage, review: Review | None, path: Path) -> ModelPackage:

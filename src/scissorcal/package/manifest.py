@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.identity import bytes_digest
+from scissorcal.package.drawn_plate import Pieces
 from scissorcal.package.review import Digest, Review
 from scissorcal.package.simplest.record import Simplification
 from scissorcal.package.table_record import (
@@ -260,7 +261,8 @@ class Manifest(Section):
     which simpler laws were enough for the scene, so that they stand here in the place of the fits'
     own: structure, parameters and draws are of the law that is rendered. It is null in packages
     that were built before there was such a choice. ``plate_pose`` is the scene's: "estimated" makes
-    a rendering follow the plate, from ``plate`` where no tracker does.
+    a rendering follow the plate, from ``plate`` where no tracker does. ``pieces`` are a drawn plate
+    along the line of the cut, null for the uniform sheet that was calibrated.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -274,6 +276,7 @@ class Manifest(Section):
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
     plate_pose: Literal["known", "estimated"] = "known"
     plate: PlateRecord | None = None
+    pieces: Pieces | None = None
     simplification: Simplification | None = None
     review: Review | None
     content_hash: Digest

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.kernel import Kernel, ModelTables
+from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel
 from scissorcal.package.archive import REMEDY, read_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import kernel_tables
+from scissorcal.package.drawn_plate import kernel_pieces
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
@@ -104,6 +105,23 @@ class ModelPackage:
         """A new kernel with the step that the loop runs, ripple included, its crack at 0."""
         return Kernel(self.tables)
 
+    def simulate(
+        self, opening: ArrayLike, opening_rate: ArrayLike, advance: ArrayLike
+    ) -> NDArray[np.void]:
+        """What the loop renders along a motion, tick by tick, on a fresh sheet or drawn plate.
+
+        Arguments (rad, rad/s, m) broadcast to (n,); they are the places of successive ticks. Gives
+        (n,) of the kernel's step (STEP_DTYPE): torque in N m and force along the cut in N before
+        any limit, contact, energies. Of a drawn plate (``manifest.pieces``) it is the sum over
+        its pieces, where `torque` and `band` are those of the calibrated sheet.
+
+        >>> step = package.simulate(opening, rate, -0.02)  # doctest: +SKIP
+        >>> step["torque"].max()  # doctest: +SKIP
+        0.0612
+        """
+        model = PiecesModel(self.tables, self.pieces) if self.pieces else self.kernel()
+        return model.step_many(opening, opening_rate, advance)
+
     def covers(
         self, opening: ArrayLike, opening_rate: ArrayLike, contact: ArrayLike
     ) -> NDArray[np.bool_]:
@@ -150,6 +168,11 @@ class ModelPackage:
     def tables(self) -> ModelTables:
         """What the loop's kernel evaluates."""
         return kernel_tables(self.manifest.mechanics, self.manifest.ranges, self.arrays)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The drawn plate along the cut, as the loop steps it; none of a uniform sheet."""
+        return kernel_pieces(self.manifest.pieces) if self.manifest.pieces else ()
 
     @cached_property
     def exact(self) -> ExactModel:
@@ -250,7 +273,7 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
                 f"fit has parameters. {REMEDY}"
             )
     try:
-        _ = package.tables, package.exact, package.average, package.kernel()
+        _ = package.tables, package.exact, package.average, package.kernel(), package.pieces
     except Exception as error:
         raise InputError(
             f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"

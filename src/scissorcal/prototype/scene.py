@@ -1,7 +1,8 @@
 """Everything that a page shows of a package: tables, sliders, draws, band, strokes."""
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,22 +12,33 @@ from scissorcal.kernel.tables import TABLE_NAMES
 from scissorcal.kernel.web_module import web_numbers
 from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
-from scissorcal.package.manifest import Parameter
+from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
+from scissorcal.package.manifest import Manifest, Parameter, PlateRecord
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.arrays import Numbers, Part
+from scissorcal.prototype.parts import (
+    Band,
+    Draws,
+    Hand,
+    PiecePart,
+    PlatePose,
+    Rows,
+    Slider,
+    Stroke,
+)
 from scissorcal.report.numbers import shown_unit
 
 Array = NDArray[np.float64]
 
-FORMAT = "scissorcal-prototype/1"
+FORMAT: Final = "scissorcal-prototype/1"
 
 NODES = 17
 """Places of a slider at which the law was evaluated; between them its tables change linearly."""
 WIDE = 2.0
 """A slider reaches from half to twice the fitted value, or as far as the posterior does."""
 POSTERIOR_SDS = 8.0
-MOST_DRAWS = 200
+MOST_DRAWS = 100
 
 OPENINGS, CONTACTS = 61, 13
 """Grid of the band over the scene's openings and contacts."""
@@ -40,83 +52,15 @@ LEAST_EXPONENT = 1.0
 """A softer law has an infinite stiffness at the first touch, which no table holds."""
 
 
-class Rows(Part):
-    """Tables at n sets of parameters: by table (n, 2, knots), values and slopes; numbers (n,).
-
-    ``tables`` of "mean_energy" are (n, 1, knots). A table that none of the sets changes is left
-    out.
-    """
-
-    tables: dict[str, Numbers]
-    fracture_energy: Numbers
-    kappa: Numbers
-    rate_damping: Numbers
-
-
-class Slider(Part):
-    """One parameter: SI values; times ``scale`` they are in ``unit``.
-
-    ``nodes`` are its values at which ``rows`` were evaluated, the others as fitted.
-    """
-
-    name: str
-    meaning: str
-    unit: str
-    scale: float
-    value: float
-    sd: float
-    q05: float
-    q95: float
-    nodes: Numbers
-    rows: Rows
-
-
-class Draws(Part):
-    """Draws of the posterior: values (draws, sliders) in SI, and the law at each."""
-
-    values: Numbers
-    rows: Rows
-
-
-class Band(Part):
-    """The 90 % interval of the torque (N m) on a grid (openings, contacts), for one direction.
-
-    ``rate`` is the opening rate in rad/s at which it was evaluated, below 0 where closing.
-    """
-
-    rate: float
-    opening: Numbers
-    contact: Numbers
-    low: Numbers
-    high: Numbers
-
-
-class Stroke(Part):
-    """A measured stroke (n,): opening in rad, contact in m, torque in N m."""
-
-    recording: str
-    kind: str
-    opening: Numbers
-    contact: Numbers
-    torque: Numbers
-
-
-class Hand(Part):
-    """A recorded hand to replay (n,): time in s from 0, opening in rad, advance in m."""
-
-    name: str
-    time: Numbers
-    opening: Numbers
-    advance: Numbers
-
-
 class Scene(Part):
     """A package as a page shows it.
 
     ``tables`` (3, knots) and ``numbers`` are what the kernel evaluates, in the orders of
     TABLE_NAMES and MODEL_NUMBERS. ``mean_energy`` (3, knots) and ``levels`` are those of the
     average torque; without a ripple there are none. ``cut`` and ``friction`` are as fitted on the
-    knots, from which sliders and draws differ.
+    knots, from which sliders and draws differ. ``notes`` are sentences about the package that do
+    not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the
+    text that a drawn plate is written into.
     """
 
     format: Literal["scissorcal-prototype/1"] = FORMAT
@@ -124,6 +68,7 @@ class Scene(Part):
     made_utc: str
     version: str
     warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     bound_Nm: float
     torque_limit_Nm: float
     opening_rad: tuple[float, float]
@@ -144,6 +89,9 @@ class Scene(Part):
     bands: tuple[Band, ...]
     strokes: tuple[Stroke, ...] = ()
     hands: tuple[Hand, ...] = ()
+    pieces: tuple[PiecePart, ...] | None = None
+    recipe: str | None = None
+    plate_pose: PlatePose | None = None
 
 
 def scene_of(
@@ -153,10 +101,14 @@ def scene_of(
     version: str,
     fits: Sequence[FitResult] = (),
     hands: Sequence[Hand] = (),
+    warnings: Sequence[str] = (),
+    notes: Sequence[str] = (),
+    recipe: str | None = None,
 ) -> Scene:
     """What a page shows of a package; ``fits`` add measured strokes and meanings.
 
     A fit that the package was not built from adds nothing: its inputs hash is another.
+    ``warnings`` stand before those of the package.
     """
     manifest = package.manifest
     own = set(manifest.fit_hashes.values())
@@ -168,7 +120,8 @@ def scene_of(
         name=manifest.name,
         made_utc=made_utc,
         version=version,
-        warnings=package.warnings,
+        warnings=(*warnings, *package.warnings),
+        notes=tuple(notes),
         bound_Nm=manifest.bound.stated_Nm,
         torque_limit_Nm=manifest.limits.torque_Nm,
         opening_rad=ranges.opening_rad,
@@ -189,6 +142,9 @@ def scene_of(
         bands=tuple(_bands(package)),
         strokes=tuple(stroke for fit in fits if fit.what == "cut" for stroke in _strokes(fit)),
         hands=tuple(hands),
+        pieces=_pieces(manifest),
+        recipe=recipe,
+        plate_pose=_plate_pose(manifest.plate),
     )
 
 
@@ -235,19 +191,20 @@ def _sliders(package: ModelPackage, meanings: Mapping[str, str]) -> "list[Slider
         varied = np.tile(cut, (NODES, 1))
         varied[:, index] = nodes
         same = None if friction is None else np.tile(friction, (NODES, 1))
-        found.append(_slider(parameter, nodes, variations(package, varied, same), meanings))
+        law = variations(package, varied, same)
+        found.append(_slider(parameter, index, nodes, law, meanings))
     for index, parameter in enumerate(record.friction.parameters if record.friction else ()):
         assert friction is not None
         nodes = slider_nodes(parameter.name, parameter.value, parameter.sd)
         varied = np.tile(friction, (NODES, 1))
         varied[:, index] = nodes
         law = variations(package, np.tile(cut, (NODES, 1)), varied)
-        found.append(_slider(parameter, nodes, law, meanings))
+        found.append(_slider(parameter, len(cut) + index, nodes, law, meanings))
     return [slider for slider in found if slider is not None]
 
 
 def _slider(
-    parameter: Parameter, nodes: Array, law: Variations, meanings: Mapping[str, str]
+    parameter: Parameter, column: int, nodes: Array, law: Variations, meanings: Mapping[str, str]
 ) -> Slider | None:
     """None for a parameter that the rendered law does not depend on, such as the rig's inertia."""
     rows = _rows(law, only_changed=True)
@@ -257,6 +214,7 @@ def _slider(
     scale, unit = shown_unit(parameter.unit)
     return Slider(
         name=parameter.name,
+        column=column,
         meaning=meanings.get(parameter.name, ""),
         unit=unit,
         scale=scale,
@@ -292,25 +250,54 @@ def _rows(law: Variations, *, only_changed: bool = False) -> Rows:
 
 
 def _bands(package: ModelPackage) -> "list[Band]":
-    """Both directions at the middle (geometric) of the scene's rates."""
-    ranges = package.manifest.ranges
-    opening = np.linspace(*ranges.opening_rad, OPENINGS)
-    contact = np.linspace(*ranges.contact_m, CONTACTS)
-    slow, fast = ranges.opening_rate_rad_per_s
+    """Both directions at the middle (geometric) of the scene's rates, with and without friction."""
+    manifest = package.manifest
+    opening = np.linspace(*manifest.ranges.opening_rad, OPENINGS)
+    contact = np.linspace(*manifest.ranges.contact_m, CONTACTS)
+    slow, fast = manifest.ranges.opening_rate_rad_per_s
     rate = float(np.sqrt(max(slow, 0.05 * fast) * fast))
-    found = []
-    for signed in (-rate, rate):
-        low, high = package.band(opening[:, None], signed, contact[None, :])
-        found.append(
-            Band(
-                rate=signed,
-                opening=Numbers.of(opening),
-                contact=Numbers.of(contact),
-                low=Numbers.of(low),
-                high=Numbers.of(high),
-            )
+    place = opening[:, None], -rate, contact[None, :]
+    limit = manifest.limits.torque_Nm
+    drawn = exact_model(_cut_draws(package), None)
+    alone = np.clip(torque_quantiles(drawn, *place, (0.05, 0.95)), -limit, limit)
+    found = [(-rate, False, alone)]
+    if manifest.provenance.friction:
+        closing, opens = package.band(*place), package.band(place[0], rate, place[2])
+        found += [(-rate, True, np.stack(closing)), (rate, True, np.stack(opens))]
+    return [
+        Band(
+            rate=signed,
+            friction=with_friction,
+            opening=Numbers.of(opening),
+            contact=Numbers.of(contact),
+            low=Numbers.of(low),
+            high=Numbers.of(high),
         )
-    return found
+        for signed, with_friction, (low, high) in found
+    ]
+
+
+def _cut_draws(package: ModelPackage) -> FitDraws:
+    record = package.manifest.provenance.cut
+    names = tuple(parameter.name for parameter in record.parameters)
+    return FitDraws(record.structure.model_dump(), names, package.arrays["draws/cut.npy"])
+
+
+def _pieces(manifest: Manifest) -> tuple[PiecePart, ...] | None:
+    if manifest.pieces is None:
+        return None
+    return tuple(PiecePart.model_validate(piece.model_dump()) for piece in manifest.pieces)
+
+
+def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:
+    """None where the plate was seen from the camera alone: where the rig is, is not known then."""
+    if plate is None or plate.frame != "rig":
+        return None
+    w, *axis = plate.quaternion
+    sine = math.hypot(*axis)
+    turn = 2.0 * math.atan2(sine, w) / sine if sine else 2.0
+    x, y, z = (turn * part for part in axis)
+    return PlatePose(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
 
 
 def _strokes(fit: FitResult) -> "list[Stroke]":
@@ -325,7 +312,7 @@ def _strokes(fit: FitResult) -> "list[Stroke]":
         closes = series.opening[own[-1]] < series.opening[own[0]]
         found.append(
             Stroke(
-                recording=fit.sources[int(series.recording[own[0]])].rpartition("/")[2],
+                recording=_file_of(fit.sources[int(series.recording[own[0]])]),
                 kind="closing" if closes else "opening",
                 opening=Numbers.of(series.opening[own]),
                 contact=Numbers.of(series.contact[own]),
@@ -333,3 +320,8 @@ def _strokes(fit: FitResult) -> "list[Stroke]":
             )
         )
     return found
+
+
+def _file_of(source: str) -> str:
+    """The file's name in what a fit says of a source: path and hash."""
+    return source.partition(" sha256:")[0].rpartition("/")[2]

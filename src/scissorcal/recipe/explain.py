@@ -228,9 +228,12 @@ def _fields(model: type[BaseModel], table: Path) -> list[str]:
 
 def _table_model(model: type[BaseModel], table: Path) -> type[BaseModel] | None:
     for key in table:
-        if isinstance(key, int) or key not in model.model_fields:
+        if isinstance(key, int):
+            continue  # the item of a list of tables: its model is that of the list
+        if key not in model.model_fields:
             return None
-        inner = _model_within(model.model_fields[key].annotation)
+        annotation = model.model_fields[key].annotation
+        inner = _model_within(annotation) or _model_listed(annotation)
         if inner is None:
             return None
         model = inner
@@ -246,6 +249,13 @@ def _model_within(annotation: Any) -> type[BaseModel] | None:
             if found is not None:
                 return found
     return None
+
+
+def _model_listed(annotation: Any) -> type[BaseModel] | None:
+    """The model of a list of tables."""
+    if typing.get_origin(annotation) is not tuple:
+        return None
+    return _model_within(typing.get_args(annotation)[0])
 
 
 def _tables(model: type[BaseModel], prefix: Path = ()) -> list[Path]:

@@ -32,6 +32,7 @@ from scissorcal.recipe.friction import FitFriction as FitFriction
 from scissorcal.recipe.friction import FrictionRung as FrictionRung
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
+from scissorcal.recipe.plate_layers import Layers, Place_mm, refuse_impossible_layers
 from scissorcal.recipe.plate_surface import PlateSurface
 from scissorcal.recipe.plate_tracking import PlateTracking
 from scissorcal.recipe.priors import CutPriors, LogNormalPrior, Section
@@ -213,8 +214,10 @@ class Scene(Section):
 
 
 class Plate(Section):
-    """How the printed target lies on the plate, where its pose is estimated; surface and tracking.
+    """What the plate is: its layers as drawn, else a uniform sheet of the material; its target.
 
+    ``layers``, in order from below, are cut along the line y = ``cut_line_mm`` of the drawing; x
+    runs along the cut from the near edge. What follows matters where the pose is estimated.
     ``place_mm`` is the pattern's upper left corner as printed, in the plate's frame (x along the
     cut from the near edge, y to the left of the cut, z out of the upper face); ``turn_deg`` turns
     its upper edge from x towards y. The pattern faces up.
@@ -225,6 +228,8 @@ class Plate(Section):
     surface: PlateSurface = PlateSurface()
     touch: Touch = Touch()
     tracking: PlateTracking = PlateTracking()
+    cut_line_mm: Place_mm = 0.0
+    layers: Layers = ()
 
 
 class Limits(Section):
@@ -354,6 +359,11 @@ class Recipe(Section):
                 "fit.cut.toughness_J_per_m2 is set, but scene.cut = false: nothing is cut, so "
                 "remove the prior or set scene.cut = true"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _layers_can_be_cut(self) -> Recipe:
+        refuse_impossible_layers(self)
         return self
 
     @property

@@ -125,7 +125,7 @@ def scan_file(path: Path) -> Scan:
     """Read a whole file, complete, cut off or damaged; InputError if it is no recording."""
     data = read_foreign(path, RECORDING)
     refuse_other_formats(path, data)
-    walk = _Walk(room=LARGEST_CHUNK + LARGEST_RATIO * len(data))
+    walk = Walk(room=LARGEST_CHUNK + LARGEST_RATIO * len(data))
     with reading(path, RECORDING):
         for offset, opcode, body in _records(data, walk):
             try:
@@ -154,8 +154,11 @@ def scan_file(path: Path) -> Scan:
 
 
 @dataclass
-class _Walk:
-    """State while walking: what was found so far; ``room`` is left for unpacked chunks."""
+class Walk:
+    """State while walking over records, one by one: what was found so far.
+
+    ``room`` are the bytes that are left for unpacked chunks; :meth:`take` raises DamageError.
+    """
 
     room: int
     metadata: RecordingMetadata | None = None
@@ -170,6 +173,7 @@ class _Walk:
     metadata_complaint: str = ""
 
     def take(self, offset: int, opcode: int, body: bytes) -> None:
+        """Take one record, which begins at ``offset`` of the file."""
         from mcap.opcode import Opcode
         from mcap.records import Statistics
 
@@ -260,7 +264,7 @@ class _Walk:
             self.events.append(np.frombuffer(messages, layout.MESSAGE_DTYPE)["sample"].copy())
 
 
-def _records(data: bytes, walk: _Walk) -> Iterator[tuple[int, int, bytes]]:
+def _records(data: bytes, walk: Walk) -> Iterator[tuple[int, int, bytes]]:
     """Yield (offset, opcode, body) of the whole records; skip damage and note where it is."""
     offset, chunks = len(MAGIC), ChunkPlaces(data)
     while offset < len(data):
@@ -319,7 +323,7 @@ def _open_attachment(body: bytes) -> Attachment:
     return Attachment(record.name, record.media_type, record.data)
 
 
-def _why_no_recording(path: Path, walk: _Walk) -> str:
+def _why_no_recording(path: Path, walk: Walk) -> str:
     if walk.metadata_complaint:
         return f"{path} is not readable: {walk.metadata_complaint}."
     others = sorted(walk.topics - {layout.TOPIC})

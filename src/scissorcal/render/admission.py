@@ -1,6 +1,6 @@
 """Decide before any force whether a rig can render a package stably, and what is taken back if not.
 
-What the package asks for (`derating.needs_of`) is compared with what rig and loop allow
+What the package asks for (`derating.needs_on`) is compared with what rig and loop allow
 (`admission_rule`). Where it is too much the elastic response is softened, at most to
 LEAST_FACTOR; the fracture energy never changes. Rendered friction gets a width near rest that
 suits the encoder and the delay. What cannot be rendered even so is refused, with what would help.
@@ -8,10 +8,11 @@ suits the encoder and the delay. What cannot be rendered even so is refused, wit
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from scissorcal.errors import InputError
-from scissorcal.kernel import Capability, Identity, ModelTables, PassivityConfig
+from scissorcal.kernel import Capability, Identity, ModelTables, PassivityConfig, Piece
 from scissorcal.package import ModelPackage
 from scissorcal.render.admission_rule import (
     OSCILLATION_RATE,
@@ -20,7 +21,7 @@ from scissorcal.render.admission_rule import (
     allowed_stiffness,
 )
 from scissorcal.render.cures import stated_cures
-from scissorcal.render.derating import Needs, felt_change, needs_of, softened
+from scissorcal.render.derating import Needs, felt_change, needs_on, softened
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
 LEAST_FACTOR = 0.05
@@ -91,14 +92,20 @@ class Admission:
 
 
 def admit(
-    tables: ModelTables, facts: LoopFacts | None, hand: float, limit: float, rate: float
+    tables: ModelTables,
+    facts: LoopFacts | None,
+    hand: float,
+    limit: float,
+    rate: float,
+    pieces: Sequence[Piece] = (),
 ) -> Admission:
     """Decide what of ``tables`` is rendered; `rendered_tables` gives the tables that follow.
 
     ``hand`` is the damping of a hand (N m s/rad), ``limit`` the torque limit (N m), ``rate`` the
-    scene's largest rate (rad/s). Raises InputError where even the softest response is too stiff.
+    scene's largest rate (rad/s), ``pieces`` a drawn plate. Raises InputError where even the
+    softest response is too stiff.
     """
-    needs = needs_of(tables, limit)
+    needs = needs_on(tables, limit, pieces)
     if facts is None:
         return _unchecked(needs, hand)
     rate = max(rate, OSCILLATION_RATE)
@@ -106,7 +113,7 @@ def admit(
     cures = stated_cures(facts, hand, rate, needs.stiffness)
     if not held > 0.0:
         raise InputError(_nothing_allowed(facts, cures))
-    steepest, left = _soften(tables, needs.stiffness, held, limit)
+    steepest, left = _soften(tables, needs.stiffness, held, limit, pieces)
     if left > held or left < LEAST_FACTOR * needs.stiffness:
         raise InputError(
             f"This rig cannot render the package stably: {needs.stiffness:.3g} N m/rad are needed "
@@ -145,7 +152,7 @@ def admit_package(
     facts, sources = loop_facts(identity, rig)
     rate = package.manifest.ranges.opening_rate_rad_per_s[1]
     hand = _hand_damping(package)
-    found = admit(package.tables, facts, hand, limit, rate)
+    found = admit(package.tables, facts, hand, limit, rate, package.pieces)
     return replace(found, sources=sources)
 
 
@@ -215,7 +222,7 @@ def _friction_width(needs: Needs, facts: LoopFacts, allowed: float) -> float:
 
 
 def _soften(
-    tables: ModelTables, needed: float, allowed: float, limit: float
+    tables: ModelTables, needed: float, allowed: float, limit: float, pieces: Sequence[Piece]
 ) -> tuple[float | None, float]:
     """The steepest response that is allowed (N/m, None for all) and the stiffness that is left.
 
@@ -226,7 +233,7 @@ def _soften(
         return None, needed
     while left > allowed and left > LEAST_FACTOR * needed:
         steepest *= max(0.999 * allowed / left, 0.5)
-        left = needs_of(softened(tables, steepest), limit).stiffness
+        left = needs_on(softened(tables, steepest), limit, pieces).stiffness
     return steepest, left
 
 

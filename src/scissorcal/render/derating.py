@@ -1,11 +1,12 @@
 """How stiff a package is over its scene, and the same package with a softer elastic response."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.kernel import Kernel, ModelTables, Table
+from scissorcal.kernel import Kernel, ModelTables, Piece, Table, largest_overlap
 
 Array = NDArray[np.float64]
 
@@ -71,6 +72,36 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
                     found, stiffness=slope, opening=float(opening), contact=float(settled)
                 )
     return found
+
+
+def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> Needs:
+    """What a package with a drawn plate asks of the loop; without pieces as `needs_of`.
+
+    Each piece is a uniform sheet of its toughest strip. Those that a blade can press at once add
+    up, each at its own worst: an upper bound, which a stack reaches where all are worst at one
+    place.
+    """
+    if not pieces:
+        return needs_of(tables, torque_limit)
+    each = []
+    for piece in pieces:
+        energy = max(strip.fracture_energy_J_per_m for strip in piece.strips) / piece.scale
+        sheet = replace(tables, upper_face=piece.upper_face_m, fracture_energy=energy)
+        each.append(needs_of(sheet, torque_limit / piece.scale))
+    reach = tables.tip_station if np.isfinite(tables.tip_station) else tables.contact_max
+    scales = [piece.scale for piece in pieces]
+
+    def together(amounts: Sequence[float]) -> float:
+        own = [scale * amount for scale, amount in zip(scales, amounts, strict=True)]
+        return largest_overlap(pieces, reach, own)
+
+    worst = each[int(np.argmax([s * one.stiffness for s, one in zip(scales, each, strict=True)]))]
+    return replace(
+        worst,
+        stiffness=together([one.stiffness for one in each]),
+        drop_Nm=together([one.drop_Nm for one in each]),
+        damper=together([one.damper for one in each]),
+    )
 
 
 def softened(tables: ModelTables, steepest: float) -> ModelTables:

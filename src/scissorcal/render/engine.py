@@ -76,6 +76,8 @@ def render(
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
+    Of a package with a drawn plate that plate is rendered.
+
     The loop runs in a separate process, paced by the device's frames, or frame by frame in
     virtual time on a LockstepLink; ``motor_sign`` is the recipe's. It keeps to the tightest of
     three limits: ``limits`` (a recipe's), the package's own, the device's. Force is ramped up from
@@ -115,7 +117,8 @@ def render(
         for sentence in warnings:
             writer.note(sentence)
     watch = Watch(_travel(package), writer, progress or _silent, seconds)
-    with open_motion(link, config, tables, every_s=EVERY_S if follower else BLOCK_S) as motion:
+    every_s, pieces = EVERY_S if follower else BLOCK_S, package.pieces or None
+    with open_motion(link, config, tables, every_s=every_s, pieces=pieces) as motion:
         watch.wanted = _prepare(motion, strokes, confirm)
         motion.fresh_sheet(0.0)
         with follower or nullcontext():

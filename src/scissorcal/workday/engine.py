@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
+from scissorcal.recipe.plate_layers import drawings
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
@@ -123,7 +124,16 @@ class Engine:
         }
         if step.kind == "package":  # it says which checks its fits failed
             made_from["failed"] = {item: self.state(item).failed for item in step.inputs}
+            if drawn := self._drawings():
+                made_from["drawings"] = drawn
         return digest(made_from)
+
+    def _drawings(self) -> dict[str, str]:
+        """Digests of the files in which the recipe's plate is drawn; "" of one that is missing."""
+        paths = {name: self.workspace.root / name for name in drawings(self.recipe)}
+        return {
+            name: self.index.digest(path) if path.is_file() else "" for name, path in paths.items()
+        }
 
     def review(self) -> dict[str, Any] | None:
         """The signature that stands under the report, as stored; None where there is none."""

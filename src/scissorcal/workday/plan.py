@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scissorcal.recipe.capture_cost import CaptureCost, CaptureKind, capture_cost
+from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
 from scissorcal.recipe.requirements import Requirement, requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.probe import probe_state
@@ -33,11 +34,13 @@ class Plan:
     costs: tuple[CaptureCost, ...] = ()
     choice: "SceneChoice | None" = None
     design: "CaptureDesign | None" = None
+    plate: str = ""
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on single steps, each once, in the order of the steps."""
-        return tuple(dict.fromkeys(note for step in self.steps for note in step.notes))
+        """What a drawn plate is, then sentences on single steps, each once, in their order."""
+        plate = (self.plate,) if self.plate else ()
+        return (*plate, *dict.fromkeys(note for step in self.steps for note in step.notes))
 
     @property
     def next_command(self) -> str | None:
@@ -69,6 +72,7 @@ def make_plan(workspace: Workspace) -> Plan:
         _costs(engine),
         _choice(engine),
         _design(engine),
+        plate_sentence(engine.recipe, plate_pieces(engine.recipe, workspace.root)),
     )
 
 

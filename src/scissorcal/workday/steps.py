@@ -116,7 +116,8 @@ def _blade_settings(recipe: Recipe) -> object:
 def _plate_settings(recipe: Recipe) -> object:
     fit = recipe.fit.plate.model_dump(mode="json")
     # the target is printed flat and at rest: surface, touch and tracking do not enter its fit
-    plate = recipe.plate.model_dump(mode="json", exclude={"surface", "touch", "tracking"})
+    others = {"surface", "touch", "tracking", "cut_line_mm", "layers"}
+    plate = recipe.plate.model_dump(mode="json", exclude=others)
     return [plate, recipe.rig.moving, fit]
 
 
@@ -134,7 +135,11 @@ def _cut_settings(recipe: Recipe) -> object:
 
 
 def _whole(recipe: Recipe) -> object:
-    return recipe.model_dump(mode="json")
+    found = recipe.model_dump(mode="json")
+    if not recipe.plate.layers:  # results of recipes without a drawn plate are what they were
+        for key in ("cut_line_mm", "layers"):
+            del found["plate"][key]
+    return found
 
 
 def _trust_check(what: str, words: str = "", *, on_request: bool = False) -> Step:

@@ -52,7 +52,7 @@ static void fill(sc_block *block, input *from)
     block->silence_limit_ms = 1;
     block->control.config = sound_control();
     block->control.has_config = take_byte(from) % 2;
-    change_words(from, config, sizeof *config);
+    change_words(from, config, offsetof(sc_servo_config, pieces));
     if (take_byte(from) % 8 == 0) change_words(from, block, offsetof(sc_block, ring));
     (void)sc_block_is_sound(block, sc_block_size(REFERENCE));
     block->reference_capacity = REFERENCE; /* what the memory has */

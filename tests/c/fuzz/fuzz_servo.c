@@ -76,7 +76,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int32_t stroke[PATH];
     config.passivity.is_measured = take_byte(&from) % 2;
     config.plate.is_estimated = take_byte(&from) % 2;
-    change_words(&from, &config, sizeof config);
+    change_words(&from, &config, offsetof(sc_servo_config, pieces));
     /* Short, so that a run of some hundred ticks passes them. */
     law.stale_s = 0.01f;
     law.end_s = 0.1f;

@@ -1,6 +1,7 @@
 /* Any sound model, any motion: every output of a step is finite, and the crack never goes back. */
 #include "models.h"
 #include "sc_fracture.h"
+#include "sc_pieces.h"
 #include "sc_plate.h"
 
 /* Slopes of a cubic that never falls between its knots (Fritsch and Carlson 1980,
@@ -56,6 +57,46 @@ static void on_a_plate(const sc_model *model, input *from)
     }
 }
 
+/* Pieces of any sound numbers: cracks never go back, and stay in their pieces. */
+static void on_pieces(const sc_model *model, input *from)
+{
+    sc_pieces_config config;
+    sc_pieces pieces, before;
+    sc_step_output out;
+    memset(&config, 0, sizeof config);
+    memset(&pieces, 0, sizeof pieces);
+    config.count = 1 + take_byte(from) % 4;
+    for (int32_t i = 0, first = 0; i < config.count; first += config.piece[i++].count) {
+        const sc_plate_piece piece = {take_float(from, -0.01f, 0.05f), take_float(from, 1e-5f, 1e-3f),
+                                      take_float(from, 0.1f, 5.0f), first, 1 + take_byte(from) % 5, 0};
+        float end = piece.begin;
+        for (int32_t k = 0; k < piece.count; k++) {
+            const sc_strip strip = {end += take_float(from, 0.0f, 0.01f), take_float(from, 0.0f, 2.0f)};
+            config.strip[first + k] = strip;
+        }
+        config.piece[i] = piece;
+    }
+    change_words(from, &config, sizeof config);
+    if (!sc_pieces_are_sound(&config) || config.count == 0) return;
+    if (take_byte(from) % 2) sc_pieces_prepare(model, &config);
+    float opening = 0.8f;
+    for (int i = 0; i < 60; i++) {
+        const float rate = take_float(from, -5.0f, 1.0f), advance = take_float(from, -0.03f, -0.02f);
+        opening = isfinite(opening) ? opening + 0.02f * rate : 0.8f;
+        before = pieces;
+        sc_pieces_step(&config, model, &pieces, opening, rate, advance, &out);
+        hold_step(model, &out);
+        PROMISED(out.arrest_J >= 0.0f || !never_falls(&model->response));
+        for (int32_t k = 0; k < config.count && before.begun && pieces.begun; k++) {
+            const sc_plate_piece *piece = &config.piece[k];
+            const int32_t strip = pieces.of[k].strip;
+            PROMISED(strip >= before.of[k].strip && strip <= piece->count);
+            PROMISED(!(pieces.of[k].crack.crack < before.of[k].crack.crack));
+            PROMISED(!(pieces.of[k].crack.crack > config.strip[piece->first + piece->count - 1].end));
+        }
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     input from = {data, size};
@@ -90,5 +131,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     PROMISED(!isfinite(start) || isfinite(crack.crack));
     on_a_plate(&model, &from);
+    on_pieces(&model, &from);
     return 0;
 }

@@ -30,7 +30,7 @@ void sc_sit(const sc_model *model, sc_bite *bite)
     if (at.y > RESPONSE_CAP && at.index == last && at.slope > 0.0f) {
         /* Summed from the table's end on: what lies beyond may be so much larger than the capped
          * energy that a difference of the two has no digit left. */
-        const float rise = RESPONSE_CAP - response->y[last];
+        const float rise = fmaxf(RESPONSE_CAP - response->y[last], 0.0f);
         const float reached = rise / at.slope;
         const float beyond = bite->indentation - response->x[last] - reached;
         at.area = response->area[last] + reached * (response->y[last] + 0.5f * rise);

@@ -18,6 +18,8 @@
  * bisections alone would reach float's resolution. */
 enum { SC_RUN_ROUNDS = 4, SC_CLOSE_ROUNDS = 24 };
 
+#define SC_SHORTEST_RUN 1e-7f /* m: a ripple below float resolution counts as smooth */
+
 /* The edge in the material: its place, how deep it sits, the response and m times its integral [J].
  * `knot`: as in sc_place, of the response. */
 typedef struct {
@@ -34,6 +36,9 @@ void sc_sit(const sc_model *model, sc_bite *bite);
 
 /* Energy released per metre of crack [N]; 0 where edges are parallel. */
 float sc_release(const sc_model *model, const sc_bite *bite);
+
+/* Whether the release is known to fall outwards along the blade at this opening. */
+int sc_falls_at(const sc_model *model, float opening);
 
 /* From a place that releases more than target, go outwards to where it does not. There the indentation
  * is what that place bears, free of the rounding of upper_face - y. 0 if the target is not met before

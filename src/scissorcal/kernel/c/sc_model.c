@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-static const float SHORTEST_RUN = 1e-7f; /* m: a ripple below float resolution counts as smooth */
 static const float WIDEST_OPENING = 3.14159274f; /* rad */
 
 static int is_finite_step(const sc_step_output *out)
@@ -31,8 +30,7 @@ static sc_turn turn_of(const sc_model *model, float opening)
     return sc_turn_of(opening / (float)model->moving_blades);
 }
 
-/* Whether the release is known to fall outwards along the blade at this opening. */
-static int falls_at(const sc_model *model, float opening)
+int sc_falls_at(const sc_model *model, float opening)
 {
     return model->release_falls && opening >= model->opening_min && opening <= model->opening_max;
 }
@@ -98,7 +96,7 @@ static int ripple(const sc_model *model, sc_crack *state, sc_turn turn, int fall
     sc_bite stop = *start;
     (void)sc_run_out(model, turn, falls, kept, &stop);
     const float length = stop.point.x - start->point.x;
-    if (!(length > SHORTEST_RUN)) {
+    if (!(length > SC_SHORTEST_RUN)) {
         return 0;
     }
     const float runs = ceilf((start->point.x - contact) / length);
@@ -192,7 +190,7 @@ void sc_model_step(const sc_model *model, sc_crack *state, float opening, float 
         return;
     }
     sc_sit(model, &bite);
-    press(model, state, turn, falls_at(model, opening), rate, &bite, out);
+    press(model, state, turn, sc_falls_at(model, opening), rate, &bite, out);
     state->edge_knot = bite.point.knot;
     state->response_knot = bite.knot;
     out->contact = bite.point.x;
@@ -228,7 +226,7 @@ static int settled_torque(const sc_model *model, float opening, float rate, floa
     int reached = bite.point.station < model->tip_station;
     if (reached && model->fracture_energy > 0.0f &&
         sc_release(model, &bite) > model->fracture_energy) {
-        reached = sc_run_out(model, turn, falls_at(model, opening), model->fracture_energy, &bite);
+        reached = sc_run_out(model, turn, sc_falls_at(model, opening), model->fracture_energy, &bite);
     }
     if (reached) {
         *torque = torque_of(model, &bite.point, damped(model, &bite.point, bite.force, rate));

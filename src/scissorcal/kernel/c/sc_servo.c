@@ -45,7 +45,8 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            config->opening_low < config->opening_high && config->opening_rate_limit > 0.0f &&
            config->advance_rate_limit > 0.0f && isfinite(config->motor_sign) &&
            sc_passivity_is_sound(&config->passivity) &&
-           sc_plate_config_is_sound(&config->plate) &&
+           sc_plate_config_is_sound(&config->plate) && sc_pieces_are_sound(&config->pieces) &&
+           !(config->plate.is_estimated && config->pieces.count > 0) &&
            sc_watch_config_is_sound(&config->watch);
 }
 

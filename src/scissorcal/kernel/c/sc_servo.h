@@ -21,6 +21,7 @@
 #include "sc_model.h"
 #include "sc_motion.h"
 #include "sc_passivity.h"
+#include "sc_pieces.h"
 #include "sc_plate.h"
 #include "sc_watch.h"
 #include "sc_wire.h"
@@ -94,6 +95,7 @@ typedef struct {
                                   measured; everything else here is of corrected signs */
     sc_watch_config watch;
     sc_plate_config plate;
+    sc_pieces_config pieces;   /* of a plate whose pose is known; none: a uniform sheet */
 } sc_servo_config;
 
 typedef struct {
@@ -106,7 +108,7 @@ typedef struct {
 } sc_reference;
 
 /* The supervisor's orders. `order` and `sheet` count up: a new number engages the mode again, or
- * puts the crack at `crack`. `heartbeat` has to change within supervisor_ms. */
+ * puts the crack at `crack` (those of pieces at their near edges). `heartbeat` has to change within supervisor_ms. */
 typedef struct {
     uint32_t mode;
     uint32_t order;
@@ -136,7 +138,8 @@ typedef struct {
     sc_motion motion;
     sc_watch watch;
     float aim_opening, aim_rate, aim_advance; /* of the reference at the last state */
-    sc_crack crack;
+    sc_crack crack; /* with pieces, where that of the shown one stands */
+    sc_pieces pieces;
     sc_plate plate;
     sc_control control;
     sc_ledger ledger; /* delivered in every mode; the rest while rendering */
@@ -230,7 +233,8 @@ void sc_servo_stop(sc_servo *servo, uint32_t reason);
  * stops. The first reason stands. */
 void sc_servo_end(sc_servo *servo, uint32_t reason);
 
-/* 1 if every limit and gain is a finite number >= 0 and the mode of the orders exists. */
+/* 1 if every limit and gain is a finite number >= 0, and there are no pieces on a plate whose pose is
+ * estimated. */
 int sc_servo_config_is_sound(const sc_servo_config *config);
 
 #endif

@@ -46,6 +46,12 @@ int sc_servo_step_model(const sc_servo_config *config, const sc_model *model, sc
     if (config->plate.is_estimated) {
         return step_on_plate(config, model, servo, share);
     }
+    if (config->pieces.count > 0) {
+        sc_pieces_step(&config->pieces, model, &servo->pieces, motion->opening,
+                       motion->opening_rate, motion->advance, &servo->step);
+        servo->crack = servo->pieces.of[servo->pieces.shown].crack;
+        return 1;
+    }
     sc_model_step(model, &servo->crack, motion->opening, motion->opening_rate, motion->advance,
                   &servo->step);
     return 1;

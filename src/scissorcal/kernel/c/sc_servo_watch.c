@@ -57,6 +57,7 @@ void sc_servo_obey(const sc_orders *orders, sc_servo *servo)
         servo->sheet = orders->sheet;
         servo->crack.crack = isfinite(orders->crack) ? orders->crack : 0.0f;
         servo->crack.detached = 0;
+        servo->pieces.begun = 0;
     }
 }
 

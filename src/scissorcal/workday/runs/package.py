@@ -46,6 +46,7 @@ def build_workspace_package(
     import numpy as np
 
     from scissorcal.package import build_package, check_package, open_package, put_review
+    from scissorcal.recipe.plate_layers import plate_pieces
     from scissorcal.workday.runs.simplest import store_scene_choice, workspace_scene_choice
 
     if not engine.needed("package build"):
@@ -79,6 +80,7 @@ def build_workspace_package(
         np.random.default_rng(seed),
         review=review,
         plate=fits["plate"],
+        drawn=plate_pieces(engine.recipe, engine.workspace.root),
         inputs_hash=engine.identity("package build"),
         allow_failed=allow_failed,
     )

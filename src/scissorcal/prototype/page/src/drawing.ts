@@ -43,8 +43,8 @@ export class Drawing {
     const { width, height } = this.fit();
     const colours = coloursOf(this.canvas);
     const length = view.scene.blade_length_m;
-    this.scale = width / (1.75 * length);
-    this.origin = [0.36 * width, 0.5 * (height - STRIP_px)];
+    this.scale = width / (2.1 * length);
+    this.origin = [0.29 * width, 0.5 * (height - STRIP_px)];
     const context = this.context;
     context.clearRect(0, 0, width, height);
     this.sheet(view, colours, width);

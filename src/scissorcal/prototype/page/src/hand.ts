@@ -47,6 +47,20 @@ function materialStiffness(scene: Scene, law: Law): number {
   return (stiffest * far * far) / scene.moving_blades;
 }
 
+/** One stroke from where the blades are: close, and open again. */
+export function oneStroke(scene: Scene, from: Pose): Script {
+  const [closed, open] = scene.opening_rad;
+  const speed = Math.min(0.6, scene.opening_rate_rad_per_s[1]);
+  const [down, up] = [Math.max(from.opening - closed, 0) / speed, (open - closed) / speed];
+  return (time) => {
+    if (time >= down + up) return null;
+    const opening = time < down
+      ? closed + (from.opening - closed) * eased(1 - time / down)
+      : closed + (open - closed) * eased((time - down) / up);
+    return { opening, advance: from.advance };
+  };
+}
+
 /** Strokes as a lab makes them: close, open, move on by what was cut, over and over. */
 export function madeHand(scene: Scene, strokes = 3): Script {
   const [closed, open] = scene.opening_rad;
@@ -59,9 +73,8 @@ export function madeHand(scene: Scene, strokes = 3): Script {
     if (number >= strokes) return null;
     const within = time - number * (2 * half + 0.3);
     const share = within < half ? within / half : Math.max(0, 2 - within / half);
-    const smooth = 0.5 - 0.5 * Math.cos(Math.PI * Math.min(share, 1));
     const moving = Math.min(Math.max((within - 2 * half) / 0.3, 0), 1);
-    return { opening: open - (open - closed) * smooth, advance: -near - 0.2 * (far - near) + step * (number + moving) };
+    return { opening: open - (open - closed) * eased(Math.min(share, 1)), advance: -near - 0.2 * (far - near) + step * (number + moving) };
   };
 }
 
@@ -79,4 +92,9 @@ export function recordedHand(hand: Hand): Script {
       advance: advance[i] + share * (advance[i + 1] - advance[i]),
     };
   };
+}
+
+/** From 0 to 1, beginning and ending at rest. */
+function eased(share: number): number {
+  return 0.5 - 0.5 * Math.cos(Math.PI * share);
 }

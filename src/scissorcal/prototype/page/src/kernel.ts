@@ -1,5 +1,7 @@
 // The C core as WebAssembly (scissorcal/kernel/web/sc_web.c): one instance holds one model.
 
+import { Piece } from "./pieces";
+
 export const TABLE_NAMES = [
   "edge", "response", "friction_opening", "friction_closing", "friction_angle",
 ] as const;
@@ -47,6 +49,10 @@ interface Exports {
   sc_web_outputs(): number;
   sc_web_steps(count: number): void;
   sc_web_settled(count: number): void;
+  sc_web_pieces_clear(): void;
+  sc_web_piece_begin(begin: number, upperFace: number, scale: number): number;
+  sc_web_piece_strip(end: number, energy: number): number;
+  sc_web_piece_crack(which: number): number;
 }
 
 export class Kernel {
@@ -78,6 +84,20 @@ export class Kernel {
       });
     });
     return this.c.sc_web_make(...numbers) === 1;
+  }
+
+  /** Cut these pieces from now on, null: the uniform sheet; false, and the sheet, where one is not sound. */
+  cut(pieces: readonly Piece[] | null): boolean {
+    this.c.sc_web_pieces_clear();
+    const isSound = (pieces ?? []).every((piece) => this.c.sc_web_piece_begin(piece.begin_m, piece.upper_face_m, piece.scale)
+      && piece.strips.every((strip) => this.c.sc_web_piece_strip(strip.end_m, strip.fracture_energy_J_per_m)));
+    if (!isSound) this.c.sc_web_pieces_clear();
+    return isSound;
+  }
+
+  /** Crack tip of each of so many pieces, m. */
+  cracks(count: number): number[] {
+    return Array.from({ length: count }, (_, i) => this.c.sc_web_piece_crack(i));
   }
 
   reset(crack = 0): void {

@@ -1,8 +1,9 @@
 // The rig on the page: two laws (as fitted, what if) stepped by one hand at the loop's rate.
 
-import { Kernel, Step } from "./kernel";
+import { AT, Kernel, Step } from "./kernel";
 import { Coupling, Pose, Script } from "./hand";
 import { Law } from "./law";
+import { Piece } from "./pieces";
 import { Scene } from "./scene";
 
 export type Which = "fitted" | "whatIf";
@@ -21,13 +22,15 @@ export interface Sample {
   opening: number;
   torque: number;
   force: number;
-  other: number;
+  friction: number;
 }
 
 const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
 const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
 const TURN_rad = 0.004;
+const STILL_rad_per_s = 1e-4;
+const MOST_SAMPLES = 4000; // of one stroke: 16 s
 
 export class Rig {
   readonly kernels: Record<Which, Kernel>;
@@ -36,20 +39,24 @@ export class Rig {
   rate = 0;
   time = 0;
   active: Which = "fitted";
+  /** Of the law that the hand feels, and of the one beside it on the same motion. */
   step: Step;
+  beside: Step | null = null;
   energy: Energy = none();
-  /** Samples of the last seconds, and of the present stroke. */
+  /** Samples of the last seconds, and of the last closing stroke. */
   recent: Sample[] = [];
   stroke: Sample[] = [];
   strokeContact: number;
   sound: Record<Which, boolean> = { fitted: false, whatIf: false };
   /** Energy that cracks released since it was read last, for sound and rumble. */
   released = 0;
+  pieces: readonly Piece[] | null = null;
   private script: Script | null = null;
   private scriptBegan = 0;
   private tick = 0;
   private left = 0;
   private closing = false;
+  private storedBefore = 0;
   private turnedAt: number;
   private coupling: Coupling | null = null;
 
@@ -61,13 +68,33 @@ export class Rig {
     this.step = { ...NOTHING };
   }
 
+  /** Take a law, its crack where it was; the energies begin anew where it is the one that is felt. */
   load(which: Which, law: Law, largestTorque: number): boolean {
-    const crack = this.kernels[which].crack;
-    const isSound = this.kernels[which].load(law.tables, law.numbers);
-    this.kernels[which].reset(crack);
+    const kernel = this.kernels[which];
+    const crack = kernel.crack;
+    const isSound = kernel.load(law.tables, law.numbers) && kernel.cut(this.scaled(law));
+    kernel.reset(crack);
     this.sound[which] = isSound;
-    if (which === this.active && isSound) this.coupling = new Coupling(this.scene, law, largestTorque);
+    if (which === this.active && isSound) {
+      this.coupling = new Coupling(this.scene, law, largestTorque);
+      this.rest();
+    }
     return isSound;
+  }
+
+  /** Cut a plate of pieces, null: the uniform sheet. The laws have to be loaded again. */
+  cut(pieces: readonly Piece[] | null): void {
+    this.pieces = pieces;
+  }
+
+  /** The pieces under a law whose fracture energy is not the fitted one: in the same ratio to it. */
+  private scaled(law: Law): Piece[] | null {
+    const fitted = this.scene.numbers[AT.fractureEnergy];
+    const share = fitted > 0 ? law.numbers[AT.fractureEnergy] / fitted : 1;
+    return this.pieces && this.pieces.map((piece) => ({
+      ...piece,
+      strips: piece.strips.map((strip) => ({ ...strip, fracture_energy_J_per_m: share * strip.fracture_energy_J_per_m })),
+    }));
   }
 
   freshSheet(): void {
@@ -75,16 +102,35 @@ export class Rig {
     this.kernels.fitted.reset();
     this.kernels.whatIf.reset();
     this.pose = this.wanted = startOf(this.scene);
-    this.rate = 0;
-    this.energy = none();
     this.recent = [];
+    this.rest();
     this.beginStroke();
   }
 
+  /** Let a hand move the blades from now on; null gives them back to the pointer. */
   play(script: Script | null): void {
-    this.freshSheet();
     this.script = script;
     this.scriptBegan = this.time;
+    this.wanted = this.pose;
+  }
+
+  /** Whether nothing moves: the blades are where the hand wants them. */
+  get isStill(): boolean {
+    const { pose, wanted } = this;
+    return !this.script && Math.abs(this.rate) < STILL_rad_per_s
+      && Math.abs(wanted.advance - pose.advance) < 1e-6;
+  }
+
+  get isClosing(): boolean {
+    return this.closing;
+  }
+
+  /** Farthest place to which the active law has cut, m. */
+  get crackMost(): number {
+    const kernel = this.kernels[this.active];
+    if (!this.pieces) return kernel.crack;
+    const cracks = kernel.cracks(this.pieces.length).filter((at, i) => at > this.pieces![i].begin_m + 1e-6); // float32
+    return Math.max(0, ...cracks);
   }
 
   get plays(): boolean {
@@ -116,28 +162,36 @@ export class Rig {
     this.rate = (next.opening - last.opening) / dt;
     this.pose = next;
     const other = this.active === "fitted" ? "whatIf" : "fitted";
-    const beside = this.sound[other]
-      ? this.kernels[other].step(next.opening, this.rate, next.advance).torque : NaN;
+    const before = this.step;
+    this.beside = this.sound[other] ? this.kernels[other].step(next.opening, this.rate, next.advance) : null;
     this.step = this.kernels[this.active].step(next.opening, this.rate, next.advance);
-    this.account(last, next);
-    if (this.tick++ % EVERY === 0) this.keep(beside);
+    this.account(last, next, before);
+    if (this.tick++ % EVERY === 0) this.keep();
   }
 
-  private account(last: Pose, next: Pose): void {
+  /** Stand still where the blades are, with books that begin at 0. */
+  private rest(): void {
+    this.rate = 0;
+    this.energy = none();
+    this.step = this.kernels[this.active].step(this.pose.opening, 0, this.pose.advance);
+    this.storedBefore = this.step.stored_J;
+  }
+
+  private account(last: Pose, next: Pose, before: Step): void {
     const [turned, moved] = [next.opening - last.opening, next.advance - last.advance];
     const { step, energy } = this;
-    energy.hand -= step.torque * turned + step.force * moved;
-    energy.friction -= step.friction_torque * turned;
+    energy.hand -= 0.5 * (step.torque + before.torque) * turned + 0.5 * (step.force + before.force) * moved;
+    energy.friction -= 0.5 * (step.friction_torque + before.friction_torque) * turned;
     energy.fracture += step.fracture_J;
     energy.arrest += step.arrest_J;
-    energy.stored = step.stored_J;
+    energy.stored = step.stored_J - this.storedBefore;
     this.released += step.fracture_J + step.arrest_J;
   }
 
-  private keep(beside: number): void {
+  private keep(): void {
     const sample = {
-      time: this.time, opening: this.pose.opening, torque: this.step.torque,
-      force: this.step.force, other: beside,
+      time: this.time, opening: this.pose.opening, torque: this.step.torque, force: this.step.force,
+      friction: this.step.friction_torque,
     };
     const way = this.closing ? 1 : -1;
     if (way * (this.pose.opening - this.turnedAt) < 0) this.turnedAt = this.pose.opening;
@@ -146,7 +200,7 @@ export class Rig {
       this.turnedAt = this.pose.opening;
       if (this.closing) this.beginStroke();
     }
-    this.stroke.push(sample);
+    if (this.closing && this.stroke.length < MOST_SAMPLES) this.stroke.push(sample);
     this.recent.push(sample);
     while (this.recent[0].time < this.time - KEPT_s) this.recent.shift();
   }

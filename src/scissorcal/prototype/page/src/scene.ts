@@ -1,5 +1,7 @@
 // What the page is told (scissorcal/prototype/scene.py), with its arrays decoded.
 
+import { Piece } from "./pieces";
+
 export interface Packed {
   shape: number[];
   base64: string;
@@ -14,6 +16,8 @@ export interface Rows {
 
 export interface Slider {
   name: string;
+  /** Its place among the values of a draw. */
+  column: number;
   meaning: string;
   unit: string;
   scale: number;
@@ -27,6 +31,8 @@ export interface Slider {
 
 export interface Band {
   rate: number;
+  /** With friction; else of the material alone, as measured strokes are. */
+  friction: boolean;
   opening: Packed;
   contact: Packed;
   low: Packed;
@@ -48,12 +54,18 @@ export interface Hand {
   advance: Packed;
 }
 
+export interface PlatePose {
+  position_m: [number, number, number];
+  rotation_vector_rad: [number, number, number];
+}
+
 export interface Scene {
   format: string;
   name: string;
   made_utc: string;
   version: string;
   warnings: string[];
+  notes: string[];
   bound_Nm: number;
   torque_limit_Nm: number;
   opening_rad: [number, number];
@@ -74,6 +86,12 @@ export interface Scene {
   bands: Band[];
   strokes: Stroke[];
   hands: Hand[];
+  /** The plate along the cut; null where it is a uniform sheet. */
+  pieces: Piece[] | null;
+  /** Text of the recipe that the package was built from, where it is known. */
+  recipe?: string | null;
+  /** Where the plate stands in the frame of the pivot, where a pose is known. */
+  plate_pose?: PlatePose | null;
 }
 
 const FORMAT = "scissorcal-prototype/1";

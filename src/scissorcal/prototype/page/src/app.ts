@@ -1,0 +1,193 @@
+// The parts of the page together: what each frame does, and what follows from a change.
+
+import { Curves, TimeChart, TorqueChart } from "./charts";
+import { Controls } from "./controls";
+import { mountDesign } from "./design";
+import { Drawing } from "./drawing";
+import { html, refilled } from "./elements";
+import { madeHand, oneStroke, recordedHand } from "./hand";
+import { KEYS, takeInput } from "./input";
+import { asFitted, Average, inPart, Law, ofDraw, whatIf } from "./law";
+import { Drawn, Piece } from "./pieces";
+import { Readout } from "./readout";
+import { Rig } from "./rig";
+import { RigPanel } from "./rig_panel";
+import { Ripple } from "./ripple";
+import { Scene } from "./scene";
+import { Server } from "./socket";
+import { View, View3d } from "./view3d";
+
+const CHARTS_EVERY_ms = 50;
+
+export class App {
+  readonly rig: Rig;
+  readonly average: Average;
+  readonly controls: Controls;
+  /** Frames drawn, and seconds since the first: frames per second. */
+  readonly frames = { count: 0, seconds: 0 };
+  laws: { fitted: Law; whatIf: Law };
+  private readonly fitted: Law;
+  private readonly drawing: Drawing;
+  private readonly torque: TorqueChart;
+  private readonly time: TimeChart;
+  private readonly readout: Readout;
+  private readonly ripple = new Ripple();
+  private readonly panel: RigPanel | null;
+  private readonly solid = html("div", { class: "solid", hidden: true });
+  private view3d: View3d | null = null;
+  private drawn: Drawn | null = null;
+  private chartedAt = 0;
+  private before = 0;
+
+  constructor(page: HTMLElement, readonly scene: Scene, module: WebAssembly.Module, server: Server | null) {
+    this.rig = new Rig(scene, module);
+    this.rig.cut(scene.pieces);
+    this.average = new Average(module);
+    this.fitted = asFitted(scene);
+    this.laws = { fitted: this.fitted, whatIf: this.fitted };
+    const canvas = html("canvas", {
+      class: "plain", tabindex: 0, role: "application",
+      "aria-label": "Scissors and sheet from the side. Arrow keys move the blades, Space makes a stroke; the numbers stand in Now.",
+    });
+    const [torque, time, now, law, design, rig] = ["torque", "time", "now", "law", "design", "rig"].map((name) => html("section", { class: name }));
+    refilled(page, this.header(),
+      html("main", {},
+        html("section", { class: "stage" }, this.actions(), canvas, this.solid, keyHelp()),
+        torque, now, time, law, server ? rig : null,
+        html("details", { class: "designer", toggle: (event) => this.openDesign(event.target as HTMLDetailsElement, design) }, html("summary", {}, "Draw plates and blades"), design)),
+      html("footer", { class: "note" }, `${scene.name}, page made ${scene.made_utc} by scissorcal ${scene.version}. Tables within ${(1e3 * scene.bound_Nm).toPrecision(2)} mN m of the fitted law.`));
+    this.drawing = new Drawing(canvas);
+    torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)));
+    time.append(html("h2", {}, "The last 8 seconds"));
+    this.torque = new TorqueChart(torque, scene);
+    this.time = new TimeChart(time);
+    this.readout = new Readout(now, scene);
+    this.controls = new Controls(law, scene, () => this.changed());
+    this.panel = server ? new RigPanel(rig, server) : null;
+    takeInput(this.drawing, this.rig, scene, { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() });
+    this.changed();
+    this.rig.freshSheet();
+  }
+
+  run(): void {
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Torque (N m) of the average law: what open_package(...).torque gives at these places. */
+  torqueAt(openings: number[], rate: number, contact: number): number[] {
+    this.average.load(inPart(this.laws.fitted, this.controls.choices.parts));
+    return Array.from(this.average.torque(Float32Array.from(openings), rate, contact));
+  }
+
+  private frame(now: number): void {
+    const seconds = this.before ? (now - this.before) / 1e3 : 0;
+    this.before = now;
+    this.frames.count += seconds ? 1 : 0;
+    this.frames.seconds += seconds;
+    const { rig } = this;
+    rig.pass(seconds);
+    this.ripple.released(rig.released);
+    rig.released = 0;
+    this.draw();
+    this.readout.show(rig, now);
+    if (now - this.chartedAt >= CHARTS_EVERY_ms) {
+      this.chartedAt = now;
+      this.torque.draw(rig);
+      this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
+    }
+    this.run();
+  }
+
+  private draw(): void {
+    const { rig, scene } = this;
+    const followed = this.panel?.pose ?? null;
+    const law = this.laws[rig.active];
+    const kernel = rig.kernels[rig.active];
+    const view: View = {
+      scene, law, step: rig.step, crack: rig.crackMost, pose: followed ?? rig.pose, wanted: followed ?? rig.wanted,
+      pieces: rig.pieces, cracks: rig.pieces && kernel.cracks(rig.pieces.length), drawn: this.drawn,
+    };
+    if (this.view3d && !this.solid.hidden) this.view3d.draw(view);
+    else this.drawing.draw(view);
+  }
+
+  /** A choice of the law changed: load both laws, and draw their curves. */
+  private changed(): void {
+    const { choices } = this.controls;
+    const other = choices.draw === null
+      ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
+    this.laws = { fitted: this.fitted, whatIf: other };
+    this.rig.active = choices.active;
+    const largest = this.scene.torque_limit_Nm;
+    const isMoved = choices.values.size > 0 || choices.draw !== null;
+    this.rig.load("whatIf", inPart(other, choices.parts), largest);
+    this.rig.load("fitted", inPart(this.fitted, choices.parts), largest);
+    const material = { ...choices.parts, friction: false };
+    const curve = (law: Law): Float32Array | null => {
+      const rate = -Math.max(this.scene.opening_rate_rad_per_s[0], 1e-3);
+      const isSound = this.average.load(inPart(law, material));
+      return isSound ? this.average.torque(this.torque.openings, rate, this.rig.strokeContact) : null;
+    };
+    const moved = isMoved ? curve(other) : null;
+    const curves: Curves = {
+      fitted: curve(this.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
+    };
+    this.torque.show(curves);
+  }
+
+  private stroke(): void {
+    this.rig.play(oneStroke(this.scene, this.rig.pose));
+  }
+
+  private header(): HTMLElement {
+    const { scene } = this;
+    return html("header", {},
+      html("h1", {}, scene.name),
+      ...scene.warnings.map((sentence) => html("p", { class: "warning" }, sentence)),
+      ...scene.notes.map((sentence) => html("p", { class: "note" }, sentence)),
+      html("p", { class: "note" }, "Blue: the fitted model. Grey: measured. The page computes with the C core that renders on the rig."));
+  }
+
+  private actions(): HTMLElement {
+    const button = (label: string, click: () => void): HTMLElement => html("button", { type: "button", click }, label);
+    const box = (label: string, changed: (isOn: boolean) => void): HTMLElement =>
+      html("label", {}, html("input", { type: "checkbox", change: (event) => changed((event.target as HTMLInputElement).checked) }), label);
+    return html("div", { class: "row actions", role: "toolbar", "aria-label": "Hands and views" },
+      button("One stroke", () => this.stroke()),
+      button("Strokes", () => this.play(madeHand(this.scene))),
+      ...this.scene.hands.map((hand) => button(`Hand of ${hand.name}`, () => this.play(recordedHand(hand)))),
+      button("Fresh sheet", () => this.rig.freshSheet()),
+      box("3-D", (isOn) => this.show3d(isOn)), box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
+  }
+
+  private play(script: Parameters<Rig["play"]>[0]): void {
+    this.rig.freshSheet();
+    this.rig.play(script);
+  }
+
+  private show3d(isOn: boolean): void {
+    this.solid.hidden = !isOn;
+    this.drawing.canvas.hidden = isOn;
+    if (isOn) this.view3d ??= new View3d(this.solid);
+  }
+
+  private openDesign(details: HTMLDetailsElement, section: HTMLElement): void {
+    if (!details.open || section.childElementCount) return;
+    mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
+      this.drawn = applied?.drawn ?? null;
+      this.rig.cut(pieces ?? this.scene.pieces);
+      this.changed();
+      this.rig.freshSheet();
+    });
+  }
+}
+
+function torqueNote(scene: Scene): string {
+  const measured = scene.strokes.length ? "grey lines are measured closing strokes with friction taken off" : "this package brings no measured strokes";
+  return `Shaded: the model's 90 % interval at the contact where the stroke began; ${measured}. The curves leave out the rig's friction, and of a drawn plate they show the uniform sheet.`;
+}
+
+function keyHelp(): HTMLElement {
+  return html("details", { class: "keys" }, html("summary", {}, "Mouse, touch and keys"),
+    html("dl", {}, ...KEYS.flatMap(([key, what]) => [html("dt", {}, key), html("dd", {}, what)])));
+}

@@ -1,0 +1,140 @@
+// What a person changes: parts of the law, parameters, draws of the posterior, hands.
+
+import { html, numberField, refilled } from "./elements";
+import { Parts } from "./law";
+import { Which } from "./rig";
+import { Scene, Slider, unpack } from "./scene";
+
+export interface Choices {
+  parts: Parts;
+  active: Which;
+  /** Values of moved sliders, SI. */
+  values: Map<string, number>;
+  draw: number | null;
+}
+
+const STEPS = 400;
+const PARTS: [keyof Parts, string][] = [["response", "response"], ["fracture", "fracture"], ["friction", "friction"]];
+
+/** The controls of the law; `changed` is called after each change of the choices. */
+export class Controls {
+  readonly choices: Choices = {
+    parts: { response: true, fracture: true, friction: true }, active: "fitted", values: new Map(), draw: null,
+  };
+  private readonly felt = html("div", { class: "row", role: "radiogroup", "aria-label": "Law that the hand feels" });
+  private readonly sliders = html("div", { class: "sliders" });
+  private readonly draws = html("div", { class: "row" });
+  private playing = 0;
+
+  constructor(container: HTMLElement, private readonly scene: Scene, private readonly changed: () => void) {
+    container.append(
+      html("h2", {}, "Law"), this.felt,
+      html("div", { class: "row", role: "group", "aria-label": "Parts of the law" }, ...PARTS.map(([name, label]) => this.part(name, label))),
+      this.draws,
+      html("h3", {}, "What if"),
+      html("p", { class: "note" }, "A slider spans at least half to twice the fitted value. The bar is the posterior's 5 to 95 %; the tick is the fitted value."),
+      this.sliders,
+    );
+    if (!scene.numbers.length) return;
+    this.refill();
+  }
+
+  /** Swap the law that is felt: as fitted, or what if. */
+  swap(): void {
+    this.choices.active = this.choices.active === "fitted" ? "whatIf" : "fitted";
+    this.refill();
+    this.changed();
+  }
+
+  reset(): void {
+    this.choices.values.clear();
+    this.choices.draw = null;
+    this.choices.active = "fitted";
+    this.refill();
+    this.changed();
+  }
+
+  private refill(): void {
+    const { choices } = this;
+    const radio = (which: Which, label: string): HTMLElement => html("label", {}, html("input", {
+      type: "radio", name: "felt", checked: choices.active === which, "data-key": which,
+      change: () => {
+        choices.active = which;
+        this.refill();
+        this.changed();
+      },
+    }), label);
+    refilled(this.felt, "felt: ", radio("fitted", "as fitted"), radio("whatIf", "what if"),
+      html("button", { type: "button", click: () => this.reset(), "data-key": "reset" }, "Reset what if"));
+    this.fillDraws();
+    refilled(this.sliders, ...this.scene.sliders.map((slider) => this.slider(slider)));
+  }
+
+  private part(name: keyof Parts, label: string): HTMLElement {
+    return html("label", {}, html("input", {
+      type: "checkbox", checked: true, "data-part": name,
+      change: (event) => {
+        this.choices.parts[name] = (event.target as HTMLInputElement).checked;
+        this.changed();
+      },
+    }), label);
+  }
+
+  private fillDraws(): void {
+    const count = this.scene.draws ? this.scene.draws.values.shape[0] : 0;
+    if (!count) return;
+    const { choices } = this;
+    const chosen = (draw: number | null): void => {
+      choices.draw = draw;
+      choices.values.clear();
+      if (draw !== null) {
+        const values = unpack(this.scene.draws!.values);
+        const columns = this.scene.draws!.values.shape[1];
+        for (const slider of this.scene.sliders) choices.values.set(slider.name, values[draw * columns + slider.column]);
+      }
+      this.refill();
+      this.changed();
+    };
+    const next = (): void => chosen(choices.draw === null ? 0 : (choices.draw + 1) % count);
+    const play = (): void => {
+      window.clearInterval(this.playing);
+      this.playing = this.playing ? 0 : window.setInterval(next, 600);
+      this.fillDraws();
+    };
+    refilled(this.draws,
+      numberField(`posterior draw (1 to ${count})`, (choices.draw ?? 0) + 1, { key: "draw", least: 1, most: count }, (value) => chosen(Math.round(value) - 1)),
+      html("button", { type: "button", click: next, "data-key": "next" }, "Next draw"),
+      html("button", { type: "button", click: play, "data-key": "play", "aria-pressed": String(this.playing !== 0) }, this.playing ? "Stop" : "Play draws"));
+  }
+
+  private slider(slider: Slider): HTMLElement {
+    const nodes = unpack(slider.nodes);
+    const [low, high] = [nodes[0], nodes[nodes.length - 1]];
+    const value = this.choices.values.get(slider.name) ?? slider.value;
+    const share = (at: number): number => Math.min(Math.max((at - low) / (high - low), 0), 1);
+    const [scale, unit] = slider.unit === "m" ? [1e3, "mm"] : [slider.scale, slider.unit === "1" ? "" : slider.unit];
+    const shown = (at: number): string => `${(scale * at).toPrecision(4)} ${unit}`.trim();
+    const output = html("output", {}, shown(value));
+    const input = html("input", {
+      type: "range", min: 0, max: STEPS, step: "any", "aria-label": slider.meaning || slider.name,
+      "aria-valuetext": shown(value), "data-slider": slider.name, "data-key": slider.name,
+      input: () => {
+        const wanted = low + (Number(input.value) / STEPS) * (high - low);
+        this.choices.values.set(slider.name, wanted);
+        this.choices.draw = null;
+        output.textContent = shown(wanted);
+        input.setAttribute("aria-valuetext", shown(wanted));
+        this.changed();
+      },
+    });
+    input.value = String(STEPS * share(value));
+    const range = html("span", { class: "range", "aria-hidden": "true" }, html("span", { class: "interval" }), html("span", { class: "tick" }));
+    const [interval, tick] = range.children as unknown as HTMLElement[];
+    interval.style.left = `${100 * share(slider.q05)}%`;
+    interval.style.width = `${Math.max(100 * (share(slider.q95) - share(slider.q05)), 0.7)}%`;
+    tick.style.left = `${100 * share(slider.value)}%`;
+    return html("div", { class: "slider" },
+      html("span", { class: "name" }, slider.meaning || slider.name), output, input, range,
+      html("span", { class: "note" }, `${slider.name}: fitted ${shown(slider.value)}, 5 to 95 % ${shown(slider.q05)} to ${shown(slider.q95)}`));
+  }
+}

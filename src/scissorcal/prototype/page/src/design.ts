@@ -1,0 +1,205 @@
+// The designer: a person draws plates and blades, and cuts them at once on the page.
+
+import { edgeOfTable } from "./blade_edge";
+import { DesignCanvas, Tool } from "./design_canvas";
+import { openDrawing, savedFile } from "./design_files";
+import { Design, Kind, plainSheet } from "./design_state";
+import { calibratedText, cornerTable, edgePanel, layerList, pieceTable } from "./design_tables";
+import { html, refilled } from "./elements";
+import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
+import { calibratedOf, recipeText } from "./recipe_text";
+import { Scene, unpack } from "./scene";
+import { svgOf } from "./svg_file";
+
+const PULL = "Pull it out on the drawing, or press Enter there.";
+const TOOLS: [Tool, string, string][] = [
+  ["move", "Move", ""], ["polygon", "Polygon", "Click the corners; a double click or Enter closes it."],
+  ["rectangle", "Rectangle", PULL], ["circle", "Circle", PULL],
+];
+const KINDS: [Kind, string][] = [
+  ["outline", "a plate or layer"], ["hole", "a hole in the chosen layer"],
+  ["region", "a tougher or weaker part of it"], ["edge", "the edge of the blades"],
+];
+
+/** Also told: the drawing and the blade's edge, for pictures and tables. */
+export interface Applied {
+  drawn: Drawn;
+  edge: Edge | null;
+}
+
+type Apply = (pieces: Piece[] | null, applied: Applied | null) => void;
+
+/**
+ * Put the designer into a container. `apply` gets the pieces at each change, null for the sheet as
+ * it was calibrated; its second argument is what they were made of.
+ */
+export function mountDesign(container: HTMLElement, scene: Scene, apply: Apply): void {
+  new Designer(container, scene, apply);
+}
+
+class Designer {
+  private readonly calibrated: Calibrated;
+  private readonly fitted: Edge;
+  private readonly design: Design;
+  private readonly canvas: DesignCanvas;
+  private readonly status = html("p", { class: "design-status", role: "status" });
+  private readonly side = html("div", { class: "design-side" });
+  private readonly tools = html("div", { class: "row", role: "toolbar", "aria-label": "Tools of the drawing" });
+  private readonly cuts = html("input", { type: "checkbox", change: () => this.told() });
+  /** The recipe that the drawing goes into. */
+  private base: string | null;
+  private pieces: Piece[] | null = null;
+  private refusal = "";
+  private timer = 0;
+
+  constructor(container: HTMLElement, private readonly scene: Scene, private readonly apply: Apply) {
+    this.calibrated = calibratedOf(scene);
+    this.fitted = fittedEdge(scene);
+    this.base = scene.recipe ?? null;
+    this.design = new Design(plainSheet(this.calibrated, scene.blade_length_m), (isDone) => this.changed(isDone));
+    const paper = html("div", { class: "design-paper" });
+    const say = (sentence: string): void => this.say(sentence);
+    this.canvas = new DesignCanvas(paper, this.design, this.calibrated, say);
+    container.classList.add("design");
+    container.addEventListener("keydown", (event) => undoKeys(event, this.design));
+    container.replaceChildren(
+      html("p", {}, `Plates from above; thickness and toughness are compared with what was calibrated (${calibratedText(this.calibrated)}).`),
+      html("div", { class: "row" }, html("label", { class: "field" }, "The next shape is ", this.kinds()), this.tools),
+      this.files(), this.status, html("div", { class: "design-both" }, paper, this.side),
+    );
+    this.canvas.fit();
+    this.meet();
+    this.tables();
+  }
+
+  private say(sentence: string): void {
+    this.status.textContent = sentence;
+  }
+
+  /** The drawing changed, or what is chosen of it. */
+  private changed(isDone: boolean): void {
+    this.canvas.redraw();
+    if (!isDone && this.canvas.isDragging) return;
+    this.meet();
+    this.refresh();
+    if (!isDone) return;
+    this.cuts.checked = true;
+    this.told();
+  }
+
+  private told(): void {
+    if (!this.cuts.checked) this.apply(null, null);
+    else if (this.pieces) this.apply(this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge });
+  }
+
+  /** What the blades meet of the drawing, or why the kernel does not take it. */
+  private meet(): void {
+    this.pieces = null;
+    this.refusal = "";
+    try {
+      this.pieces = piecesOf(this.design.drawn, this.calibrated);
+    } catch (error) {
+      this.refusal = (error as Error).message;
+    }
+  }
+
+  /** Show the tables anew once the focus has moved on, so that it stays where it went. */
+  private refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.tables());
+  }
+
+  private tables(): void {
+    const { design } = this;
+    refilled(this.side,
+      layerList(design), pieceTable(this.pieces, this.refusal),
+      cornerTable(design, (sentence) => this.say(sentence)), edgePanel(design, this.fitted));
+    this.buttons();
+  }
+
+  private buttons(): void {
+    const { canvas, design } = this;
+    const button = (key: string, text: string, click: () => void, more: Record<string, string | boolean> = {}): HTMLElement =>
+      html("button", { type: "button", "data-key": key, click, ...more }, text);
+    refilled(this.tools,
+      ...TOOLS.map(([tool, text, sentence]) => button(tool, text, () => {
+        canvas.choose(tool);
+        this.buttons();
+        this.say(sentence);
+      }, { "aria-pressed": String(canvas.tool === tool) })),
+      button("undo", "Undo", () => design.undo(), { disabled: !design.canUndo }),
+      button("redo", "Redo", () => design.redo(), { disabled: !design.canRedo }),
+      button("in", "+", () => canvas.zoom(1.25), { "aria-label": "Zoom in" }),
+      button("out", "−", () => canvas.zoom(0.8), { "aria-label": "Zoom out" }),
+      button("fit", "Show all", () => canvas.fit()));
+  }
+
+  private kinds(): HTMLElement {
+    const select = html("select", { change: () => (this.canvas.draws = select.value as Kind) },
+      ...KINDS.map(([kind, text]) => html("option", { value: kind }, text)));
+    return select;
+  }
+
+  private files(): HTMLElement {
+    const file = html("input", {
+      type: "file", accept: ".svg,.toml,image/svg+xml", "aria-label": "Load an SVG outline or a recipe",
+      change: () => {
+        const chosen = file.files?.[0];
+        if (chosen) void this.load(chosen).finally(() => (file.value = ""));
+      },
+    });
+    const { design, scene } = this;
+    const saves = (name: string, type: string, text: () => string): HTMLElement =>
+      html("button", { type: "button", click: () => this.tried(() => {
+        savedFile(name, type, text());
+        this.say(`${name} is saved.`);
+      }) }, `Save ${name}`);
+    return html("div", { class: "row" },
+      html("label", { class: "button" }, "Load SVG or recipe ", file),
+      saves("recipe.toml", "application/toml", () => recipeText(design.drawn, scene, this.base)),
+      saves("drawing.svg", "image/svg+xml", () => svgOf(design.drawn)),
+      html("label", { class: "field" }, this.cuts, " cut this drawing instead of the plain sheet"));
+  }
+
+  private async load(chosen: File): Promise<void> {
+    const text = await chosen.text();
+    this.tried(() => {
+      const { design, canvas } = this;
+      const found = openDrawing(chosen.name, text, design.drawn, {
+        kind: canvas.draws, layer: design.part.layer, thickness_mm: 1e3 * this.calibrated.thickness_m,
+      });
+      this.base = found.base ?? this.base;
+      design.part = found.part;
+      design.corner = null;
+      design.replace(found.drawn);
+      canvas.fit();
+      this.say(found.sentence);
+    });
+  }
+
+  /** Do what may be refused, and say why where it is. */
+  private tried(action: () => void): void {
+    try {
+      action();
+    } catch (error) {
+      this.say((error as Error).message);
+    }
+  }
+}
+
+/** Control and Z, Y or Shift and Z, except in a field, which has its own. */
+function undoKeys(event: KeyboardEvent, design: Design): void {
+  const key = event.key.toLowerCase();
+  if (!(event.ctrlKey || event.metaKey) || (key !== "z" && key !== "y")) return;
+  if (event.target instanceof HTMLInputElement && event.target.type !== "checkbox") return;
+  event.preventDefault();
+  if (key === "y" || event.shiftKey) design.redo();
+  else design.undo();
+}
+
+function fittedEdge(scene: Scene): Edge {
+  const numbers = unpack(scene.tables.edge);
+  const size = numbers.length / 3;
+  const [x, y, slope] = [0, 1, 2].map((row) => numbers.slice(row * size, (row + 1) * size));
+  return edgeOfTable({ x, y, slope }, scene.blade_length_m);
+}

@@ -1,0 +1,77 @@
+// Numbers beside the pictures, for everybody and for screen readers.
+
+import { html, refilled } from "./elements";
+import { FLAG } from "./kernel";
+import { Rig } from "./rig";
+import { Scene } from "./scene";
+
+const SAID_EVERY_ms = 2000;
+const SHOWN_EVERY_ms = 100;
+
+const DEG = 180 / Math.PI;
+
+/** The state in numbers: shown ten times a second, told to screen readers every two seconds. */
+export class Readout {
+  private readonly state = html("dl", { class: "numbers" });
+  private readonly energy = html("dl", { class: "numbers" });
+  private readonly said = html("p", { class: "said", "aria-live": "polite" });
+  private shownAt = 0;
+  private saidAt = 0;
+  private before = "";
+
+  constructor(container: HTMLElement, private readonly scene: Scene) {
+    container.append(
+      html("h2", {}, "Now"), this.state, html("h3", {}, "Energy since the fresh sheet, mJ"), this.energy,
+      html("p", { class: "note" }, "Work of the hand = stored + fracture + arrest + friction, up to the error of steps of a tick."), this.said);
+  }
+
+  show(rig: Rig, now: number): void {
+    if (now - this.shownAt < SHOWN_EVERY_ms) return;
+    this.shownAt = now;
+    const { step, energy, scene } = { step: rig.step, energy: rig.energy, scene: this.scene };
+    const cut_mm = 1e3 * rig.crackMost;
+    const rows: [string, string, string][] = [
+      ["torque", (1e3 * step.torque).toFixed(1), "mN m"],
+      ["of it friction", (1e3 * step.friction_torque).toFixed(1), "mN m"],
+      ["what if, the same motion", rig.beside ? (1e3 * rig.beside.torque).toFixed(1) : "–", "mN m"],
+      ["handle force", (step.torque / scene.handle_radius_m).toFixed(2), "N"],
+      ["force along the cut", step.force.toFixed(2), "N"],
+      ["opening", (DEG * rig.pose.opening).toFixed(1), "°"],
+      ["opening rate", rig.rate.toFixed(2), "rad/s"],
+      ["advance", (1e3 * rig.pose.advance).toFixed(1), "mm"],
+      ["contact", (1e3 * step.contact).toFixed(1), "mm"],
+      ["indentation", (1e3 * Math.max(step.indentation, 0)).toFixed(3), "mm"],
+      ["crack", cut_mm.toFixed(1), "mm"],
+    ];
+    list(this.state, rows);
+    const error = energy.hand - energy.stored - energy.fracture - energy.arrest - energy.friction;
+    list(this.energy, (["hand", "stored", "fracture", "arrest", "friction"] as const)
+      .map((name): [string, string, string] => [name === "hand" ? "work of the hand" : name, (1e3 * energy[name]).toFixed(2), "mJ"])
+      .concat([["error", (1e3 * error).toFixed(2), "mJ"]]));
+    this.say(rig, cut_mm, now);
+  }
+
+  private say(rig: Rig, cut_mm: number, now: number): void {
+    if (now - this.saidAt < SAID_EVERY_ms) return;
+    const flags = rig.step.flags;
+    const beyond = flags & FLAG.outOfRange ? "Outside the range of the package. " : "";
+    const text = `${beyond}Torque ${(1e3 * rig.step.torque).toFixed(0)} millinewton metres, opening ${(DEG * rig.pose.opening).toFixed(0)} degrees, crack at ${cut_mm.toFixed(0)} mm.`;
+    if (text === this.before) return;
+    this.saidAt = now;
+    this.before = text;
+    refilled(this.said, text);
+  }
+}
+
+/** Fill a list of named numbers; elements stay where they are, so that reading is not interrupted. */
+function list(into: HTMLElement, rows: [string, string, string][]): void {
+  rows.forEach(([name, value, unit], i) => {
+    let entry = into.children[i] as HTMLElement | undefined;
+    if (!entry) {
+      entry = html("div", { "data-number": name }, html("dt", {}, name), html("dd", {}));
+      into.append(entry);
+    }
+    const text = `${value} ${unit}`;
+    if (entry.lastChild!.textContent !== text) entry.lastChild!.textContent = text;
+  });
+}

@@ -1,0 +1,279 @@
+// A drawing as tables of a recipe: [[plate.layers]] and [rig.edge] in recipe.toml, and back.
+
+import { parse, TomlTableWithoutBigInt } from "smol-toml";
+import { AT } from "./kernel";
+import { edgeOfTable } from "./blade_edge";
+import { areaOf, Outline, Point } from "./outline";
+import { Calibrated, Drawn, Edge, Layer, layerName, Region } from "./pieces";
+import { Scene, unpack } from "./scene";
+
+const MOST_CHARACTERS = 1_000_000;
+const POINTS_OF_A_LINE = 8;
+// What scissorcal.recipe.plate_layers takes.
+const MOST_CORNERS = 2000;
+const MOST_OF_OUTLINE = 1000;
+const MOST_PARTS = 64;
+const SMALLEST_AREA_mm2 = 1e-4;
+
+type Toml = TomlTableWithoutBigInt;
+
+/** What was calibrated, as the pieces of a drawing are compared with it. */
+export function calibratedOf(scene: Scene): Calibrated {
+  return {
+    thickness_m: scene.upper_face_m * scene.moving_blades,
+    fracture_energy_J_per_m: scene.numbers[AT.fractureEnergy],
+    moving_blades: scene.moving_blades,
+  };
+}
+
+/**
+ * A recipe with the drawing in it.
+ *
+ * All else stays as it stands in `base`, comments too; without one the recipe is made from what the
+ * page knows of the scene. Raises Error where the base is a recipe in which nothing can be replaced.
+ */
+export function recipeText(drawn: Drawn, scene: Scene, base: string | null): string {
+  refuseUnfit(drawn);
+  let text = base ?? recipeOf(scene, drawn.edge);
+  if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge));
+  text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
+  const known = parsed(text);
+  const plate = (known.plate ?? {}) as Toml;
+  const line = drawn.layers.length ? drawn.cut_line_mm : 0;
+  if (line !== Number(plate.cut_line_mm ?? 0)) text = withCutLine(text, line);
+  const layers = drawn.layers.map(layerText).join("\n");
+  const whole = layers ? `${text.trimEnd()}\n\n${layers}` : text;
+  if (known.plate && (known.plate as Toml).layers !== undefined) {
+    throw new Error("This recipe has its plate on one line (inline tables), which cannot be replaced: write [plate] and [[plate.layers]].");
+  }
+  drawnFromRecipe(whole); // what is saved can be loaded
+  return whole;
+}
+
+/** The drawing of a recipe; an Error with a sentence where it is none, or has outlines in files. */
+export function drawnFromRecipe(text: string): Drawn {
+  if (text.length > MOST_CHARACTERS) throw new Error("This recipe is larger than 1 MB.");
+  const recipe = parsed(text);
+  const plate = table(recipe.plate ?? {}, "plate");
+  const layers = list(plate.layers ?? [], "plate.layers").map((one, i) => layerOf(one, `plate.layers[${i + 1}]`));
+  const edge = (recipe.rig as Toml | undefined)?.edge;
+  return {
+    cut_line_mm: numberOf(plate.cut_line_mm ?? 0, "plate.cut_line_mm"),
+    layers,
+    edge: edge === undefined ? null : edgeOf(table(edge, "rig.edge")),
+    edge_points: [],
+  };
+}
+
+function refuseUnfit({ layers }: Drawn): void {
+  const outlines = layers.flatMap((layer) => [layer.outline, ...layer.holes, ...layer.regions.map((region) => region.outline)]);
+  const count = outlines.reduce((sum, outline) => sum + outline.length, 0);
+  if (count > MOST_CORNERS || outlines.some((outline) => outline.length > MOST_OF_OUTLINE)) {
+    throw new Error(
+      `A recipe holds ${MOST_CORNERS} corners, ${MOST_OF_OUTLINE} of one outline, and this drawing has ${count}: save drawing.svg and name its `
+      + 'shapes in the recipe, with outline = "drawing.svg" and id = "layer-1".');
+  }
+  if (outlines.some((outline) => Math.abs(areaOf(outline)) < SMALLEST_AREA_mm2)) {
+    throw new Error("An outline of this drawing encloses no area, which no recipe takes: remove it or give it one.");
+  }
+  if (layers.some((layer) => layer.holes.length > MOST_PARTS || layer.regions.length > MOST_PARTS)) {
+    throw new Error(`A layer of a recipe has up to ${MOST_PARTS} holes and ${MOST_PARTS} parts: draw fewer.`);
+  }
+}
+
+function layerText(layer: Layer): string {
+  return [
+    "[[plate.layers]]",
+    `name = ${quoted(layer.name)}`,
+    `thickness_mm = ${shown(layer.thickness_mm)}`,
+    `toughness_ratio = ${shown(layer.toughness_ratio)}`,
+    `outline_mm = ${pointsText(layer.outline)}`,
+    ...(layer.holes.length ? [`holes_mm = [\n${layer.holes.map((hole) => `${pointsText(hole)},`).join("\n")}\n]`] : []),
+    ...layer.regions.map((region) => [
+      "[[plate.layers.regions]]",
+      `toughness_ratio = ${shown(region.toughness_ratio)}`,
+      `outline_mm = ${pointsText(region.outline)}`,
+    ].join("\n")),
+    "",
+  ].join("\n");
+}
+
+function edgeText(edge: Edge): string {
+  return [
+    "[rig.edge]",
+    `family = ${quoted(edge.family)}`,
+    `offset_mm = ${shown(edge.offset_mm)}`,
+    `taper_deg = ${shown(edge.taper_deg)}`,
+    ...(edge.family === "arc" ? [`curvature_per_m = ${shown(edge.curvature_per_m)}`] : []),
+    `length_mm = ${shown(edge.length_mm)}`,
+    "",
+  ].join("\n");
+}
+
+/** A recipe of the page's scene: what plan asks for, all else by default. */
+function recipeOf(scene: Scene, edge: Edge | null): string {
+  const { thickness_m, fracture_energy_J_per_m } = calibratedOf(scene);
+  const [x, y, slope] = [0, 1, 2].map((row) => {
+    const numbers = unpack(scene.tables.edge);
+    const size = numbers.length / 3;
+    return numbers.slice(row * size, (row + 1) * size);
+  });
+  const range = (values: readonly number[], factor: number): string => `[${values.map((value) => shown(factor * value)).join(", ")}]`;
+  const toughness = Math.max(fracture_energy_J_per_m, 1e-6) / thickness_m;
+  const name = (scene.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "") || "scene").slice(0, 54);
+  return `# Drawn on the page of ${oneLine(scene.name)}. Units stand in the names.
+
+format = "scissorcal-recipe/1"
+name = ${quoted(`${name}-drawn`)}
+description = ${quoted(`Plate drawn on the page of ${oneLine(scene.name)}.`)}
+
+[rig]
+moving = ${quoted(scene.moving_blades === 2 ? "both" : "upper")}
+handle_radius_mm = ${shown(1e3 * scene.handle_radius_m)}
+
+${edgeText(edge ?? edgeOfTable({ x, y, slope }, scene.blade_length_m))}
+[material]                         # what is calibrated; layers are stated against it
+name = ${quoted(oneLine(scene.name))}
+thickness_mm = ${shown(1e3 * thickness_m)}
+
+[scene]
+opening_deg = ${range(scene.opening_rad, 180 / Math.PI)}
+opening_rate_rad_per_s = ${range(scene.opening_rate_rad_per_s, 1)}
+contact_mm = ${range(scene.contact_m, 1e3)}
+loop_rate_Hz = ${shown(scene.loop_rate_Hz)}
+
+[limits]
+torque_Nm = ${shown(scene.torque_limit_Nm)}
+
+[fit.cut]
+toughness_J_per_m2 = { median = ${Number(toughness.toPrecision(3))}, factor_90 = 10 }
+`;
+}
+
+/** Text in which the lines of a table are others; appended where there is no such table. */
+function withTable(text: string, name: string, lines: string): string {
+  const mark = "\u0000";
+  let isFirst = true;
+  const marked = withoutTables(text, (one) => one === name, () => {
+    const put = isFirst ? mark : "";
+    isFirst = false;
+    return put;
+  });
+  return isFirst ? `${text.trimEnd()}\n\n${lines}` : marked.replace(mark, () => lines);
+}
+
+function withCutLine(text: string, cut_line_mm: number): string {
+  const line = `cut_line_mm = ${shown(cut_line_mm)}`;
+  const lines = text.split("\n").filter((one) => !/^\s*cut_line_mm\s*=/.test(one));
+  const at = lines.findIndex((one) => /^\s*\[\s*plate\s*\]/.test(one));
+  if (at >= 0) lines.splice(at + 1, 0, line);
+  else lines.push("", "[plate]", line);
+  return lines.join("\n");
+}
+
+/** Text without the tables that a test picks by name; comments right above their headers go too. */
+function withoutTables(text: string, picks: (name: string) => boolean, put: () => string = () => ""): string {
+  const kept: string[] = [];
+  let isOut = false;
+  for (const line of text.split("\n")) {
+    const header = /^\s*\[\[?\s*([A-Za-z0-9_."' -]+?)\s*\]\]?\s*(#.*)?$/.exec(line);
+    if (header) {
+      isOut = picks(header[1].replace(/["'\s]/g, ""));
+      if (isOut) {
+        const instead = put();
+        if (instead) kept.push(instead);
+      }
+    }
+    if (!isOut) kept.push(line);
+  }
+  return kept.join("\n");
+}
+
+function parsed(text: string): Toml {
+  try {
+    return parse(text) as Toml;
+  } catch (error) {
+    throw new Error(`This is no recipe: ${(error as Error).message.split("\n")[0]}`);
+  }
+}
+
+function layerOf(value: unknown, place: string): Layer {
+  const layer = table(value, place);
+  if (layer.outline !== undefined) {
+    throw new Error(`${place} takes its outline from the file ${String(layer.outline)}: load that SVG file instead.`);
+  }
+  return {
+    name: layerName(String(layer.name ?? ""), [], "plate"),
+    thickness_mm: positive(layer.thickness_mm, `${place}.thickness_mm`),
+    toughness_ratio: positive(layer.toughness_ratio ?? 1, `${place}.toughness_ratio`),
+    outline: outlineOf(layer.outline_mm, `${place}.outline_mm`),
+    holes: list(layer.holes_mm ?? [], `${place}.holes_mm`).map((one) => outlineOf(one, `${place}.holes_mm`)),
+    regions: list(layer.regions ?? [], `${place}.regions`).map((one, i): Region => {
+      const region = table(one, `${place}.regions[${i + 1}]`);
+      return {
+        toughness_ratio: positive(region.toughness_ratio, `${place}.regions[${i + 1}].toughness_ratio`),
+        outline: outlineOf(region.outline_mm, `${place}.regions[${i + 1}].outline_mm`),
+      };
+    }),
+  };
+}
+
+function edgeOf(edge: Toml): Edge {
+  return {
+    family: edge.family === "arc" ? "arc" : "line",
+    offset_mm: numberOf(edge.offset_mm, "rig.edge.offset_mm"),
+    taper_deg: numberOf(edge.taper_deg, "rig.edge.taper_deg"),
+    curvature_per_m: numberOf(edge.curvature_per_m ?? 0, "rig.edge.curvature_per_m"),
+    length_mm: positive(edge.length_mm, "rig.edge.length_mm"),
+  };
+}
+
+function outlineOf(value: unknown, place: string): Outline {
+  const points = list(value, place).map((one): Point => {
+    const pair = list(one, place);
+    if (pair.length !== 2) throw new Error(`${place} has a point that is not [x, y].`);
+    return [numberOf(pair[0], place), numberOf(pair[1], place)];
+  });
+  if (points.length < 3) throw new Error(`${place} needs three points or more.`);
+  return points;
+}
+
+function table(value: unknown, place: string): Toml {
+  if (typeof value !== "object" || value === null || Array.isArray(value)) throw new Error(`${place} must be a table.`);
+  return value as Toml;
+}
+
+function list(value: unknown, place: string): unknown[] {
+  if (!Array.isArray(value)) throw new Error(`${place} must be a list.`);
+  return value;
+}
+
+function numberOf(value: unknown, place: string): number {
+  if (typeof value !== "number" || !Number.isFinite(value)) throw new Error(`${place} must be a number.`);
+  return value;
+}
+
+function positive(value: unknown, place: string): number {
+  const number = numberOf(value, place);
+  if (number <= 0) throw new Error(`${place} must be above 0.`);
+  return number;
+}
+
+function pointsText(outline: Outline): string {
+  const points = outline.map(([x, y]) => `[${shown(x)}, ${shown(y)}]`);
+  const lines: string[] = [];
+  for (let i = 0; i < points.length; i += POINTS_OF_A_LINE) lines.push(points.slice(i, i + POINTS_OF_A_LINE).join(", "));
+  return lines.length === 1 ? `[${lines[0]}]` : `[\n  ${lines.join(",\n  ")},\n]`;
+}
+
+function shown(value: number): string {
+  return String(Number(value.toFixed(6)) + 0);
+}
+
+function quoted(text: string): string {
+  return JSON.stringify(text).replaceAll("\u007f", "\\u007f");
+}
+
+function oneLine(text: string): string {
+  return text.replace(/[\u0000-\u001f\u007f\u0085\u2028\u2029]+/g, " ");
+}

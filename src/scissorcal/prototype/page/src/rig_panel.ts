@@ -1,0 +1,58 @@
+// A running rig: its state, what a person confirms, and its samples.
+
+import { html, refilled } from "./elements";
+import { connect, Line, Recent, RigState, Server } from "./socket";
+
+/** The section of a rig; only served pages have one. */
+export class RigPanel {
+  readonly recent = new Recent();
+  private readonly line: Line;
+  private readonly state = html("p", { class: "rig-state", role: "status" }, "Connecting.");
+  private readonly following = html("p", { class: "note" });
+  private readonly buttons = html("div", { class: "row" });
+  private readonly refusal = html("p", { class: "warning", role: "alert" });
+  private armed = "";
+
+  constructor(container: HTMLElement, server: Server) {
+    container.append(html("h2", {}, "Rig"), this.state, this.following, this.buttons, this.refusal,
+      html("p", { class: "note" }, "Stop here is a convenience, not an emergency stop: keep the rig's own at hand."));
+    this.line = connect(server, {
+      connected: (isConnected) => {
+        if (isConnected) return;
+        this.state.textContent = "The server cannot be reached; trying again.";
+        refilled(this.buttons);
+      },
+      state: (state) => this.show(state),
+      samples: (samples) => this.recent.add(samples),
+      refused: (sentence) => (this.refusal.textContent = sentence),
+    });
+  }
+
+  /** The newest state of the rig's blades, null where nothing is followed. */
+  get pose(): { opening: number; advance: number } | null {
+    const { opening_rad: opening, advance_m: advance } = this.recent.columns;
+    const last = opening.length - 1;
+    return last < 0 ? null : { opening: opening[last], advance: advance[last] };
+  }
+
+  private show(state: RigState): void {
+    this.refusal.textContent = "";
+    const what = state.command ? `${state.command}: ` : "";
+    const code = state.code === null ? "" : ` (exit code ${state.code})`;
+    this.state.textContent = `${what}${state.state}. ${state.sentence}${code}`;
+    this.following.textContent = state.following;
+    const { request } = state;
+    const button = (label: string, click: () => void, kind = ""): HTMLElement => html("button", { type: "button", class: kind, click }, label);
+    const arm = (command: string): HTMLElement => button(`Arm ${command}`, () => {
+      this.armed = command;
+      this.line.arm(command);
+    });
+    const confirm = request === null ? [] : [
+      html("p", { class: "request" }, request),
+      button(`That is done: start ${state.command ?? this.armed}`, () => this.line.start(state.command ?? this.armed), "primary"),
+    ];
+    refilled(this.buttons, ...confirm,
+      ...(state.state === "idle" && request === null ? state.commands.map(arm) : []),
+      state.state === "idle" && request === null ? null : button("Stop", () => this.line.stop(), "stop"));
+  }
+}

@@ -1,0 +1,138 @@
+// The page's line to its server: what the rig does, and the few words that a page may say.
+
+/** What the document says of its server; an offline page has none. */
+export interface Server {
+  socket: string;
+}
+
+export interface RigState {
+  kind: "state";
+  state: "idle" | "running" | "ending";
+  command: string | null;
+  /** How it goes, or how it ended. */
+  sentence: string;
+  code: number | null;
+  /** What a person has to confirm before anything moves; null: nothing. */
+  request: string | null;
+  /** Which recording is followed, or how it ended. */
+  following: string;
+  /** What may be started; none without a rig. */
+  commands: string[];
+}
+
+/** Newest last; time is the rig's, from the beginning of the recording. */
+export interface RigSamples {
+  kind: "samples";
+  time_s: number[];
+  opening_rad: number[];
+  advance_m: number[];
+  torque_Nm: number[];
+  force_N: number[];
+  /** Samples that were left out before these, because the page or the disk was too slow. */
+  lost: number;
+  /** Of a tracked plate: quaternion (w, x, y, z), then its place (m). */
+  pose: number[] | null;
+  recording: string;
+}
+
+export interface Handlers {
+  connected(isConnected: boolean): void;
+  state(state: RigState): void;
+  samples(samples: RigSamples): void;
+  refused(sentence: string): void;
+}
+
+export interface Line {
+  /** Ask what has to be confirmed before a command is started. */
+  arm(command: string): void;
+  /** Start what was armed; or confirm what a running command asks for. */
+  start(command: string): void;
+  stop(): void;
+  close(): void;
+}
+
+const SOONEST_ms = 300;
+const LATEST_ms = 5000;
+const COLUMNS = ["time_s", "opening_rad", "advance_m", "torque_Nm", "force_N"] as const;
+const MOST_ROWS = 1000; // of a message; the server sends 250 at most
+
+/** Opens the line and keeps it: where it breaks it is opened again, later and later. */
+export function connect(server: Server, handlers: Handlers): Line {
+  let socket: WebSocket | null = null;
+  let wait = SOONEST_ms;
+  let timer = 0;
+  let isOver = false;
+
+  function open(): void {
+    const own = new WebSocket(`ws://${location.host}${server.socket}`);
+    socket = own;
+    own.onopen = () => {
+      wait = SOONEST_ms;
+      handlers.connected(true);
+    };
+    own.onmessage = (event) => hear(event.data, handlers);
+    own.onclose = () => {
+      if (socket !== own) return;
+      socket = null;
+      handlers.connected(false);
+      if (!isOver) timer = window.setTimeout(open, wait);
+      wait = Math.min(2 * wait, LATEST_ms);
+    };
+  }
+
+  function say(message: { do: string; command?: string }): void {
+    if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+    else handlers.refused("The server cannot be reached.");
+  }
+
+  open();
+  return {
+    arm: (command) => say({ do: "arm", command }),
+    start: (command) => say({ do: "start", command }),
+    stop: () => say({ do: "stop" }),
+    close: () => {
+      isOver = true;
+      window.clearTimeout(timer);
+      socket?.close();
+    },
+  };
+}
+
+function hear(text: unknown, handlers: Handlers): void {
+  if (typeof text !== "string") return;
+  const message = JSON.parse(text) as RigState | RigSamples | { kind: "refused"; sentence: string };
+  if (message.kind === "state") handlers.state(message);
+  else if (message.kind === "refused") handlers.refused(message.sentence);
+  else if (message.kind === "samples" && isWhole(message)) handlers.samples(message);
+}
+
+function isWhole(samples: RigSamples): boolean {
+  const count = samples.time_s.length;
+  return count <= MOST_ROWS && COLUMNS.every((name) => samples[name].length === count);
+}
+
+/** The last seconds of a rig: columns that never grow beyond what is kept. */
+export class Recent {
+  readonly columns: Record<(typeof COLUMNS)[number], number[]> = {
+    time_s: [], opening_rad: [], advance_m: [], torque_Nm: [], force_N: [],
+  };
+  recording = "";
+  lost = 0;
+
+  constructor(readonly kept_s = 10) {}
+
+  /** Add samples; another recording, or a clock that went back, begins anew. */
+  add(samples: RigSamples): void {
+    const { time_s } = this.columns;
+    const isNew = samples.recording !== this.recording
+      || (samples.time_s.length > 0 && samples.time_s[0] < (time_s[time_s.length - 1] ?? 0));
+    if (isNew) for (const name of COLUMNS) this.columns[name].length = 0;
+    if (isNew) this.lost = 0;
+    this.recording = samples.recording;
+    this.lost += samples.lost;
+    for (const name of COLUMNS) this.columns[name].push(...samples[name]);
+    const newest = time_s[time_s.length - 1] ?? 0;
+    const old = time_s.findIndex((time) => time >= newest - this.kept_s);
+    if (old > 0) for (const name of COLUMNS) this.columns[name].splice(0, old);
+  }
+}

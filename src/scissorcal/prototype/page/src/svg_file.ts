@@ -1,0 +1,254 @@
+// SVG files: outlines out of one, and a drawing as one that can be read back.
+
+import { SVGPathData } from "svg-pathdata";
+import { flattened, nested, Outline, Point } from "./outline";
+import { withEdge } from "./design_state";
+import { Drawn, Layer, layerName } from "./pieces";
+
+const MOST_CHARACTERS = 2_000_000;
+const MOST_SHAPES = 400;
+const MOST_POINTS = 4000; // of one outline, and never more than 20,000 of a file
+const MOST_POINTS_OF_FILE = 20_000;
+const FLAT_mm = 0.02;
+const PIXEL_mm = 25.4 / 96;
+/** By SVGLength's numbers: none, px, cm, mm, in, pt, pc. */
+const UNITS_mm: Record<number, number | undefined> = {
+  1: PIXEL_mm, 5: PIXEL_mm, 6: 10, 7: 1, 8: 25.4, 9: 25.4 / 72, 10: 25.4 / 6,
+};
+
+const NAMESPACE = "http://www.w3.org/2000/svg";
+const DRAWN = new Set(["path", "rect", "circle", "ellipse", "polygon", "polyline"]);
+const KINDS = new Set(["cut", "edge", "outline", "hole", "region"]);
+/** What these hold is not itself in the picture. */
+const NOT_SHOWN = "defs, symbol, clipPath, mask, pattern, marker, metadata, foreignObject";
+
+/** One element's outlines in mm, y up; `marks` are its data- attributes and those of its group. */
+export interface Shape {
+  outlines: Outline[];
+  id: string;
+  marks: Record<string, string>;
+}
+
+/**
+ * The shapes of an SVG file: paths, rectangles, circles, ellipses, polygons and polylines.
+ *
+ * Curves become points within 0.02 mm. Nothing of the file is shown or run: scripts, styles, texts,
+ * pictures and references are passed over. Places are from the upper left corner of the page, y up
+ * and so below 0; units are those of the width and the viewBox, a pixel (1/96 inch) where it states
+ * none. Raises Error with a sentence.
+ */
+export function readSvg(text: string): Shape[] {
+  if (text.length > MOST_CHARACTERS) throw new Error("This SVG file is larger than 2 MB: simplify it first.");
+  if (/<!ENTITY/i.test(text)) throw new Error("This SVG file defines entities, which are not read.");
+  const page = new DOMParser().parseFromString(text, "image/svg+xml");
+  const root = page.documentElement;
+  if (page.querySelector("parsererror") || root.namespaceURI !== NAMESPACE || root.localName !== "svg") {
+    throw new Error("This is no SVG file: it does not parse as one.");
+  }
+  const svg = root as unknown as SVGSVGElement;
+  const [unit, box] = [unitOf(svg), svg.viewBox.baseVal];
+  const corner: Point = box ? [box.x, box.y] : [0, 0];
+  const found: Shape[] = [];
+  let points = 0;
+  for (const element of root.querySelectorAll<SVGGeometryElement>("*")) {
+    if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN)) continue;
+    if (found.length === MOST_SHAPES) throw new Error(`This SVG file has more than ${MOST_SHAPES} shapes.`);
+    const outlines = outlinesOf(element, unit, corner).filter((outline) => outline.length >= 2);
+    points += outlines.reduce((sum, one) => sum + one.length, 0);
+    if (points > MOST_POINTS_OF_FILE || outlines.some((one) => one.length > MOST_POINTS)) {
+      throw new Error(`This SVG file has an outline of more than ${MOST_POINTS} points, or ${MOST_POINTS_OF_FILE} in all.`);
+    }
+    if (outlines.flat(2).some((value) => !(Math.abs(value) < 1e5))) {
+      throw new Error("This SVG file has a place that is no number, or 100 m away.");
+    }
+    if (outlines.length) found.push({ outlines, id: element.id, marks: marksOf(element) });
+  }
+  if (!found.length) throw new Error("This SVG file has no path, rectangle, circle, ellipse, polygon or polyline.");
+  return found;
+}
+
+/** The drawing that a file holds: one of ours as it was, any other as one layer for each plate. */
+export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOurs: boolean } {
+  const shapes = readSvg(text);
+  const drawn: Drawn & { isOurs: boolean } = { cut_line_mm: 0, layers: [], edge: null, edge_points: [], isOurs: false };
+  const ours = shapes.filter((shape) => KINDS.has(shape.marks.kind));
+  if (!ours.length) {
+    const plates = nested(shapes.flatMap((shape) => shape.outlines).filter((outline) => outline.length >= 3));
+    plates.forEach((plate, i) => drawn.layers.push({
+      name: layerName(nameOf(shapes, plate.outline), drawn.layers.map((one) => one.name), `plate ${i + 1}`),
+      thickness_mm, toughness_ratio: 1, ...plate, regions: [],
+    }));
+    if (!drawn.layers.length) drawn.edge_points = shapes[0].outlines[0];
+    return drawn;
+  }
+  drawn.isOurs = true;
+  const cut = ours.find((shape) => shape.marks.kind === "cut");
+  const begin = cut?.outlines[0][0] ?? [0, 0];
+  drawn.cut_line_mm = Number(cut?.marks.y) || 0;
+  const settle = (outline: Outline): Outline =>
+    outline.map(([x, y]): Point => [round(x - begin[0]), round(y - begin[1] + drawn.cut_line_mm)]);
+  for (const { outlines: found, marks } of ours) {
+    const { kind, layer, ratio, thickness } = marks;
+    const outlines = found.map(settle);
+    if (kind === "edge") Object.assign(drawn, withEdge(drawn, outlines[0], marks.family === "arc" ? "arc" : "line"));
+    if (kind === "outline") {
+      drawn.layers.push({
+        name: layerName(layer ?? "", drawn.layers.map((one) => one.name), "plate"), thickness_mm: positive(thickness, thickness_mm), toughness_ratio: positive(ratio, 1),
+        outline: outlines[0], holes: [], regions: [],
+      });
+    }
+    const last = drawn.layers[drawn.layers.length - 1];
+    if (kind === "hole" && last) last.holes.push(...outlines);
+    if (kind === "region" && last) {
+      last.regions.push(...outlines.map((outline) => ({ toughness_ratio: positive(ratio, 1), outline })));
+    }
+  }
+  return drawn;
+}
+
+/**
+ * A drawing as an SVG file in mm, which `drawnFromSvg` reads back; each outline has an id. Where no
+ * place is below x = 0, x counts from the left of the page. The cut's mark begins at x = 0.
+ */
+export function svgOf(drawn: Drawn): string {
+  const points = [...drawn.layers.flatMap((layer) => layer.outline), ...drawn.edge_points];
+  const xs = points.map(([x]) => x).concat(0);
+  const ys = points.map(([, y]) => -y).concat(-drawn.cut_line_mm);
+  const [left, top] = [Math.min(...xs), Math.min(...ys) - 2];
+  const [width, height] = [Math.max(...xs) + 2 - left, Math.max(...ys) + 2 - top];
+  const shape = (tag: string, outline: Outline, attributes: Record<string, string>): string => {
+    const named = Object.entries(attributes).map(([key, value]) => `${key}="${escaped(value)}"`).join(" ");
+    return `    <${tag} ${named} points="${outline.map(([x, y]) => `${number(x)},${number(-y)}`).join(" ")}"/>`;
+  };
+  const groups = drawn.layers.map((layer, i) => [
+    `  <g fill="none" stroke="black" stroke-width="0.3">`,
+    shape("polygon", layer.outline, {
+      id: `layer-${i + 1}`, "data-kind": "outline", "data-layer": layer.name,
+      "data-thickness": String(layer.thickness_mm), "data-ratio": String(layer.toughness_ratio),
+    }),
+    ...layer.holes.map((hole, k) => shape("polygon", hole, { id: `layer-${i + 1}-hole-${k + 1}`, "data-kind": "hole" })),
+    ...layer.regions.map((region, k) => shape("polygon", region.outline, {
+      id: `layer-${i + 1}-region-${k + 1}`, "data-kind": "region", "data-ratio": String(region.toughness_ratio),
+    })),
+    "  </g>",
+  ].join("\n"));
+  const cut: Outline = [[0, drawn.cut_line_mm], [left + width, drawn.cut_line_mm]];
+  const lines = [shape("polyline", cut, {
+    id: "cut", "data-kind": "cut", "data-y": String(drawn.cut_line_mm), stroke: "red", "stroke-width": "0.2",
+  })];
+  if (drawn.edge_points.length) {
+    lines.push(shape("polyline", drawn.edge_points, {
+      id: "edge", "data-kind": "edge", "data-family": drawn.edge?.family ?? "line", stroke: "blue", fill: "none", "stroke-width": "0.3",
+    }));
+  }
+  const box = [left, top, width, height].map(number);
+  return [
+    `<svg xmlns="${NAMESPACE}" width="${box[2]}mm" height="${box[3]}mm" viewBox="${box.join(" ")}">`,
+    ...groups, ...lines, "</svg>", "",
+  ].join("\n");
+}
+
+/** Millimetres of one user unit of the file. */
+function unitOf(root: SVGSVGElement): number {
+  const width = root.width.baseVal;
+  const box = root.viewBox.baseVal;
+  const unit = root.hasAttribute("width") ? UNITS_mm[width.unitType] : undefined;
+  if (!box || !box.width || unit === undefined || !(width.valueInSpecifiedUnits > 0)) return PIXEL_mm;
+  return (unit * width.valueInSpecifiedUnits) / box.width;
+}
+
+function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Point): Outline[] {
+  const found: Outline[] = [];
+  const matrix = placeOf(element);
+  const place = (x: number, y: number): Point => [
+    unit * (matrix.a * x + matrix.c * y + matrix.e - left), -unit * (matrix.b * x + matrix.d * y + matrix.f - top),
+  ];
+  let data: SVGPathData;
+  try {
+    data = new SVGPathData(pathOf(element)).toAbs().normalizeHVZ(false).normalizeST().aToC().qtToC();
+  } catch {
+    throw new Error(`This SVG file has a ${element.localName} that is not written as SVG asks${element.id ? ` (${element.id})` : ""}.`);
+  }
+  for (const command of data.commands) {
+    const own = found[found.length - 1];
+    if (command.type === SVGPathData.MOVE_TO) found.push([place(command.x, command.y)]);
+    else if (command.type === SVGPathData.LINE_TO) own.push(place(command.x, command.y));
+    else if (command.type === SVGPathData.CURVE_TO) {
+      own.push(...flattened(
+        own[own.length - 1], place(command.x1, command.y1), place(command.x2, command.y2), place(command.x, command.y), FLAT_mm,
+      ));
+    } else if (command.type === SVGPathData.CLOSE_PATH) found.push([own[0]]);
+  }
+  return found.map(settled);
+}
+
+/** To 0.1 um, without points that stand on the one before, nor the first one again at the end. */
+function settled(outline: Outline): Outline {
+  const points = outline.map(([x, y]): Point => [round(x), round(y)]);
+  const apart = (a: Point, b: Point): boolean => a[0] !== b[0] || a[1] !== b[1];
+  const kept = points.filter((point, i) => i === 0 || apart(point, points[i - 1]));
+  while (kept.length > 1 && !apart(kept[0], kept[kept.length - 1])) kept.pop();
+  return kept;
+}
+
+function round(value: number): number {
+  return Math.round(value * 1e4) / 1e4 + 0;
+}
+
+/** All transforms from the file's root down to an element. */
+function placeOf(element: SVGGraphicsElement): DOMMatrix {
+  let matrix = new DOMMatrix();
+  for (let at: Element | null = element; at; at = at.parentElement) {
+    const own = (at as SVGGraphicsElement).transform?.baseVal.consolidate()?.matrix;
+    if (own) matrix = new DOMMatrix([own.a, own.b, own.c, own.d, own.e, own.f]).multiply(matrix);
+  }
+  return matrix;
+}
+
+/** An element as the commands of a path. */
+function pathOf(element: SVGGeometryElement): string {
+  const length = (name: string): number => {
+    const animated = (element as unknown as Record<string, SVGAnimatedLength | undefined>)[name];
+    return animated ? animated.baseVal.value : 0;
+  };
+  if (element.localName === "path") return element.getAttribute("d") ?? "";
+  if (element.localName === "rect") {
+    const [x, y, w, h] = ["x", "y", "width", "height"].map(length);
+    const [rx0, ry0] = [length("rx"), length("ry")];
+    const [rx, ry] = [Math.min(rx0 || ry0, w / 2), Math.min(ry0 || rx0, h / 2)];
+    if (!(w > 0 && h > 0)) return "";
+    if (!rx || !ry) return `M${x} ${y}h${w}v${h}h${-w}z`;
+    const corner = (dx: number, dy: number): string => `a${rx} ${ry} 0 0 1 ${dx} ${dy}`;
+    return `M${x + rx} ${y}h${w - 2 * rx}${corner(rx, ry)}v${h - 2 * ry}${corner(-rx, ry)}h${2 * rx - w}${corner(-rx, -ry)}v${2 * ry - h}${corner(rx, -ry)}z`;
+  }
+  if (element.localName === "circle" || element.localName === "ellipse") {
+    const [cx, cy] = [length("cx"), length("cy")];
+    const [rx, ry] = element.localName === "circle" ? [length("r"), length("r")] : [length("rx"), length("ry")];
+    if (!(rx > 0 && ry > 0)) return "";
+    return `M${cx - rx} ${cy}a${rx} ${ry} 0 1 0 ${2 * rx} 0a${rx} ${ry} 0 1 0 ${-2 * rx} 0z`;
+  }
+  const points = [...(element as SVGPolygonElement).points].map(({ x, y }) => `${x} ${y}`);
+  return points.length ? `M${points.join("L")}${element.localName === "polygon" ? "z" : ""}` : "";
+}
+
+function marksOf(element: SVGElement): Record<string, string> {
+  return Object.fromEntries(Object.entries(element.dataset).map(([key, value]) => [key, value ?? ""]));
+}
+
+/** The id of the element that an outline is from. */
+function nameOf(shapes: Shape[], outline: Outline): Layer["name"] {
+  return shapes.find((shape) => shape.outlines.includes(outline))?.id ?? "";
+}
+
+function positive(text: string | undefined, otherwise: number): number {
+  const value = Number(text);
+  return value > 0 && Number.isFinite(value) ? value : otherwise;
+}
+
+function escaped(text: string): string {
+  return text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll('"', "&quot;").replace(/[\u0000-\u001f]/g, " ");
+}
+
+function number(value: number): string {
+  return String(Number(value.toFixed(4)) + 0);
+}

@@ -1,0 +1,228 @@
+"""Shapes of an SVG drawing as outlines in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scissorcal.foreign import parse_isolated, read_foreign
+from scissorcal.foreign.formats import DRAWING
+
+if TYPE_CHECKING:
+    from scissorcal.model.plate_pieces import Outline
+
+FLAT_MM = 0.01
+"""Curves become polygons that lie nowhere farther from them."""
+
+MOST_ELEMENTS = 5_000
+MOST_POINTS = 200_000
+DEEPEST = 32
+LARGEST_MM = 100_000.0
+
+SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
+_REFUSED = {
+    "script": "it has a script, which no drawing of a plate needs: save it as plain SVG",
+    "use": "it has clones (<use>): turn them into paths, such as with 'Unlink Clone'",
+    "foreignObject": "it has foreign objects: save it as plain SVG",
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Shapes of one file: by id, in the order of the file; shapes without id are "" alone."""
+
+    path: Path
+    shapes: tuple[tuple[str, Outline], ...]
+
+    def shape(self, name: str | None) -> Outline:
+        """The shape with this id, or the only one; ValueError, a sentence, where there is none."""
+        named = [one for one, _ in self.shapes if one]
+        listed = ", ".join(named[:20]) or "none has an id"
+        if name is None:
+            if len(self.shapes) != 1:
+                raise ValueError(
+                    f"{self.path} has {len(self.shapes)} shapes: say which is meant with id (there "
+                    f"are: {listed})"
+                )
+            return self.shapes[0][1]
+        found = [outline for one, outline in self.shapes if one == name]
+        if len(found) != 1:
+            count = "no" if not found else str(len(found))
+            raise ValueError(
+                f'{self.path} has {count} shapes with id "{name}" (there are: {listed})'
+            )
+        return found[0]
+
+
+def read_drawing(path: Path) -> Drawing:
+    """Read the shapes of an SVG file, by a child process with limits of memory and time.
+
+    Lengths come from the file's width and height, which need a unit, and its viewBox. Taken are
+    path, rect, circle, ellipse, polygon and polyline with their transforms; curves are flattened
+    to 0.01 mm, open contours closed. Text, pictures and styles are passed over. Raises InputError
+    where it is no such file, has a document type, script or clone, or refers to another file.
+    """
+    from scissorcal.model.plate_pieces import Outline
+
+    data = read_foreign(path, DRAWING)
+    answer = parse_isolated("scissorcal.recipe.drawing:parse_drawing", data, path, DRAWING)
+    shapes: dict[int, tuple[str, list[Any]]] = {}
+    for index, name, contour in answer:
+        shapes.setdefault(index, (name, []))[1].append(contour * 1e-3)
+    return Drawing(
+        path, tuple((name, Outline(tuple(contours))) for name, contours in shapes.values())
+    )
+
+
+def parse_drawing(data: bytes) -> list[list[Any]]:
+    """Contours of an SVG file's shapes: number of the shape, its id, corners (n, 2) in mm.
+
+    ValueError with the reason where the file is not taken; see :func:`read_drawing`.
+    """
+    import io
+
+    from svgelements import SVG, Length, Path, Shape
+
+    _refuse_unsafe(data)
+    millimetre = float(Length("1mm").value(ppi=96.0))  # in 1/96 inch, as svgelements rounds it
+    parsed = SVG.parse(io.BytesIO(data), reify=True, ppi=96.0)
+    found: list[list[Any]] = []
+    room = MOST_POINTS
+    shapes = [one for one in parsed.elements() if isinstance(one, Shape)]
+    for index, shape in enumerate(shapes):
+        if type(shape).__name__.lower() not in SHAPES:
+            continue
+        name = str(shape.id or "")
+        for part in Path(shape).as_subpaths():
+            corners = _flattened(Path(part), FLAT_MM * millimetre, room)
+            room -= len(corners)
+            contour = _closed(corners, millimetre)
+            if len(contour) >= 3:
+                found.append([index, name, contour])
+    if not found:
+        raise ValueError("it has no closed shape: draw path, rect, circle, ellipse or polygon")
+    return found
+
+
+def _refuse_unsafe(data: bytes) -> None:
+    """ValueError for what no drawing of a plate needs, before anything is made of it."""
+    from xml.parsers import expat
+
+    count = depth = 0
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        nonlocal count, depth
+        count, depth = count + 1, depth + 1
+        local = name.rpartition("}")[2].rpartition(":")[2]
+        if count > MOST_ELEMENTS or depth > DEEPEST:
+            raise ValueError(f"it has more than {MOST_ELEMENTS} elements, or {DEEPEST} levels")
+        if local in _REFUSED:
+            raise ValueError(_REFUSED[local])
+        if count == 1:
+            _refuse_unitless(local, attributes)
+        for key, value in attributes.items():
+            word = key.rpartition(":")[2].lower()
+            if word == "href" and not value.startswith(("#", "data:image/")):
+                raise ValueError(f"it refers to another file ({value[:60]}): embed or remove it")
+            if word.startswith("on"):
+                raise ValueError(f"it has a script ({key}): save it as plain SVG")
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("it has a document type or entities: save it as plain SVG")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"it is not well-formed XML: {error}") from None
+
+
+def _refuse_unitless(root: str, attributes: dict[str, str]) -> None:
+    if root != "svg":
+        raise ValueError(f"its root is <{root}>, not <svg>")
+    for key in ("width", "height"):
+        value = attributes.get(key, "").strip()
+        if not value.endswith(("mm", "cm", "in", "pt", "pc")):
+            raise ValueError(
+                f'its {key} is "{value[:40]}": state it with a unit, such as {key}="80mm", so that '
+                "lengths are known"
+            )
+
+
+def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
+    """Corners of one contour: ends of lines, and points of curves close enough together."""
+    from svgelements import Arc, CubicBezier, Line, QuadraticBezier
+
+    corners: list[Any] = []
+    for segment in path:
+        if segment.start is None or segment.end is None:
+            continue
+        steps = 1
+        if isinstance(segment, Arc):
+            steps = _arc_steps(segment, tolerance)
+        elif isinstance(segment, CubicBezier | QuadraticBezier):
+            steps = _bezier_steps(segment, tolerance)
+        elif not isinstance(segment, Line) and type(segment).__name__ not in ("Close", "Move"):
+            continue
+        if type(segment).__name__ == "Move":
+            continue
+        if len(corners) + steps > room:
+            raise ValueError(f"its curves need more than {MOST_POINTS} points: draw it simpler")
+        corners += [segment.start]
+        corners += [segment.point(step / steps) for step in range(1, steps)]
+        corners += [segment.end]
+    return corners
+
+
+def _arc_steps(arc: Any, tolerance: float) -> int:
+    """A chord over the angle a is r (1 - cos(a / 2)) off its arc."""
+    import math
+
+    radius = max(abs(arc.rx), abs(arc.ry))
+    if not radius > tolerance:
+        return 4
+    widest = 2.0 * math.acos(1.0 - tolerance / radius)
+    return max(4, _whole(abs(arc.sweep) / widest))
+
+
+def _bezier_steps(curve: Any, tolerance: float) -> int:
+    """A chord over a share h of a curve is at most h^2 / 8 of its largest second derivative off."""
+    import math
+
+    names = ("start", "control", "end") if hasattr(curve, "control") else None
+    points = [getattr(curve, n) for n in names or ("start", "control1", "control2", "end")]
+    degree = len(points) - 1
+    bends = (
+        abs(complex(a.x - 2 * b.x + c.x, a.y - 2 * b.y + c.y))
+        for a, b, c in zip(points, points[1:], points[2:], strict=False)
+    )
+    largest = degree * (degree - 1) * max(bends)
+    return max(1, _whole(math.sqrt(largest / (8.0 * tolerance))))
+
+
+def _whole(number: float) -> int:
+    import math
+
+    if not math.isfinite(number) or number > MOST_POINTS:
+        raise ValueError("it has numbers that are no places on a plate")
+    return math.ceil(number)
+
+
+def _closed(corners: list[Any], millimetre: float) -> Any:
+    """Corners (n, 2) in mm, each once."""
+    import numpy as np
+
+    places = np.array([[one.x, one.y] for one in corners], dtype=np.float64) / millimetre
+    if not len(places):
+        return places
+    if not (np.isfinite(places).all() and np.abs(places).max() <= LARGEST_MM):
+        raise ValueError("it has numbers that are no places on a plate")
+    kept = np.any(places != np.roll(places, 1, axis=0), axis=1)
+    return places[kept]

@@ -1,0 +1,235 @@
+"""The page of a workspace's package: what it shows, and what it may start on a rig."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import scissorcal
+from scissorcal.errors import InputError, MissingError
+from scissorcal.recipe.load import read_text
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.rigs import SIM
+from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.runs.render import package_warnings
+from scissorcal.workday.workspace import Workspace
+
+if TYPE_CHECKING:
+    from scissorcal.prototype.parts import Hand
+    from scissorcal.prototype.rig_commands import RigCommand
+    from scissorcal.prototype.scene import Scene
+    from scissorcal.prototype.server import PrototypeServer
+    from scissorcal.recording import Recording
+
+NONE = "none"
+SIM_REQUEST = "The virtual rig moves by itself: nobody has to keep clear."
+TRACK_REQUEST = (
+    "The motors stay off. Move the handles so that the blade's tip taps the plate, at several "
+    "places."
+)
+HAND_POINTS = 1500
+"""Of a recorded hand: 30 s at 50 Hz."""
+LONGEST_HAND_s = 60.0
+
+
+@dataclass(frozen=True)
+class Exported:
+    """An offline page: its file and its size."""
+
+    path: Path
+    bytes: int
+
+
+def workspace_scene(
+    workspace: Workspace, package_path: Path | None = None, now: datetime | None = None
+) -> "Scene":
+    """What a page shows of the workspace's package (or another): with measured strokes and hands.
+
+    Raises MissingError where there is no package, with the command that builds it, and what opening
+    one raises.
+    """
+    from scissorcal.package import open_package
+    from scissorcal.prototype.scene import scene_of
+
+    path = package_path or workspace.package_path(workspace.recipe())
+    if package_path is None and not path.is_file():
+        command = Engine.of(workspace).leads_to("package build")
+        raise MissingError(f"There is no package to show yet: run '{command}' first.")
+    engine = Engine.of(workspace)
+    fits = [load_result(engine, what) for what in available(engine, ("cut", "friction"))]
+    package = open_package(path, warn=False)
+    said = package_warnings(workspace, package_path)
+    return scene_of(
+        package,
+        made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        version=scissorcal.__version__,
+        fits=fits,
+        hands=workspace_hands(workspace),
+        warnings=[sentence for sentence in said if sentence not in package.warnings],
+        recipe=None if package_path else read_text(workspace.recipe_path),
+    )
+
+
+def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
+    """How the blades were moved in the newest recordings of a cut and of a rendering.
+
+    Of several sheets it is the first. A recording that cannot be read gives none.
+    """
+    from scissorcal.recording import read_recording
+
+    found = []
+    for kind in ("cut", "render"):
+        paths = workspace.recordings("cut" if kind == "cut" else "render")
+        try:
+            hand = _hand(read_recording(paths[-1])) if paths else None
+        except InputError:
+            continue  # 'recording show' says what is wrong with it
+        if hand is not None:
+            found.append(hand)
+    return tuple(found)
+
+
+def _hand(recording: "Recording") -> "Hand | None":
+    from scissorcal.prototype.arrays import Numbers
+    from scissorcal.prototype.parts import Hand
+
+    samples = recording.samples
+    numbers = [stroke.index for stroke in recording.strokes if stroke.sheet <= 0]
+    own = np.flatnonzero(np.isin(samples["stroke"], numbers))
+    if len(own) < 2:
+        return None
+    samples = samples[own[0] : own[-1] + 1]
+    time_s = 1e-6 * (samples["device_time_us"] - samples["device_time_us"][0])
+    moved = np.isfinite(samples["opening"]) & np.isfinite(samples["advance"])
+    samples, time_s = samples[moved], time_s[moved]
+    within = time_s <= LONGEST_HAND_s
+    every = max(1, -(-int(within.sum()) // HAND_POINTS))
+    kept = np.flatnonzero(within)[::every]
+    if len(kept) < 2:
+        return None
+    return Hand(
+        name=Path(recording.source).stem,
+        time=Numbers.of(time_s[kept]),
+        opening=Numbers.of(samples["opening"][kept]),
+        advance=Numbers.of(samples["advance"][kept]),
+    )
+
+
+def rig_commands(
+    workspace: Workspace, device: str, *, camera: str = NONE, package_path: Path | None = None
+) -> "tuple[RigCommand, ...]":
+    """The commands of a rig that a page may start, with the sentence that each asks first."""
+    from scissorcal.device.capture import CLEAR_REQUEST
+    from scissorcal.device.trajectory import EMPTY_REQUEST
+    from scissorcal.prototype.rig_commands import RigCommand
+    from scissorcal.render.engine import REQUEST
+
+    sim = device == SIM
+    on = ("--device", device, "--workspace", str(workspace.root))
+    paced = (*on, "--realtime") if sim else on
+    package = ("--package", str(package_path.absolute())) if package_path else ()
+
+    def asks(request: str) -> str:
+        return SIM_REQUEST if sim else request
+
+    found = [
+        RigCommand("render", ("render", *paced, *package), asks(REQUEST)),
+        RigCommand("capture friction", ("capture", "friction", *paced), asks(EMPTY_REQUEST)),
+        RigCommand("capture cut", ("capture", "cut", *paced), asks(CLEAR_REQUEST)),
+    ]
+    if camera != NONE:
+        words = ("track", *on, "--camera", camera)
+        found.append(RigCommand("track", words, asks(TRACK_REQUEST)))
+    return tuple(found)
+
+
+def prototype_server(
+    workspace: Workspace,
+    *,
+    device: str = NONE,
+    camera: str = NONE,
+    package_path: Path | None = None,
+    port: int = 0,
+) -> "PrototypeServer":
+    """A server of the package's page that follows the workspace's rig; see `serve`.
+
+    With a ``device`` the page may start commands on it, with a ``camera`` a track too. Raises
+    MissingError where aiohttp is not installed, InputError where a camera has no device, and what
+    `workspace_scene` raises.
+    """
+    _require_aiohttp()
+    from scissorcal.prototype.document import page_of, policy_of
+    from scissorcal.prototype.server import PrototypeServer
+
+    if camera != NONE and device == NONE:
+        raise InputError("--camera is for a track that the page starts: name a --device, too.")
+    scene = workspace_scene(workspace, package_path)
+    commands: tuple[RigCommand, ...] = ()
+    if device != NONE:
+        commands = rig_commands(workspace, device, camera=camera, package_path=package_path)
+    return PrototypeServer(
+        lambda socket: (page_of(scene, socket=socket), policy_of(served=True)),
+        workspace.captures_dir,
+        workspace.root,
+        commands,
+        port=port,
+    )
+
+
+def serve(server: "PrototypeServer", ready: Callable[[str], None]) -> str:
+    """Serve until Ctrl-C (or a request to terminate); returns the address without its token.
+
+    ``ready`` is told the address with its token. A command that the page started is ended first.
+    Raises InputError where the port is taken.
+    """
+    import asyncio
+    import signal
+
+    async def run() -> str:
+        over = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, over.set)
+        async with server:
+            ready(server.url)
+            await server.run(over)
+            return server.url.partition("?")[0]
+
+    return asyncio.run(run())
+
+
+def export_page(
+    workspace: Workspace, path: Path, package_path: Path | None = None, *, overwrite: bool = False
+) -> Exported:
+    """Write the package's page as one file that needs no server and no network.
+
+    Raises InputError where the file is there already, unless ``overwrite``, or is not named as a
+    page, and what `workspace_scene` raises.
+    """
+    from scissorcal.files import replacing
+    from scissorcal.prototype.document import page_of
+
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path} would not open in a browser: name a file that ends in .html.")
+    if path.is_dir() or (path.exists() and not overwrite):
+        raise InputError(f"{path} already exists: name another file, or give --overwrite.")
+    scene = workspace_scene(workspace, package_path)
+    data = page_of(scene).encode("utf-8")
+    with replacing(path) as part:
+        part.write_bytes(data)
+    return Exported(path, len(data))
+
+
+def _require_aiohttp() -> None:
+    """MissingError, with the remedy, where the server's library is not installed."""
+    try:
+        import aiohttp  # noqa: F401
+    except ImportError:
+        raise MissingError(
+            "The page's server needs aiohttp, which is not installed: pip install "
+            "'scissorcal[prototype]', or write the page into a file with 'scissorcal package "
+            "export --html FILE'."
+        ) from None

@@ -1,0 +1,164 @@
+"""The page and the recipe see the same plate: the same pieces, or the same refusal."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser
+
+from scissorcal.model.plate_pieces import Layer, Outline, Region, layer_pieces
+from scissorcal.recipe.drawing import read_drawing
+from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.plate_layers import plate_pieces
+from tests.browser import open_browser
+from tests.prototype.design_bed import Bed, open_bed
+from tests.prototype.test_design import SHEET, box, drawn, layer
+
+RANDOM = 300
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with open_browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def bed(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bed]:
+    with open_bed(browser, tmp_path_factory.mktemp("agrees")) as found:
+        yield found
+
+
+def random_outline(rng: np.random.Generator, middle: float, size: float) -> NDArray[np.float64]:
+    """Corners around a place on the cut, some of them on half millimetres and on the line."""
+    count = int(rng.integers(3, 9))
+    angles = np.sort(rng.uniform(0, 2 * np.pi, count))
+    radii = rng.uniform(0.3, 1.0, count) * size
+    corners = np.stack([middle + radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    return np.round(2 * corners) / 2 if rng.uniform() < 0.5 else corners
+
+
+def random_drawing(rng: np.random.Generator) -> dict[str, Any]:
+    layers = []
+    for number in range(int(rng.integers(1, 4))):
+        middle = rng.uniform(40, 60)
+        holes = [
+            random_outline(rng, middle + rng.uniform(-15, 15), 4).tolist()
+            for _ in range(int(rng.integers(0, 4)))
+        ]
+        regions = [
+            {
+                "toughness_ratio": float(rng.choice([0.5, 2.0, 3.0])),
+                "outline": random_outline(rng, middle + rng.uniform(-15, 15), 4).tolist(),
+            }
+            for _ in range(int(rng.integers(0, 3)))
+        ]
+        outline = random_outline(rng, middle, 30).tolist()
+        thickness = float(rng.choice([0.1, 0.25, 0.5]))
+        layers.append(layer(outline, thickness, name=f"l{number}", holes=holes, regions=regions))
+    return drawn(*layers, cut=float(rng.choice([0.0, 0.5, -1.0])))
+
+
+def of_recipe(given: dict[str, Any]) -> list[Any]:
+    def outline(corners: Any) -> Outline:
+        return Outline((1e-3 * np.array(corners, dtype=np.float64),))
+
+    layers = [
+        Layer(
+            one["name"],
+            one["thickness_mm"] * 1e-3,
+            one["toughness_ratio"],
+            outline(one["outline"]),
+            tuple(outline(hole) for hole in one["holes"]),
+            tuple(Region(outline(r["outline"]), r["toughness_ratio"]) for r in one["regions"]),
+        )
+        for one in given["layers"]
+    ]
+    return numbers(layer_pieces(layers, 1e-3 * given["cut_line_mm"]))
+
+
+def numbers(pieces: Any) -> list[Any]:
+    """Each piece in mm: begin, top, thickness, then ends and ratios of its strips."""
+    return [
+        [1e3 * piece.begin_m, 1e3 * piece.top_m, 1e3 * piece.thickness_m]
+        + [value for strip in piece.strips for value in (1e3 * strip.end_m, strip.toughness_ratio)]
+        for piece in pieces
+    ]
+
+
+def of_page(bed: Bed, given: dict[str, Any]) -> Any:
+    return bed.run(
+        "(given) => tried(() => layerPieces(given).map((p) => [p.begin, p.top, p.thickness,"
+        " ...p.strips.flatMap((s) => [s.end, s.ratio])]))",
+        given,
+    )
+
+
+def test_random_drawings_have_the_same_pieces(bed: Bed) -> None:
+    rng = np.random.default_rng(14)
+    refused = several = 0
+    for _ in range(RANDOM):
+        given = random_drawing(rng)
+        found = of_page(bed, given)
+        try:
+            wanted = of_recipe(given)
+        except ValueError:
+            assert "refused" in found, given
+            refused += 1
+            continue
+        assert "refused" not in found, (found, given)
+        assert len(found) == len(wanted), given
+        for one, other in zip(found, wanted, strict=True):
+            assert one == pytest.approx(other, abs=1e-9), given
+        several += len(wanted) > 2
+    assert several > RANDOM / 5
+    assert RANDOM / 20 < refused < RANDOM / 2
+
+
+def test_a_saved_recipe_is_taken_and_has_the_same_pieces(bed: Bed, tmp_path: Path) -> None:
+    given = drawn(
+        layer(SHEET, holes=[box(30, -5, 40, 5)], name="lower sheet"),
+        layer(box(20, -5, 50, 5), 0.25, name="patch", toughness_ratio=0.7,
+              regions=[{"toughness_ratio": 3.0, "outline": box(25, -2, 30, 2.125)}]),
+        cut=-1.25,
+    )  # fmt: skip
+    text = bed.run("(given) => recipeText(given, scene, null)", given)
+    recipe = parse_recipe(text)
+    wanted = numbers(plate_pieces(recipe, tmp_path))
+    found = of_page(bed, given)
+    assert [len(one) for one in found] == [len(one) for one in wanted]
+    for one, other in zip(found, wanted, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+
+
+def test_names_that_the_page_gives_are_names_of_a_recipe(bed: Bed) -> None:
+    text = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">'
+        '<rect id="-größe &lt;1&gt;" width="20" height="30"/>'
+        '<rect id="größe 1" x="30" width="20" height="30"/></svg>'
+    )
+    given = bed.run("(text) => drawnFromSvg(text, 0.1)", text)
+    names = [one["name"] for one in given["layers"]]
+    given["cut_line_mm"] = -15
+    recipe = parse_recipe(bed.run("(given) => recipeText(given, scene, null)", given))
+    assert [one.name for one in recipe.plate.layers] == names
+    assert len(set(names)) == 2
+
+
+def test_a_saved_drawing_is_an_svg_file_that_a_recipe_may_name(bed: Bed, tmp_path: Path) -> None:
+    """x as drawn; y of the file counts down from its upper border, 2 mm above the plate."""
+    given = drawn(layer(SHEET, holes=[box(30, -5, 40, 5)]), layer(box(20, -5, 50, 6), name="two"))
+    file = tmp_path / "drawing.svg"
+    file.write_text(bed.run("(given) => svgOf(given)", given), encoding="utf-8")
+    drawing = read_drawing(file)
+    for name, corners in (
+        ("layer-1", SHEET),
+        ("layer-1-hole-1", box(30, -5, 40, 5)),
+        ("layer-2", box(20, -5, 50, 6)),
+    ):
+        (found,) = drawing.shape(name).contours
+        wanted = sorted([x, 32.0 - y] for x, y in corners)
+        assert sorted(np.round(1e3 * found, 6).tolist()) == wanted

@@ -1,0 +1,188 @@
+"""In a browser: the page's line to its server, and a page of another site that gets nothing."""
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from scissorcal.prototype.rig_commands import RigCommand
+from scissorcal.prototype.server import PrototypeServer
+from tests.browser import bundled, open_browser, watch
+
+from .made import a_writer, samples_of
+
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; connect-src 'self'"
+REQUEST = "Take everything out."
+HARNESS = """
+import { connect, Recent } from "./src/socket";
+const recent = new Recent(2);
+const told = { connected: [], states: [], refused: [] as string[], samples: 0 };
+const server = JSON.parse(document.getElementById("server")!.textContent!);
+const line = connect(server, {
+  connected: (is) => told.connected.push(is),
+  state: (state) => told.states.push(state),
+  samples: (samples) => { told.samples += samples.time_s.length; recent.add(samples); },
+  refused: (sentence) => told.refused.push(sentence),
+});
+Object.assign(window, { line, told, recent });
+"""
+
+STRANGER = """<!doctype html><title>Another site</title><script>
+const found = [];
+window.tried = (async () => {
+  for (const url of URLS) {
+    for (const mode of ["cors", "no-cors", "same-origin"]) {
+      try { found.push(await (await fetch(url, { mode })).text()); } catch { found.push(""); }
+    }
+    found.push(await new Promise((done) => {
+      const socket = new WebSocket(url.replace("http:", "ws:").replace("/?", "/rig?"));
+      socket.onmessage = (event) => done(event.data);
+      socket.onclose = () => done("");
+    }));
+    found.push(await new Promise((done) => {
+      const frame = document.createElement("iframe");
+      frame.onload = () => {
+        try { done(frame.contentDocument.body.textContent); } catch { done(""); }
+      };
+      frame.src = url;
+      document.body.append(frame);
+    }));
+  }
+  return found;
+})();
+</script><body></body>"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with open_browser() as found:
+        yield found
+
+
+def until(page: Page, expression: str) -> None:
+    """Wait until it is true; the page's policy lets no text be evaluated within the page."""
+    for _ in range(1200):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(25)
+    pytest.fail(f"{expression} did not become true")
+
+
+@contextmanager
+def served(folder: Path, page: str) -> Iterator[PrototypeServer]:
+    """A server in a thread, since the browser is driven from this one."""
+    ready, over = threading.Event(), asyncio.Event()
+    loops: list[asyncio.AbstractEventLoop] = []
+    command = RigCommand("render", ("render",), REQUEST)
+
+    def page_of(socket: str) -> tuple[str, str]:
+        told = f'<script type="application/json" id="server">{{"socket": "{socket}"}}</script>'
+        return page.replace("SERVER", told), POLICY
+
+    server = PrototypeServer(page_of, folder / "captures", folder, [command])
+
+    async def run() -> None:
+        async with server:
+            loops.append(asyncio.get_running_loop())
+            ready.set()
+            await server.run(over)
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
+    thread.start()
+    try:
+        assert ready.wait(30.0)
+        yield server
+    finally:
+        loops[0].call_soon_threadsafe(over.set)
+        thread.join(30.0)
+
+
+@contextmanager
+def another_site(text: str) -> Iterator[str]:
+    """A web server of somebody else on this computer, with one page."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.end_headers()
+            self.wfile.write(text.encode())
+
+        def log_message(self, *_: Any) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as site:
+        thread = threading.Thread(target=site.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{site.server_port}/"
+        finally:
+            site.shutdown()
+            thread.join()
+
+
+def test_the_page_follows_asks_and_connects_again(browser: Browser, tmp_path: Path) -> None:
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    with served(tmp_path, page_text) as server, browser.new_context() as context:
+        page = context.new_page()
+        seen = watch(page)
+        page.goto(server.url)
+        until(page, "told.states.length > 0")
+        assert page.evaluate("told.states[0].commands") == ["render"]
+        page.evaluate("line.start('render')")
+        until(page, "told.refused.length > 0")
+        page.evaluate("line.arm('render')")
+        until(page, f"told.states.at(-1).request === '{REQUEST}'")
+        with a_writer(tmp_path) as writer:
+            for number in range(50):
+                writer.append(samples_of(100 * number, 100))
+            until(page, "told.samples > 100")
+            assert "Following" in page.evaluate("told.states.at(-1).following")
+            page.reload()
+            until(page, "told.states.length > 0")
+            for number in range(50, 100):
+                writer.append(samples_of(100 * number, 100))
+            until(page, "recent.columns.time_s.at(-1) > 9.5")
+        columns = page.evaluate("recent.columns")
+        assert columns["time_s"][0] >= columns["time_s"][-1] - 2.0
+        assert len({len(column) for column in columns.values()}) == 1
+        assert not seen.errors
+        assert not seen.elsewhere
+
+
+def test_a_page_waits_for_a_server_that_is_gone_and_says_so(
+    browser: Browser, tmp_path: Path
+) -> None:
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    with browser.new_context() as context:
+        page = context.new_page()
+        with served(tmp_path, page_text) as server:
+            page.goto(server.url)
+            until(page, "told.connected.at(-1) === true")
+        until(page, "told.connected.at(-1) === false")
+        page.evaluate("line.stop()")
+        assert page.evaluate("told.refused") == ["The server cannot be reached."]
+
+
+def test_a_page_of_another_site_gets_nothing_even_with_the_address(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with served(tmp_path, "<!doctype html><title>Rig</title><p>secret</p>SERVER") as server:
+        bare = server.url.partition("?")[0]
+        urls = [server.url, server.url.replace("127.0.0.1", "localhost"), f"{bare}?token="]
+        text = STRANGER.replace("URLS", str(urls))
+        with another_site(text) as site, browser.new_context() as context:
+            page = context.new_page()
+            page.goto(site)
+            found = page.evaluate("tried")
+            assert found == [""] * 5 * len(urls)
+            assert not server.watching
+            own = context.new_page()
+            own.goto(server.url)
+            assert own.inner_text("p") == "secret"

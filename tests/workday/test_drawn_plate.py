@@ -1,0 +1,138 @@
+"""A plate drawn with a hole and a tougher band: planned, built, and rendered as drawn."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.kernel import PiecesModel
+from scissorcal.package import ModelPackage, open_package
+from scissorcal.recording import read_recording
+from scissorcal.render.derating import needs_on
+from scissorcal.workday.workspace import Workspace
+from tests.workday.faults import run
+from tests.workday.made import quick_workspace, record_cut, record_friction
+
+LAYERS = """
+[[plate.layers]]
+name = "sheet"
+thickness_mm = 0.1
+outline = "plate.svg"
+id = "sheet"
+holes = ["hole"]
+
+[[plate.layers.regions]]
+toughness_ratio = 3.0
+id = "band"
+"""
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="60mm" viewBox="0 0 100 60">
+<g transform="translate(0 30)">
+<rect id="sheet" x="0" y="-20" width="90" height="40"/>
+<circle id="hole" cx="{hole}" cy="0" r="3"/>
+<rect id="band" x="35" y="-20" width="10" height="40"/>
+</g></svg>
+"""
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    made = quick_workspace(tmp_path_factory.mktemp("drawn") / "plate")
+    text = made.recipe_path.read_text(encoding="utf-8")
+    line = text + "\n[plate]\ncut_line_mm = 30.0\n" + LAYERS
+    made.recipe_path.write_text(line, encoding="utf-8")
+    (made.root / "plate.svg").write_text(SVG.format(hole=25), encoding="utf-8")
+    record_friction(made)
+    record_cut(made)
+    for words in (("fit",), ("package", "build")):
+        done = run(words, made.root)
+        assert done.code == 0, done.err
+    return made
+
+
+@pytest.fixture(scope="module")
+def package(workspace: Workspace) -> ModelPackage:
+    return open_package(workspace.package_path(workspace.recipe()), warn=False)
+
+
+def test_plan_says_what_is_measured_of_the_plate(workspace: Workspace) -> None:
+    done = run(("plan",), workspace.root)
+    assert done.code == 0
+    said = " ".join(done.out.split())
+    assert "2 pieces with 1 gap within layers" in said
+    assert "Toughness ratios of 1, 3 are declared in the recipe, not measured." in said
+
+
+def test_pieces_follow_the_drawing(package: ModelPackage) -> None:
+    first, second = package.pieces
+    fracture = package.manifest.mechanics.fracture
+    assert fracture is not None
+    energy = fracture.energy_J_per_m
+    assert (first.begin_m, first.end_m) == pytest.approx((0.0, 22e-3), abs=1e-5)
+    assert [strip.end_m for strip in second.strips] == pytest.approx(
+        [35e-3, 45e-3, 90e-3], abs=1e-5
+    )
+    energies = [strip.fracture_energy_J_per_m / energy for strip in second.strips]
+    assert energies == pytest.approx([1.0, 3.0, 1.0])
+    assert {piece.scale for piece in package.pieces} == {1.0}
+
+
+def test_torque_is_none_in_the_hole_and_in_proportion_in_the_band(package: ModelPackage) -> None:
+    low, high = package.manifest.ranges.opening_rad
+    opening = np.concatenate([[high] * 2, np.linspace(high, low, 4000)])
+    quiet = replace(package.tables, render_friction=False)
+    found = {}
+    for at_m in (0.010, 0.024, 0.040):  # in the sheet, the hole, the band
+        model = PiecesModel(quiet, package.pieces)
+        model.step_many(np.full(2, high), 0.0, at_m - 0.12)
+        step = model.step_many(opening, -0.2, at_m - 0.03)
+        place = step["contact"] + at_m - 0.03
+        near = (place > at_m - 2e-3) & (place < at_m + 2e-3) & (step["torque"] > 0.0)
+        found[at_m] = float(np.median(step["torque"][near])) if near.any() else 0.0
+    sheet, hole, band = found.values()
+    assert sheet > 0.0
+    assert hole == 0.0
+    assert band / sheet == pytest.approx(3.0, rel=0.1)
+
+
+def test_a_changed_drawing_makes_the_package_stale(workspace: Workspace, tmp_path: Path) -> None:
+    drawing = workspace.root / "plate.svg"
+    before = drawing.read_bytes()
+    try:
+        drawing.write_text(SVG.format(hole=60), encoding="utf-8")
+        states = {s["name"]: s["state"] for s in plan_steps(workspace)}
+        assert states["package build"] == "stale"
+        assert states["fit cut"] != "stale"
+    finally:
+        drawing.write_bytes(before)
+
+
+def plan_steps(workspace: Workspace) -> list[dict[str, str]]:
+    import json
+
+    found = json.loads(run(("plan", "--json"), workspace.root).out)["result"]["steps"]
+    return list(found)
+
+
+def test_overlapping_pieces_need_a_stiffer_rig(package: ModelPackage) -> None:
+    limit = package.manifest.limits.torque_Nm
+    sheet = needs_on(package.tables, limit, ())
+    one = needs_on(package.tables, limit, package.pieces[:1])
+    stack = needs_on(package.tables, limit, (package.pieces[0], package.pieces[0]))
+    assert one.stiffness == pytest.approx(sheet.stiffness, rel=1e-3)
+    assert stack.stiffness == pytest.approx(2.0 * one.stiffness, rel=1e-6)
+
+
+def test_the_rig_renders_the_drawn_plate(workspace: Workspace, package: ModelPackage) -> None:
+    words = ("render", "--device", "sim", "--strokes", "3", "--seed", "3")
+    done = run(words, workspace.root)
+    assert done.code == 0, done.err
+    (path,) = sorted((workspace.root / "captures").glob("render-*.mcap"))
+    samples = read_recording(path).samples
+    rate = np.gradient(samples["opening"]) * package.manifest.mechanics.loop_rate_Hz
+    cutting = rate < -0.05
+    wanted = PiecesModel(replace(package.tables, render_friction=False), package.pieces)
+    felt = wanted.step_many(samples["opening"], rate, samples["advance"])
+    assert np.count_nonzero(felt["torque"][cutting]) > 100
+    both = np.corrcoef(felt["torque"][cutting], samples["torque_command"][cutting])
+    assert both[0, 1] > 0.5
