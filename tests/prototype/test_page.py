@@ -201,9 +201,7 @@ def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) 
         largest = np.abs(what_if["tables"][table]).max(axis=1, keepdims=True)
         assert np.all(np.abs(moved - wanted) <= 2e-6 * largest), table
     assert np.isclose(law.fracture_energy[1], what_if["numbers"], rtol=1e-6).any()
-    changed = name == "fracture_energy" or not np.array_equal(
-        [*fitted["tables"].values()][0], None
-    )
+    changed = name == "fracture_energy" or not np.array_equal([*fitted["tables"].values()][0], None)
     assert changed
 
 
@@ -213,7 +211,9 @@ def test_the_law_that_is_felt_changes_the_torque(shown: Shown) -> None:
         "(one) => { one.value = one.max; one.dispatchEvent(new Event('input')); }"
     )
     moving = "() => { const k = scissorcal.rig.kernels[scissorcal.rig.active];"
-    moving += " return k.step(scissorcal.rig.pose.opening, -0.3, scissorcal.rig.pose.advance).torque; }"
+    moving += (
+        " return k.step(scissorcal.rig.pose.opening, -0.3, scissorcal.rig.pose.advance).torque; }"
+    )
     before = shown.run(moving)
     shown.page.get_by_label("what if", exact=True).check()
     assert shown.run("() => scissorcal.rig.active") == "whatIf"
@@ -239,7 +239,9 @@ def test_keys_alone_work_the_page(shown: Shown) -> None:
     for _ in range(80):
         shown.page.keyboard.press("Tab")
         reached.add(
-            shown.run("() => document.activeElement.tagName + ' ' + document.activeElement.textContent")
+            shown.run(
+                "() => document.activeElement.tagName + ' ' + document.activeElement.textContent"
+            )
         )
         if any(one.startswith("SUMMARY Draw") for one in reached):
             break
