@@ -125,7 +125,7 @@ def test_what_is_no_drawing_of_a_plate_is_refused(tmp_path: Path, text: str, why
 
 
 def test_a_shape_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match='no shapes with id "a".*sheet, hole'):
+    with pytest.raises(ValueError, match=r'no shapes with id "a".*sheet, hole'):
         drawn(
             tmp_path,
             '<rect id="sheet" width="9" height="9"/><rect id="hole" width="1" height="1"/>',

@@ -33,7 +33,7 @@ def many_holes(count: int) -> str:
         (SHEET + "toughness_ratio = 1000\n", "at most 100"),
         (SHEET + SHEET, "one name"),
         ("[plate]\ncut_line_mm = 40\n" + SHEET, 'misses the layer "sheet"'),
-        ("[plate]\ncut_line_mm = 4\n", "needs .*plate.layers"),
+        ("[plate]\ncut_line_mm = 4\n", r"needs .*plate\.layers"),
         (SHEET.replace("[[0,", "[[-5,").replace("[0, 30]", "[-5, 30]"), "begins at x = -5 mm"),
         (SHEET + many_holes(17), "18 pieces"),
         (SHEET + 'outline = "a.svg"\n', "keep one of them"),
