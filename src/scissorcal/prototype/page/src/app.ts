@@ -1,5 +1,6 @@
 // The parts of the page together: what each frame does, and what follows from a change.
 
+import { edgeTable } from "./blade_edge";
 import { Curves, TimeChart, TorqueChart } from "./charts";
 import { Controls } from "./controls";
 import { mountDesign } from "./design";
@@ -8,7 +9,7 @@ import { html, refilled } from "./elements";
 import { madeHand, oneStroke, recordedHand } from "./hand";
 import { KEYS, takeInput } from "./input";
 import { asFitted, Average, inPart, Law, ofDraw, whatIf } from "./law";
-import { Drawn, Piece } from "./pieces";
+import { Drawn, Edge, Piece } from "./pieces";
 import { Readout } from "./readout";
 import { Rig } from "./rig";
 import { RigPanel } from "./rig_panel";
@@ -36,6 +37,8 @@ export class App {
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
   private drawn: Drawn | null = null;
+  /** Edge of the blades that a person drew; null: as fitted. */
+  private edge: Edge | null = null;
   private chartedAt = 0;
   private before = 0;
 
@@ -116,23 +119,27 @@ export class App {
     const { choices } = this.controls;
     const other = choices.draw === null
       ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
-    this.laws = { fitted: this.fitted, whatIf: other };
+    this.laws = { fitted: this.withBlades(this.fitted), whatIf: this.withBlades(other) };
     this.rig.active = choices.active;
     const largest = this.scene.torque_limit_Nm;
     const isMoved = choices.values.size > 0 || choices.draw !== null;
-    this.rig.load("whatIf", inPart(other, choices.parts), largest);
-    this.rig.load("fitted", inPart(this.fitted, choices.parts), largest);
+    this.rig.load("whatIf", inPart(this.laws.whatIf, choices.parts), largest);
+    this.rig.load("fitted", inPart(this.laws.fitted, choices.parts), largest);
     const material = { ...choices.parts, friction: false };
     const curve = (law: Law): Float32Array | null => {
       const rate = -Math.max(this.scene.opening_rate_rad_per_s[0], 1e-3);
       const isSound = this.average.load(inPart(law, material));
       return isSound ? this.average.torque(this.torque.openings, rate, this.rig.strokeContact) : null;
     };
-    const moved = isMoved ? curve(other) : null;
+    const moved = isMoved ? curve(this.laws.whatIf) : null;
     const curves: Curves = {
-      fitted: curve(this.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
+      fitted: curve(this.laws.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
     };
     this.torque.show(curves);
+  }
+
+  private withBlades(law: Law): Law {
+    return this.edge ? { ...law, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } } : law;
   }
 
   private stroke(): void {
@@ -175,6 +182,7 @@ export class App {
     if (!details.open || section.childElementCount) return;
     mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
       this.drawn = applied?.drawn ?? null;
+      this.edge = applied?.edge ?? null;
       this.rig.cut(pieces ?? this.scene.pieces);
       this.changed();
       this.rig.freshSheet();
