@@ -124,18 +124,18 @@ def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
     mouse.move(x, box["y"] + box["height"] - 10, steps=12)
     shown.until("a.rig.wanted.opening < 0.5 * a.scene.opening_rad[1]")
     mouse.up()
-    shown.until("a.rig.isStill")
+    shown.until("Math.abs(a.rig.rate) < 1e-3 && a.rig.pose.opening < a.scene.opening_rad[1] - 0.1")
     after = shown.run("() => scissorcal.rig.crackMost")
     assert after > before + 0.005
     shown.page.wait_for_timeout(300)
     number = shown.page.locator("[data-number=crack] dd").inner_text()
     assert float(number.split()[0]) == pytest.approx(1e3 * after, abs=0.06)
-    assert shown.run("() => scissorcal.rig.pose.opening") < shown.scene.opening_rad[1] - 0.1
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_the_torque_drawn_is_that_of_the_package(shown: Shown, sign: float) -> None:
-    openings = np.linspace(*shown.scene.opening_rad, 61).astype(np.float32).astype(float)
+    inside = np.linspace(*shown.scene.opening_rad, 63)[1:-1]
+    openings = inside.astype(np.float32).astype(float)
     rate = sign * 0.5 * sum(shown.scene.opening_rate_rad_per_s)
     for contact in np.linspace(*shown.scene.contact_m, 3):
         own = shown.package.torque(openings, rate, contact)
@@ -200,11 +200,11 @@ def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) 
         wanted = np.diff(law.rows[table], axis=0)[0] if table in law.rows else 0.0 * moved
         largest = np.abs(what_if["tables"][table]).max(axis=1, keepdims=True)
         assert np.all(np.abs(moved - wanted) <= 2e-6 * largest), table
-    assert np.isclose(law.fracture_energy[1], what_if["numbers"], rtol=1e-6).any()
-    changed = name == "fracture_energy" or not np.array_equal(
-        [*fitted["tables"].values()][0], None
-    )
-    assert changed
+    energy, kappa, damping = what_if["numbers"][4:7]
+    assert energy == pytest.approx(law.fracture_energy[1], rel=1e-6)
+    assert kappa == pytest.approx(law.kappa[1], rel=1e-6)
+    assert damping == law.rate_damping[1]
+    assert what_if != fitted
 
 
 def test_the_law_that_is_felt_changes_the_torque(shown: Shown) -> None:
