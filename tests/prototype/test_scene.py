@@ -94,7 +94,12 @@ def test_bands_hold_the_fitted_torque(package: ModelPackage, scene: Scene) -> No
         opening, contact = read(band.opening)[:, None], read(band.contact)[None, :]
         low, high = read(band.low), read(band.high)
         assert np.all(low <= high)
-        torque = package.torque(opening, band.rate, contact)
+        place = (
+            np.clip(opening.astype(float), *scene.opening_rad),
+            band.rate,
+            np.clip(contact.astype(float), *scene.contact_m),
+        )
+        torque = package.torque(*place)
         spare = scene.bound_Nm + 1e-6
         within = (torque >= low - spare) & (torque <= high + spare)
         assert within.mean() > 0.95

@@ -59,7 +59,7 @@ export class TorqueChart {
     const measured = this.measured.map((_, i) => ({ ...line("measured", colours.muted, 0.7), ...(i ? { class: "more" } : {}) }));
     const radius = this.scene.handle_radius_m;
     this.chart = new uPlot({
-      width: this.container.clientWidth, height: HEIGHT_px,
+      width: widthIn(this.container), height: HEIGHT_px,
       series: [
         { label: "opening", value: (_, v) => (v === null ? "" : `${v.toFixed(1)}°`) },
         line("5 %", "transparent", 0), line("95 %", "transparent", 0), ...measured,
@@ -79,7 +79,7 @@ export class TorqueChart {
   }
 
   private size(): void {
-    this.chart?.setSize({ width: this.container.clientWidth, height: HEIGHT_px });
+    this.chart?.setSize({ width: widthIn(this.container), height: HEIGHT_px });
   }
 }
 
@@ -90,7 +90,7 @@ export class TimeChart {
   private readonly times = Array.from({ length: TIMES }, (_, i) => -LAST_s + (LAST_s * (i + 1)) / TIMES);
 
   constructor(private readonly container: HTMLElement) {
-    new ResizeObserver(() => this.chart?.setSize({ width: container.clientWidth, height: HEIGHT_px })).observe(container);
+    new ResizeObserver(() => this.chart?.setSize({ width: widthIn(container), height: HEIGHT_px })).observe(container);
   }
 
   draw(recent: readonly Sample[], now: number, followed: { time_s: number[]; torque_Nm: number[] } | null): void {
@@ -115,7 +115,7 @@ export class TimeChart {
     this.chart?.destroy();
     const show = { points: { show: false }, spanGaps: true };
     this.chart = new uPlot({
-      width: this.container.clientWidth, height: HEIGHT_px,
+      width: widthIn(this.container), height: HEIGHT_px,
       series: [
         { label: "time", value: (_, v) => (v === null ? "" : `${v.toFixed(2)} s`) },
         { label: "torque with friction", stroke: colours.ink, width: 1.5, ...show, value: (_, v) => (v === null ? "" : `${(1e3 * v).toFixed(1)} mN m`) },
@@ -206,4 +206,10 @@ function latest(stroke: readonly Sample[], grid: Float32Array): Row {
     before = place;
   }
   return row;
+}
+
+/** Width (px) that a chart has in its container: without the padding. */
+function widthIn(container: HTMLElement): number {
+  const { paddingLeft, paddingRight } = getComputedStyle(container);
+  return Math.max(container.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight), 50);
 }
