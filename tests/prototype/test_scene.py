@@ -78,9 +78,7 @@ def test_columns_of_draws_are_those_of_the_sliders(package: ModelPackage, scene:
     assert scene.draws is not None
     values = read(scene.draws.values)
     energy = next(slider for slider in scene.sliders if slider.name == "fracture_energy")
-    np.testing.assert_array_equal(
-        values[:, energy.column], read(scene.draws.rows.fracture_energy)
-    )
+    np.testing.assert_array_equal(values[:, energy.column], read(scene.draws.rows.fracture_energy))
     for slider in scene.sliders:
         column = values[:, slider.column]
         assert slider.value == pytest.approx(column.mean(), abs=slider.sd), slider.name

@@ -108,9 +108,9 @@ export class Rig {
 
   /** Let a hand move the blades from now on; null gives them back to the pointer. */
   play(script: Script | null): void {
+    if (script || this.script) this.wanted = this.pose; // else keys pressed in a row add up
     this.script = script;
     this.scriptBegan = this.time;
-    this.wanted = this.pose;
   }
 
   get isClosing(): boolean {
