@@ -237,6 +237,15 @@ def test_a_draw_sets_the_sliders(shown: Shown) -> None:
             assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
 
 
+def test_blades_that_nobody_moves_stand_still(shown: Shown) -> None:
+    shown.page.locator("canvas.plain").press("ArrowDown")
+    shown.page.wait_for_timeout(700)
+    before = shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]")
+    shown.page.wait_for_timeout(500)
+    assert shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]") == before
+    assert shown.run("() => scissorcal.rig.rate") == 0.0
+
+
 def test_keys_alone_work_the_page(shown: Shown) -> None:
     reached: set[str] = set()
     for _ in range(80):

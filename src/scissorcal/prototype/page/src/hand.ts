@@ -1,6 +1,7 @@
 // The hand that moves the blades: by pointer and keys through a spring, or one that is replayed.
 
-import { Law } from "./law";
+import { AT } from "./kernel";
+import { heldValue, Law } from "./law";
 import { Hand, Scene, unpack } from "./scene";
 
 export interface Pose {
@@ -15,6 +16,7 @@ const LAG_rad = 0.15; // by which the blades stay behind the hand at the largest
 const LAG_m = 0.003;
 const SETTLES_s = 0.03;
 const PUSH_N = 3;
+const STILL_rad_per_s = 1e-4; // a hand that would move the blades no faster lets them rest
 
 /** A hand that holds the handles by a spring: it feels by how far the blades stay behind. */
 export class Coupling {
@@ -22,19 +24,31 @@ export class Coupling {
   private readonly damping: number;
   private readonly push = PUSH_N / LAG_m;
 
-  constructor(scene: Scene, law: Law, largestTorque: number) {
+  constructor(scene: Scene, private readonly law: Law, largestTorque: number) {
     this.stiffness = largestTorque / LAG_rad;
     // A step is stable while damping exceeds half of what the material's stiffness does in a tick.
     const material = materialStiffness(scene, law) / scene.loop_rate_Hz;
     this.damping = Math.max(this.stiffness * SETTLES_s, material);
   }
 
-  /** The pose after dt, of blades that feel a torque (positive opens) and a force along the cut. */
-  moved(at: Pose, wanted: Pose, torque: number, force: number, dt: number): Pose {
-    const turn = (this.stiffness * (wanted.opening - at.opening) + torque) / this.damping;
+  /**
+   * The pose after dt, of blades that turn at a rate and feel the material's torque (positive opens) and
+   * a force along the cut. Friction holds them where the hand does not overcome it.
+   */
+  moved(at: Pose, rate: number, wanted: Pose, torque: number, force: number, dt: number): Pose {
+    const drive = this.stiffness * (wanted.opening - at.opening) + torque;
+    const left = Math.abs(drive) - frictionLevel(this.law, at.opening, Math.sign(drive), Math.abs(rate));
+    const turn = left > STILL_rad_per_s * this.damping ? (Math.sign(drive) * left) / this.damping : 0;
     const slide = (this.push * (wanted.advance - at.advance) + force) / (this.push * SETTLES_s);
     return { opening: at.opening + dt * turn, advance: at.advance + dt * slide };
   }
+}
+
+/** Level of friction against a motion, N m. */
+function frictionLevel(law: Law, opening: number, sign: number, speed: number): number {
+  if (!law.numbers[AT.renderFriction]) return 0;
+  const level = law.tables[sign > 0 ? "friction_opening" : "friction_closing"];
+  return heldValue(level, speed) * heldValue(law.tables.friction_angle, opening);
 }
 
 /** Largest stiffness (N m/rad) with which the material resists closing, up to the torque limit. */
