@@ -24,13 +24,14 @@ export class Controls {
   private readonly felt = html("div", { class: "row", role: "radiogroup", "aria-label": "Law that the hand feels" });
   private readonly sliders = html("div", { class: "sliders" });
   private readonly draws = html("div", { class: "row" });
+  private readonly refusal = html("p", { class: "warning", role: "status" });
   private playing = 0;
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly changed: () => void) {
     container.append(
       html("h2", {}, "Law"), this.felt,
       html("div", { class: "row", role: "group", "aria-label": "Parts of the law" }, ...PARTS.map(([name, label]) => this.part(name, label))),
-      this.draws,
+      this.draws, this.refusal,
       html("h3", {}, "What if"),
       html("p", { class: "note" }, "A slider spans at least half to twice the fitted value. The bar is the posterior's 5 to 95 %; the tick is the fitted value."),
       this.sliders,
@@ -44,6 +45,12 @@ export class Controls {
     this.choices.active = this.choices.active === "fitted" ? "whatIf" : "fitted";
     this.refill();
     this.changed();
+  }
+
+  /** Name the laws that the kernel did not take, such as one whose response has no stiffness. */
+  refuse(names: string[]): void {
+    refilled(this.refusal, names.length ? `The kernel does not take this law (${names.join(", ")}): its blades stand still. Move the parameters back.` : null);
+    this.refusal.hidden = !names.length;
   }
 
   reset(): void {
