@@ -158,7 +158,7 @@ export class App {
       html("h1", {}, scene.name),
       ...scene.warnings.map((sentence) => html("p", { class: "warning" }, sentence)),
       ...scene.notes.map((sentence) => html("p", { class: "note" }, sentence)),
-      html("p", { class: "note" }, "Blue is the fitted model, orange what if, grey measured, black this page's blades: a model, too, on the C core that renders on the rig."));
+      html("p", { class: "note" }, "Blue is the fitted model, orange what if, grey measured, and the last closing stroke that of the blades on this page: a model, too, on the C core that renders on the rig."));
   }
 
   private actions(): HTMLElement {
