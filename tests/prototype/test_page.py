@@ -17,7 +17,7 @@ from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
 from tests.browser import Seen, open_browser, open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
-from tests.prototype.test_scene import read
+from tests.prototype.test_scene import unpacked as read
 
 MOST_BYTES = 1_000_000
 WAIT_S = 30.0
@@ -124,7 +124,8 @@ def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
     mouse.move(x, box["y"] + box["height"] - 10, steps=12)
     shown.until("a.rig.wanted.opening < 0.5 * a.scene.opening_rad[1]")
     mouse.up()
-    shown.until("Math.abs(a.rig.pose.opening - a.rig.wanted.opening) < 0.005")
+    # at rest, behind the hand by what friction holds: at most the lag at the largest torque
+    shown.until("a.rig.rate === 0 && a.rig.pose.opening - a.rig.wanted.opening < 0.15")
     shown.page.wait_for_timeout(500)  # the numbers are shown ten times a second
     after = shown.run("() => scissorcal.rig.crackMost")
     assert after > before + 0.005
@@ -266,7 +267,7 @@ def test_keys_alone_work_the_page(shown: Shown) -> None:
     wanted_now = shown.run("() => scissorcal.rig.wanted")
     assert wanted_now["opening"] == pytest.approx(before["opening"] - 3 * 0.035)
     assert wanted_now["advance"] == pytest.approx(before["advance"] + 0.005)
-    shown.until(f"a.rig.pose.opening < {before['opening']} - 0.09")
+    shown.until(f"a.rig.rate === 0 && a.rig.pose.opening < {before['opening']} - 0.06")
     shown.until(f"a.rig.pose.advance > {before['advance']} + 0.003")
     assert shown.run(UNNAMED) == []
 

@@ -2,6 +2,7 @@
 
 import uPlot from "uplot";
 import { coloursOf } from "./drawing";
+import { html } from "./elements";
 import { Rig, Sample } from "./rig";
 import { Band, Scene, Stroke, unpack } from "./scene";
 
@@ -29,12 +30,15 @@ export class TorqueChart {
   private curves: Curves = { fitted: null, whatIf: null, draw: null };
   private theme = "";
 
-  constructor(private readonly container: HTMLElement, private readonly scene: Scene) {
+  private readonly container = html("div", { class: "chart" });
+
+  constructor(section: HTMLElement, private readonly scene: Scene) {
+    section.append(this.container);
     const [low, high] = scene.opening_rad;
     this.openings = Float32Array.from({ length: GRID }, (_, i) => low + ((high - low) * i) / (GRID - 1));
     this.degrees = Array.from(this.openings, (opening) => DEG * opening);
     this.measured = scene.strokes.map((stroke) => onGrid(stroke, this.openings));
-    new ResizeObserver(() => this.size()).observe(container);
+    new ResizeObserver(() => this.size()).observe(this.container);
   }
 
   show(curves: Curves): void {
@@ -59,7 +63,7 @@ export class TorqueChart {
     const measured = this.measured.map((_, i) => ({ ...line("measured", colours.muted, 0.7), ...(i ? { class: "more" } : {}) }));
     const radius = this.scene.handle_radius_m;
     this.chart = new uPlot({
-      width: widthIn(this.container), height: HEIGHT_px,
+      width: this.container.clientWidth, height: HEIGHT_px,
       series: [
         { label: "opening", value: (_, v) => (v === null ? "" : `${v.toFixed(1)}°`) },
         line("5 %", "transparent", 0), line("95 %", "transparent", 0), ...measured,
@@ -79,7 +83,7 @@ export class TorqueChart {
   }
 
   private size(): void {
-    this.chart?.setSize({ width: widthIn(this.container), height: HEIGHT_px });
+    this.chart?.setSize({ width: this.container.clientWidth, height: HEIGHT_px });
   }
 }
 
@@ -89,8 +93,12 @@ export class TimeChart {
   private theme = "";
   private readonly times = Array.from({ length: TIMES }, (_, i) => -LAST_s + (LAST_s * (i + 1)) / TIMES);
 
-  constructor(private readonly container: HTMLElement) {
-    new ResizeObserver(() => this.chart?.setSize({ width: widthIn(container), height: HEIGHT_px })).observe(container);
+  private readonly container = html("div", { class: "chart" });
+
+  constructor(section: HTMLElement) {
+    section.append(this.container);
+    const { container } = this;
+    new ResizeObserver(() => this.chart?.setSize({ width: container.clientWidth, height: HEIGHT_px })).observe(container);
   }
 
   draw(recent: readonly Sample[], now: number, followed: { time_s: number[]; torque_Nm: number[] } | null): void {
@@ -115,7 +123,7 @@ export class TimeChart {
     this.chart?.destroy();
     const show = { points: { show: false }, spanGaps: true };
     this.chart = new uPlot({
-      width: widthIn(this.container), height: HEIGHT_px,
+      width: this.container.clientWidth, height: HEIGHT_px,
       series: [
         { label: "time", value: (_, v) => (v === null ? "" : `${v.toFixed(2)} s`) },
         { label: "torque with friction", stroke: colours.ink, width: 1.5, ...show, value: (_, v) => (v === null ? "" : `${(1e3 * v).toFixed(1)} mN m`) },
@@ -206,10 +214,4 @@ function latest(stroke: readonly Sample[], grid: Float32Array): Row {
     before = place;
   }
   return row;
-}
-
-/** Width (px) that a chart has in its container: without the padding. */
-function widthIn(container: HTMLElement): number {
-  const { paddingLeft, paddingRight } = getComputedStyle(container);
-  return Math.max(container.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight), 50);
 }

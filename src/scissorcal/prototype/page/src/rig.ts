@@ -149,7 +149,7 @@ export class Rig {
     if (played) {
       next = this.wanted = played;
     } else {
-      next = this.coupling.moved(last, this.rate, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
+      next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
     this.rate = (next.opening - last.opening) / dt;
     this.pose = next;
