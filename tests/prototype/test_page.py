@@ -17,7 +17,7 @@ from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
 from tests.browser import Seen, open_browser, open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
-from tests.prototype.test_scene import read
+from tests.prototype.test_scene import unpacked as read
 
 MOST_BYTES = 1_000_000
 WAIT_S = 30.0
@@ -124,18 +124,19 @@ def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
     mouse.move(x, box["y"] + box["height"] - 10, steps=12)
     shown.until("a.rig.wanted.opening < 0.5 * a.scene.opening_rad[1]")
     mouse.up()
-    shown.until("a.rig.isStill")
+    # at rest, behind the hand by what friction holds: at most the lag at the largest torque
+    shown.until("a.rig.rate === 0 && a.rig.pose.opening - a.rig.wanted.opening < 0.15")
+    shown.page.wait_for_timeout(500)  # the numbers are shown ten times a second
     after = shown.run("() => scissorcal.rig.crackMost")
     assert after > before + 0.005
-    shown.page.wait_for_timeout(300)
     number = shown.page.locator("[data-number=crack] dd").inner_text()
     assert float(number.split()[0]) == pytest.approx(1e3 * after, abs=0.06)
-    assert shown.run("() => scissorcal.rig.pose.opening") < shown.scene.opening_rad[1] - 0.1
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_the_torque_drawn_is_that_of_the_package(shown: Shown, sign: float) -> None:
-    openings = np.linspace(*shown.scene.opening_rad, 61).astype(np.float32).astype(float)
+    inside = np.linspace(*shown.scene.opening_rad, 63)[1:-1]
+    openings = inside.astype(np.float32).astype(float)
     rate = sign * 0.5 * sum(shown.scene.opening_rate_rad_per_s)
     for contact in np.linspace(*shown.scene.contact_m, 3):
         own = shown.package.torque(openings, rate, contact)
@@ -186,7 +187,8 @@ def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) 
     nodes = read(slider.nodes).astype(float)
     shown.stroke()
     shown.page.locator(f"[data-slider={name}]").evaluate(
-        "(one, at) => { one.value = String(at * Number(one.max)); one.dispatchEvent(new Event('input')); }",
+        "(one, at) => { one.value = String(at * Number(one.max));"
+        " one.dispatchEvent(new Event('input')); }",
         (nodes[12] - nodes[0]) / (nodes[-1] - nodes[0]),
     )
     cut, friction = central_values(shown.package)
@@ -200,9 +202,11 @@ def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) 
         wanted = np.diff(law.rows[table], axis=0)[0] if table in law.rows else 0.0 * moved
         largest = np.abs(what_if["tables"][table]).max(axis=1, keepdims=True)
         assert np.all(np.abs(moved - wanted) <= 2e-6 * largest), table
-    assert np.isclose(law.fracture_energy[1], what_if["numbers"], rtol=1e-6).any()
-    changed = name == "fracture_energy" or not np.array_equal([*fitted["tables"].values()][0], None)
-    assert changed
+    energy, kappa, damping = what_if["numbers"][4:7]
+    assert energy == pytest.approx(law.fracture_energy[1], rel=1e-6)
+    assert kappa == pytest.approx(law.kappa[1], rel=1e-6)
+    assert damping == law.rate_damping[1]
+    assert what_if != fitted
 
 
 def test_the_law_that_is_felt_changes_the_torque(shown: Shown) -> None:
@@ -234,6 +238,15 @@ def test_a_draw_sets_the_sliders(shown: Shown) -> None:
             assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
 
 
+def test_blades_that_nobody_moves_stand_still(shown: Shown) -> None:
+    shown.page.locator("canvas.plain").press("ArrowDown")
+    shown.page.wait_for_timeout(700)
+    before = shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]")
+    shown.page.wait_for_timeout(500)
+    assert shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]") == before
+    assert shown.run("() => scissorcal.rig.rate") == 0.0
+
+
 def test_keys_alone_work_the_page(shown: Shown) -> None:
     reached: set[str] = set()
     for _ in range(80):
@@ -249,9 +262,12 @@ def test_keys_alone_work_the_page(shown: Shown) -> None:
     assert wanted <= reached
     shown.page.locator("canvas.plain").focus()
     before = shown.run("() => scissorcal.rig.pose")
-    shown.page.keyboard.press("ArrowDown")
-    shown.page.keyboard.press("Shift+ArrowRight")
-    shown.until(f"a.rig.pose.opening < {before['opening']} - 0.02")
+    for key in ("ArrowDown", "ArrowDown", "ArrowDown", "Shift+ArrowRight"):
+        shown.page.keyboard.press(key)
+    wanted_now = shown.run("() => scissorcal.rig.wanted")
+    assert wanted_now["opening"] == pytest.approx(before["opening"] - 3 * 0.035)
+    assert wanted_now["advance"] == pytest.approx(before["advance"] + 0.005)
+    shown.until(f"a.rig.rate === 0 && a.rig.pose.opening < {before['opening']} - 0.06")
     shown.until(f"a.rig.pose.advance > {before['advance']} + 0.003")
     assert shown.run(UNNAMED) == []
 

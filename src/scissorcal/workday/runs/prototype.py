@@ -68,8 +68,33 @@ def workspace_scene(
         version=scissorcal.__version__,
         fits=fits,
         hands=workspace_hands(workspace),
-        warnings=[sentence for sentence in said if sentence not in package.warnings],
+        warnings=[
+            *(() if package_path else _origin(workspace)),
+            *(sentence for sentence in said if sentence not in package.warnings),
+        ],
         recipe=None if package_path else read_text(workspace.recipe_path),
+    )
+
+
+def _origin(workspace: Workspace) -> tuple[str, ...]:
+    """A sentence where recordings of the workspace come from a virtual rig, as they state."""
+    from scissorcal.kernel import Capability
+    from scissorcal.recording import read_header
+
+    paths = [*workspace.recordings("friction"), *workspace.recordings("cut")]
+    stated = []
+    for path in paths:
+        try:
+            device = read_header(path).device
+        except InputError:
+            continue  # 'recording show' says what is wrong with it
+        stated.append(bool(int(device.get("capabilities", 0)) & Capability.SIMULATOR))
+    if not any(stated):
+        return ()
+    which = "all" if all(stated) else f"{sum(stated)} of {len(stated)}"
+    return (
+        f"Simulated: {which} recordings of friction and cuts come from a virtual rig, so what is "
+        "shown as measured is not of a real specimen.",
     )
 
 

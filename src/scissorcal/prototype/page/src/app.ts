@@ -1,5 +1,6 @@
 // The parts of the page together: what each frame does, and what follows from a change.
 
+import { edgeTable } from "./blade_edge";
 import { Curves, TimeChart, TorqueChart } from "./charts";
 import { Controls } from "./controls";
 import { mountDesign } from "./design";
@@ -8,12 +9,12 @@ import { html, refilled } from "./elements";
 import { madeHand, oneStroke, recordedHand } from "./hand";
 import { KEYS, takeInput } from "./input";
 import { asFitted, Average, inPart, Law, ofDraw, whatIf } from "./law";
-import { Drawn, Piece } from "./pieces";
+import { Drawn, Edge, Piece } from "./pieces";
 import { Readout } from "./readout";
 import { Rig } from "./rig";
 import { RigPanel } from "./rig_panel";
 import { Ripple } from "./ripple";
-import { Scene } from "./scene";
+import { Scene, unpack } from "./scene";
 import { Server } from "./socket";
 import { View, View3d } from "./view3d";
 
@@ -36,10 +37,15 @@ export class App {
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
   private drawn: Drawn | null = null;
+  /** Edge of the blades that a person drew; null: as fitted. */
+  private edge: Edge | null = null;
   private chartedAt = 0;
+  private curvesAt = NaN;
+  private readonly largestTorque: number;
   private before = 0;
 
   constructor(page: HTMLElement, readonly scene: Scene, module: WebAssembly.Module, server: Server | null) {
+    this.largestTorque = largestOf(scene);
     this.rig = new Rig(scene, module);
     this.rig.cut(scene.pieces);
     this.average = new Average(module);
@@ -86,12 +92,13 @@ export class App {
     this.frames.seconds += seconds;
     const { rig } = this;
     rig.pass(seconds);
-    this.ripple.released(rig.released);
+    this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
     this.draw();
     this.readout.show(rig, now);
     if (now - this.chartedAt >= CHARTS_EVERY_ms) {
       this.chartedAt = now;
+      if (rig.strokeContact !== this.curvesAt) this.showCurves();
       this.torque.draw(rig);
       this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
     }
@@ -116,23 +123,36 @@ export class App {
     const { choices } = this.controls;
     const other = choices.draw === null
       ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
-    this.laws = { fitted: this.fitted, whatIf: other };
+    this.laws = { fitted: this.withBlades(this.fitted), whatIf: this.withBlades(other) };
     this.rig.active = choices.active;
-    const largest = this.scene.torque_limit_Nm;
+    const names = { fitted: "as fitted", whatIf: "what if" };
+    const refused = (["whatIf", "fitted"] as const).filter(
+      (which) => !this.rig.load(which, inPart(this.laws[which], choices.parts), this.largestTorque),
+    );
+    this.controls.refuse(refused.map((which) => names[which]));
+    this.showCurves();
+  }
+
+  /** Curves of both laws at the contact where the present stroke began. */
+  private showCurves(): void {
+    const { choices } = this.controls;
     const isMoved = choices.values.size > 0 || choices.draw !== null;
-    this.rig.load("whatIf", inPart(other, choices.parts), largest);
-    this.rig.load("fitted", inPart(this.fitted, choices.parts), largest);
+    this.curvesAt = this.rig.strokeContact;
     const material = { ...choices.parts, friction: false };
     const curve = (law: Law): Float32Array | null => {
       const rate = -Math.max(this.scene.opening_rate_rad_per_s[0], 1e-3);
       const isSound = this.average.load(inPart(law, material));
       return isSound ? this.average.torque(this.torque.openings, rate, this.rig.strokeContact) : null;
     };
-    const moved = isMoved ? curve(other) : null;
+    const moved = isMoved ? curve(this.laws.whatIf) : null;
     const curves: Curves = {
-      fitted: curve(this.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
+      fitted: curve(this.laws.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
     };
     this.torque.show(curves);
+  }
+
+  private withBlades(law: Law): Law {
+    return this.edge ? { ...law, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } } : law;
   }
 
   private stroke(): void {
@@ -145,7 +165,7 @@ export class App {
       html("h1", {}, scene.name),
       ...scene.warnings.map((sentence) => html("p", { class: "warning" }, sentence)),
       ...scene.notes.map((sentence) => html("p", { class: "note" }, sentence)),
-      html("p", { class: "note" }, "Blue: the fitted model. Grey: measured. The page computes with the C core that renders on the rig."));
+      html("p", { class: "note" }, "Blue is the fitted model, orange what if, grey measured, and the last closing stroke that of the blades on this page: a model, too, on the C core that renders on the rig."));
   }
 
   private actions(): HTMLElement {
@@ -175,11 +195,18 @@ export class App {
     if (!details.open || section.childElementCount) return;
     mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
       this.drawn = applied?.drawn ?? null;
+      this.edge = applied?.edge ?? null;
       this.rig.cut(pieces ?? this.scene.pieces);
       this.changed();
       this.rig.freshSheet();
     });
   }
+}
+
+/** Torque at which the blades lag most behind the hand: the largest of the scene's band. */
+function largestOf(scene: Scene): number {
+  const highs = scene.bands.flatMap((band) => Array.from(unpack(band.high)));
+  return highs.reduce((most, high) => Math.max(most, high), 0) || scene.torque_limit_Nm;
 }
 
 function torqueNote(scene: Scene): string {

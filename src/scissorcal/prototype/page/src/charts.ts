@@ -2,6 +2,7 @@
 
 import uPlot from "uplot";
 import { coloursOf } from "./drawing";
+import { html } from "./elements";
 import { Rig, Sample } from "./rig";
 import { Band, Scene, Stroke, unpack } from "./scene";
 
@@ -29,12 +30,15 @@ export class TorqueChart {
   private curves: Curves = { fitted: null, whatIf: null, draw: null };
   private theme = "";
 
-  constructor(private readonly container: HTMLElement, private readonly scene: Scene) {
+  private readonly container = html("div", { class: "chart" });
+
+  constructor(section: HTMLElement, private readonly scene: Scene) {
+    section.append(this.container);
     const [low, high] = scene.opening_rad;
     this.openings = Float32Array.from({ length: GRID }, (_, i) => low + ((high - low) * i) / (GRID - 1));
     this.degrees = Array.from(this.openings, (opening) => DEG * opening);
     this.measured = scene.strokes.map((stroke) => onGrid(stroke, this.openings));
-    new ResizeObserver(() => this.size()).observe(container);
+    new ResizeObserver(() => this.size()).observe(this.container);
   }
 
   show(curves: Curves): void {
@@ -89,7 +93,11 @@ export class TimeChart {
   private theme = "";
   private readonly times = Array.from({ length: TIMES }, (_, i) => -LAST_s + (LAST_s * (i + 1)) / TIMES);
 
-  constructor(private readonly container: HTMLElement) {
+  private readonly container = html("div", { class: "chart" });
+
+  constructor(section: HTMLElement) {
+    section.append(this.container);
+    const { container } = this;
     new ResizeObserver(() => this.chart?.setSize({ width: container.clientWidth, height: HEIGHT_px })).observe(container);
   }
 

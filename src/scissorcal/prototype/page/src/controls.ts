@@ -24,13 +24,14 @@ export class Controls {
   private readonly felt = html("div", { class: "row", role: "radiogroup", "aria-label": "Law that the hand feels" });
   private readonly sliders = html("div", { class: "sliders" });
   private readonly draws = html("div", { class: "row" });
+  private readonly refusal = html("p", { class: "warning", role: "status" });
   private playing = 0;
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly changed: () => void) {
     container.append(
       html("h2", {}, "Law"), this.felt,
       html("div", { class: "row", role: "group", "aria-label": "Parts of the law" }, ...PARTS.map(([name, label]) => this.part(name, label))),
-      this.draws,
+      this.draws, this.refusal,
       html("h3", {}, "What if"),
       html("p", { class: "note" }, "A slider spans at least half to twice the fitted value. The bar is the posterior's 5 to 95 %; the tick is the fitted value."),
       this.sliders,
@@ -44,6 +45,12 @@ export class Controls {
     this.choices.active = this.choices.active === "fitted" ? "whatIf" : "fitted";
     this.refill();
     this.changed();
+  }
+
+  /** Name the laws that the kernel did not take, such as one whose response has no stiffness. */
+  refuse(names: string[]): void {
+    refilled(this.refusal, names.length ? `The kernel does not take this law (${names.join(", ")}): its blades stand still. Move the parameters back.` : null);
+    this.refusal.hidden = !names.length;
   }
 
   reset(): void {
@@ -102,7 +109,7 @@ export class Controls {
       this.fillDraws();
     };
     refilled(this.draws,
-      numberField(`posterior draw (1 to ${count})`, (choices.draw ?? 0) + 1, { key: "draw", least: 1, most: count }, (value) => chosen(Math.round(value) - 1)),
+      numberField(`draw of the posterior (1 to ${count}, 0 for none)`, choices.draw === null ? 0 : choices.draw + 1, { key: "draw", least: 0, most: count }, (value) => chosen(value < 0.5 ? null : Math.round(value) - 1)),
       html("button", { type: "button", click: next, "data-key": "next" }, "Next draw"),
       html("button", { type: "button", click: play, "data-key": "play", "aria-pressed": String(this.playing !== 0) }, this.playing ? "Stop" : "Play draws"));
   }
@@ -113,7 +120,8 @@ export class Controls {
     const value = this.choices.values.get(slider.name) ?? slider.value;
     const share = (at: number): number => Math.min(Math.max((at - low) / (high - low), 0), 1);
     const [scale, unit] = slider.unit === "m" ? [1e3, "mm"] : [slider.scale, slider.unit === "1" ? "" : slider.unit];
-    const shown = (at: number): string => `${(scale * at).toPrecision(4)} ${unit}`.trim();
+    const decimals = decimalsOf(scale * slider.sd);
+    const shown = (at: number): string => `${(scale * at).toFixed(decimals).replace("-", "−")} ${raised(unit)}`.trim();
     const output = html("output", {}, shown(value));
     const input = html("input", {
       type: "range", min: 0, max: STEPS, step: "any", "aria-label": slider.meaning || slider.name,
@@ -137,4 +145,14 @@ export class Controls {
       html("span", { class: "name" }, slider.meaning || slider.name), output, input, range,
       html("span", { class: "note" }, `${slider.name}: fitted ${shown(slider.value)}, 5 to 95 % ${shown(slider.q05)} to ${shown(slider.q95)}`));
   }
+}
+
+/** Places after the point that two digits of a posterior's sd reach: more would be invented. */
+function decimalsOf(sd: number): number {
+  return sd > 0 ? Math.min(Math.max(1 - Math.floor(Math.log10(sd)), 0), 8) : 4;
+}
+
+/** A unit with raised exponents, "1/rad^2" as "1/rad²". */
+function raised(unit: string): string {
+  return unit.replace(/\^(-?\d+)/g, (_, power: string) => Array.from(power, (one) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(one)]).join(""));
 }

@@ -177,7 +177,7 @@ export class Drawing {
 
   /** The contact, some hundred times larger: how the edges press the sheet. */
   private lens(view: View, colours: Colours, width: number): void {
-    const radius = Math.min(58, 0.16 * width);
+    const radius = Math.min(58, 0.13 * width);
     const [x, y] = [width - radius - 10, radius + 10];
     const context = this.context;
     const kept: [number, Point] = [this.scale, this.origin];

@@ -29,7 +29,6 @@ const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
 const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
 const TURN_rad = 0.004;
-const STILL_rad_per_s = 1e-4;
 const MOST_SAMPLES = 4000; // of one stroke: 16 s
 
 export class Rig {
@@ -109,16 +108,9 @@ export class Rig {
 
   /** Let a hand move the blades from now on; null gives them back to the pointer. */
   play(script: Script | null): void {
+    if (script || this.script) this.wanted = this.pose; // else keys pressed in a row add up
     this.script = script;
     this.scriptBegan = this.time;
-    this.wanted = this.pose;
-  }
-
-  /** Whether nothing moves: the blades are where the hand wants them. */
-  get isStill(): boolean {
-    const { pose, wanted } = this;
-    return !this.script && Math.abs(this.rate) < STILL_rad_per_s
-      && Math.abs(wanted.advance - pose.advance) < 1e-6;
   }
 
   get isClosing(): boolean {
@@ -157,7 +149,7 @@ export class Rig {
     if (played) {
       next = this.wanted = played;
     } else {
-      next = this.coupling.moved(last, this.wanted, this.step.torque, this.step.force, dt);
+      next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
     this.rate = (next.opening - last.opening) / dt;
     this.pose = next;

@@ -17,15 +17,15 @@ export class Ripple {
     this.hasRumble = isOn;
   }
 
-  /** Energy (J) that cracks released since the last frame. */
-  released(energy: number): void {
+  /** Energy (J) that cracks released since the last frame, and the torque as a share of the largest. */
+  released(energy: number, load: number): void {
     const strength = Math.min(Math.sqrt(energy / FULL_J), 1);
     if (strength < 0.05) return;
     if (this.hasSound && this.context) click(this.context, strength);
     if (!this.hasRumble) return;
     for (const pad of navigator.getGamepads()) {
       void pad?.vibrationActuator?.playEffect("dual-rumble", {
-        duration: RUMBLE_ms, strongMagnitude: strength, weakMagnitude: 0.5 * strength,
+        duration: RUMBLE_ms, strongMagnitude: strength, weakMagnitude: Math.min(Math.max(load, 0), 1),
       });
     }
   }
