@@ -19,6 +19,7 @@ from scissorcal.model.curvature import (
     response_breaks,
     response_curvature,
 )
+from scissorcal.package.drawn_plate import hardest_layer
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_functions, friction_tables
 from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
@@ -166,6 +167,9 @@ def table_laws(model: ExactModel, recipe: Recipe) -> dict[str, TableLaw]:
     """
     points = spread_points(scene_ranges(recipe), SCOUTS)
     reach = _reach(model, points, recipe.limits.torque_Nm)
+    if recipe.plate.layers:
+        deepest = _reach(*hardest_layer(model, recipe, points)).indentation
+        reach = replace(reach, indentation=max(reach.indentation, deepest))
     cutting = model.cutting
     edge, response = cutting.edge, cutting.response
     functions = law_functions(model)

@@ -1,6 +1,7 @@
 """A drawn plate in a package: its pieces, from the recipe's layers and the fitted energy."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, Strict
@@ -11,6 +12,8 @@ from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import LayerPiece
+    from scissorcal.package.exact import ExactModel
+    from scissorcal.package.grid import Points
     from scissorcal.recipe.schema import Recipe
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -73,6 +76,23 @@ def piece_records(
         )
         for piece in found
     )
+
+
+def hardest_layer(
+    model: "ExactModel", recipe: "Recipe", points: "Points"
+) -> "tuple[ExactModel, Points, float]":
+    """A sheet as tough and as high as any of a drawn plate, the points, and its torque limit.
+
+    As deep as the blades press that one the tables of the response have to reach.
+    """
+    layers, cutting = recipe.plate.layers, model.cutting
+    ratios = [layer.toughness_ratio for layer in layers]
+    ratios += [region.toughness_ratio for layer in layers for region in layer.regions]
+    thickness = [layer.thickness_mm / recipe.material.thickness_mm for layer in layers]
+    energy = None if cutting.fracture_energy is None else max(ratios) * cutting.fracture_energy
+    face = max(1.0, sum(thickness)) * cutting.upper_face_m
+    sheet = replace(cutting, fracture_energy=energy, upper_face_m=face)
+    return replace(model, cutting=sheet), points, recipe.limits.torque_Nm / min(1.0, *thickness)
 
 
 def kernel_pieces(records: Sequence[PieceRecord]) -> tuple[Piece, ...]:

@@ -88,7 +88,7 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
         energy = max(strip.fracture_energy_J_per_m for strip in piece.strips) / piece.scale
         sheet = replace(tables, upper_face=piece.upper_face_m, fracture_energy=energy)
         each.append(needs_of(sheet, torque_limit / piece.scale))
-    reach = tables.tip_station if np.isfinite(tables.tip_station) else tables.contact_max
+    reach = _pressed_m(tables, pieces)
     scales = [piece.scale for piece in pieces]
 
     def together(amounts: Sequence[float]) -> float:
@@ -102,6 +102,19 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
         drop_Nm=together([one.drop_Nm for one in each]),
         damper=together([one.damper for one in each]),
     )
+
+
+def _pressed_m(tables: ModelTables, pieces: Sequence[Piece]) -> float:
+    """Most length (m) of material along the cut that lies below a blade's edge at once.
+
+    Between the place where it stands deepest and the one where it leaves the highest face: the
+    depth of the response's table, and what faces differ in height, over the least slope.
+    """
+    beta = tables.opening_min / tables.moving_blades
+    slope = np.tan(beta + np.arctan(float(tables.edge.slope.min())))
+    faces = [piece.upper_face_m for piece in pieces]
+    depth = float(tables.response.x[-1]) + max(faces) - min(faces)
+    return float(min(depth / max(slope, 1e-6), tables.tip_station))
 
 
 def softened(tables: ModelTables, steepest: float) -> ModelTables:
