@@ -1,6 +1,7 @@
 // The hand that moves the blades: by pointer and keys through a spring, or one that is replayed.
 
-import { Law } from "./law";
+import { AT } from "./kernel";
+import { heldValue, Law } from "./law";
 import { Hand, Scene, unpack } from "./scene";
 
 export interface Pose {
@@ -14,6 +15,7 @@ export type Script = (time: number) => Pose | null;
 const LAG_rad = 0.15; // by which the blades stay behind the hand at the largest torque of the scene
 const LAG_m = 0.003;
 const SETTLES_s = 0.03;
+const HELD = 5; // times the largest torque: what a hand at the other end of the scene's openings can give
 const PUSH_N = 3;
 
 /** A hand that holds the handles by a spring: it feels by how far the blades stay behind. */
@@ -22,26 +24,41 @@ export class Coupling {
   private readonly damping: number;
   private readonly push = PUSH_N / LAG_m;
 
-  constructor(scene: Scene, law: Law, largestTorque: number) {
+  constructor(scene: Scene, private readonly law: Law, largestTorque: number) {
     this.stiffness = largestTorque / LAG_rad;
     // A step is stable while damping exceeds half of what the material's stiffness does in a tick.
-    const material = materialStiffness(scene, law) / scene.loop_rate_Hz;
+    const material = materialStiffness(scene, law, HELD * largestTorque) / scene.loop_rate_Hz;
     this.damping = Math.max(this.stiffness * SETTLES_s, material);
   }
 
-  /** The pose after dt, of blades that feel a torque (positive opens) and a force along the cut. */
+  /**
+   * The pose after dt, of blades that feel the material's torque (positive opens) and a force along the cut.
+   *
+   * Dry friction is not fed back through the torque of the tick before, which would make resting blades
+   * chatter: it holds them until hand and material exceed it, and takes its level off then.
+   */
   moved(at: Pose, wanted: Pose, torque: number, force: number, dt: number): Pose {
-    const turn = (this.stiffness * (wanted.opening - at.opening) + torque) / this.damping;
+    const drive = this.stiffness * (wanted.opening - at.opening) + torque;
+    const held = this.friction(at.opening, drive, Math.abs(drive) / this.damping);
+    const turn = Math.abs(drive) <= held ? 0 : (drive - Math.sign(drive) * held) / this.damping;
     const slide = (this.push * (wanted.advance - at.advance) + force) / (this.push * SETTLES_s);
     return { opening: at.opening + dt * turn, advance: at.advance + dt * slide };
   }
+
+  /** Level of the law's friction (N m) at a speed, on the side to which the blades are driven. */
+  private friction(opening: number, drive: number, speed: number): number {
+    const { tables, numbers } = this.law;
+    if (!numbers[AT.renderFriction]) return 0;
+    const side = drive > 0 ? tables.friction_opening : tables.friction_closing;
+    return heldValue(side, speed) * heldValue(tables.friction_angle, opening);
+  }
 }
 
-/** Largest stiffness (N m/rad) with which the material resists closing, up to the torque limit. */
-function materialStiffness(scene: Scene, law: Law): number {
+/** Largest stiffness (N m/rad) with which the material resists closing, up to a torque. */
+function materialStiffness(scene: Scene, law: Law, torque: number): number {
   const { y, slope } = law.tables.response;
   const [near, far] = scene.contact_m;
-  const strongest = (2 * scene.torque_limit_Nm) / near;
+  const strongest = torque / near;
   let stiffest = 0;
   for (let i = 0; i < y.length; i++) if (i === 0 || y[i - 1] < strongest) stiffest = Math.max(stiffest, slope[i]);
   return (stiffest * far * far) / scene.moving_blades;

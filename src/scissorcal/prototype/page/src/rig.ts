@@ -109,9 +109,9 @@ export class Rig {
 
   /** Let a hand move the blades from now on; null gives them back to the pointer. */
   play(script: Script | null): void {
+    if (this.script || script) this.wanted = this.pose;
     this.script = script;
     this.scriptBegan = this.time;
-    this.wanted = this.pose;
   }
 
   /** Whether nothing moves: the blades are where the hand wants them. */
@@ -157,7 +157,7 @@ export class Rig {
     if (played) {
       next = this.wanted = played;
     } else {
-      next = this.coupling.moved(last, this.wanted, this.step.torque, this.step.force, dt);
+      next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
     this.rate = (next.opening - last.opening) / dt;
     this.pose = next;
