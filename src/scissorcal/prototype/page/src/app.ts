@@ -18,6 +18,7 @@ import { Server } from "./socket";
 import { View, View3d } from "./view3d";
 
 const CHARTS_EVERY_ms = 50;
+const AT_REST_ms = 250;
 
 export class App {
   readonly rig: Rig;
@@ -36,6 +37,7 @@ export class App {
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
   private drawn: Drawn | null = null;
+  private drawnAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
   private readonly largestTorque: number;
@@ -91,6 +93,9 @@ export class App {
     rig.pass(seconds);
     this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
+    // at rest nothing changes but colours and sizes: four pictures a second are enough
+    if (rig.isStill && !this.panel?.pose && now - this.drawnAt < AT_REST_ms) return this.run();
+    this.drawnAt = now;
     this.draw();
     this.readout.show(rig, now);
     if (now - this.chartedAt >= CHARTS_EVERY_ms) {
