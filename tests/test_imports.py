@@ -169,7 +169,7 @@ LOADS = {
         "try:\n    run(['plan', '--json'])\n"
         "except SystemExit as end:\n    assert end.code == 0, end.code\n",
         {"numpy", "h5py", "mcap", "scissorcal.device", "scissorcal.calibration"},
-        326,
+        327,
     ),
     "package": (
         "import scissorcal.package.build, scissorcal.workday.runs.package\n",

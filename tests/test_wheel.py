@@ -1,5 +1,6 @@
 """Wheel and source archive carry recipes, schemas and what a browser needs, and build anywhere."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -155,11 +156,15 @@ def test_an_install_without_a_page_says_how_and_works(
         assert not (tmp_path / "made" / name).exists()
 
 
-def test_the_lock_of_the_page_names_no_host() -> None:
-    lock = (ROOT / "src/scissorcal/prototype/page/package-lock.json").read_text(encoding="utf-8")
-    assert '"integrity"' in lock
-    assert '"resolved"' not in lock
-    assert "://" not in lock
+def test_the_lock_of_the_page_names_no_registry() -> None:
+    lock = ROOT / "src/scissorcal/prototype/page/package-lock.json"
+    packages = json.loads(lock.read_text(encoding="utf-8"))["packages"]
+    installed = {name: package for name, package in packages.items() if name}
+    assert len(installed) > 10
+    for package in installed.values():
+        assert package["integrity"].startswith("sha512-")
+        package.pop("funding", None)  # pages of those who wrote it
+        assert "://" not in json.dumps(package)
 
 
 def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:

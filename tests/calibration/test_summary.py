@@ -9,17 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from scissorcal.calibration.plateau import plateau_of
+from scissorcal.calibration.stroke_intervals import difference_interval, mean_interval
 from scissorcal.calibration.summary import (
     BINS,
     LogSummary,
     common_places,
     difference,
-    difference_interval,
     effort_unit,
     friction_of,
-    mean_interval,
     plateau_in,
-    plateau_of,
     slope_in,
     summarise,
 )

@@ -1,7 +1,6 @@
-"""The page of a package in a browser: strokes, numbers, parts, sliders, themes, a phone."""
+"""The page of a package, opened from disk: what it draws, and how a person works it."""
 
-import base64
-import json
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,19 +8,60 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page
 
-from scissorcal.package import ModelPackage, build_package, open_package
-from scissorcal.package.variations import central_values
+from scissorcal.package import build_package, open_package
+from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.variations import central_values, variations
 from scissorcal.prototype.document import page_of
-from scissorcal.prototype.scene import Scene, scene_of
+from scissorcal.prototype.scene import scene_of
 from tests.browser import Seen, open_browser, open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
+from tests.prototype.test_scene import unpacked as read
 
 MOST_BYTES = 1_000_000
-WIDE = {"width": 1400, "height": 1000}
-PHONE = {"width": 390, "height": 844}
+WAIT_S = 30.0
+UNNAMED = """() => [...document.querySelectorAll("input, button, select, textarea, canvas.plain")]
+  .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
+    || [...(one.labels || [])].some((label) => label.textContent.trim())))
+  .map((one) => one.outerHTML)"""
+LAW = """() => { const plain = (law) => ({ numbers: law.numbers, tables: Object.fromEntries(
+    Object.entries(law.tables).map(([name, t]) => [name, [[...t.y], [...t.slope]]])) });
+  return [plain(scissorcal.laws.fitted), plain(scissorcal.laws.whatIf)]; }"""
+
+
+@dataclass
+class Shown:
+    """A package and its page; ``seen`` is what the page must not have done."""
+
+    package: ModelPackage
+    scene: Any
+    page: Page
+    seen: Seen
+
+    def run(self, script: str, *given: Any) -> Any:
+        return self.page.evaluate(script, *given)
+
+    def until(self, script: str) -> None:
+        """Wait until an expression of the app `a` is true; the page's policy forbids eval in it."""
+        end = time.monotonic() + WAIT_S
+        while not self.run(f"() => {{ const a = scissorcal; return {script}; }}"):
+            assert time.monotonic() < end, f"waited in vain until {script}"
+            self.page.wait_for_timeout(30)
+
+    def stroke(self) -> None:
+        """One stroke by the key, to its end."""
+        self.page.locator("canvas.plain").focus()
+        self.page.keyboard.press("Space")
+        assert self.run("() => scissorcal.rig.plays")
+        self.until("!a.rig.plays")
+
+    def part(self, name: str, is_on: bool) -> None:
+        self.page.locator(f"[data-part={name}]").set_checked(is_on)
+
+    def torque(self, opening: Any, rate: float, contact: float) -> Any:
+        script = "([openings, rate, contact]) => scissorcal.torqueAt(openings, rate, contact)"
+        return np.array(self.run(script, [list(opening), rate, contact]))
 
 
 @pytest.fixture(scope="module")
@@ -31,277 +71,220 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def package(tmp_path_factory: pytest.TempPathFactory) -> ModelPackage:
-    chosen = recipe()
-    friction = friction_fit(coulomb=0.014, stribeck=0.004, viscous=0.002)
-    path = tmp_path_factory.mktemp("package") / "paper.zip"
-    build_package(chosen, friction, cut_fit(chosen, kappa=0.75), path, np.random.default_rng(3))
-    return open_package(path, warn=False)
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[ModelPackage, Any, Path]:
+    chosen, folder = recipe(), tmp_path_factory.mktemp("page")
+    cut = cut_fit(chosen, kappa=0.75)
+    path = folder / "paper.zip"
+    build_package(chosen, friction_fit(), cut, path, np.random.default_rng(3))
+    package = open_package(path, warn=False)
+    told = {"made_utc": "2026-11-24T00:00:00Z", "version": "1", "warnings": ("The rig is old.",)}
+    scene = scene_of(package, **told)
+    (folder / "paper.html").write_text(page_of(scene), encoding="utf-8")
+    return package, scene, folder / "paper.html"
 
 
-@pytest.fixture(scope="module")
-def scene(package: ModelPackage) -> Scene:
-    return scene_of(package, made_utc="2026-01-02T03:04:05Z", version="0")
-
-
-@pytest.fixture(scope="module")
-def file(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("page") / "page.html"
-    path.write_text(page_of(scene), encoding="utf-8")
-    return path
-
-
-@dataclass
-class Open:
-    """An open page with its numbers."""
-
-    page: Page
-    seen: Seen
-
-    def run(self, code: str, given: Any = None) -> Any:
-        return self.page.evaluate(code, given)
-
-    def number(self, name: str) -> float:
-        row = self.page.locator(f'[data-number="{name}"] dd').first
-        return float(row.inner_text().split()[0].replace("\u2212", "-"))
-
-    def settle(self, seconds: float = 0.6) -> None:
-        """Let the page's own time pass; it has less of it than the clock on a busy computer."""
-        until = self.run("() => scissorcal.rig.time") + seconds
-        while self.run("() => scissorcal.rig.time") < until:
-            self.page.wait_for_timeout(50)
-
-    def set_slider(self, name: str, value: float) -> None:
-        code = """([name, value]) => {
-            const input = document.querySelector(`[data-slider="${name}"]`);
-            input.value = value;
-            input.dispatchEvent(new Event("input", { bubbles: true }));
-        }"""
-        self.run(code, [name, value])
+def opened(browser: Browser, built: Any, **context: Any) -> Iterator[Shown]:
+    package, scene, path = built
+    page, seen = open_file(browser, path, **context)
+    shown = Shown(package, scene, page, seen)
+    page.wait_for_selector("canvas.plain")
+    shown.until("a && a.frames.count > 2")
+    yield shown
+    page.context.close()
+    assert seen.errors == []
 
 
 @pytest.fixture
-def opened(browser: Browser, file: Path) -> Iterator[Open]:
-    with_page = open_page(browser, file, viewport=WIDE)
-    yield with_page
-    close(with_page)
+def shown(browser: Browser, built: Any) -> Iterator[Shown]:
+    yield from opened(browser, built, viewport={"width": 1280, "height": 900})
 
 
-def open_page(browser: Browser, file: Path, **context: object) -> Open:
-    page, seen = open_file(browser, file, **context)
-    page.locator("[data-number=torque]").wait_for()
-    return Open(page, seen)
+@pytest.fixture
+def phone(browser: Browser, built: Any) -> Iterator[Shown]:
+    context = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    yield from opened(browser, built, color_scheme="dark", **context)
 
 
-def close(opened: Open) -> None:
-    opened.page.context.close()
-    assert opened.seen.errors == []
-    assert opened.seen.elsewhere == []
+def test_the_file_alone_is_the_page(shown: Shown, built: Any) -> None:
+    path = built[2]
+    assert path.stat().st_size < MOST_BYTES
+    assert [url for url in shown.seen.requests if not url.startswith("data:")] == [path.as_uri()]
+    told = shown.page.locator("header .warning").all_inner_texts()
+    assert told == ["The rig is old.", *shown.package.warnings]
+    assert shown.page.locator("h1").inner_text() == shown.package.manifest.name
 
 
-def drag(opened: Open, share: float) -> None:
-    """Pull the pointer down over a share of the drawing's height: closes the blades."""
-    canvas = opened.page.locator("canvas.plain")
-    canvas.scroll_into_view_if_needed()
-    box = canvas.bounding_box()
+def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
+    box = shown.page.locator("canvas.plain").bounding_box()
     assert box is not None
-    x, top = box["x"] + 0.3 * box["width"], box["y"] + 0.1 * box["height"]
-    mouse = opened.page.mouse
-    mouse.move(x, top)
+    before = shown.run("() => scissorcal.rig.crackMost")
+    mouse, x = shown.page.mouse, box["x"] + 0.5 * box["width"]
+    mouse.move(x, box["y"] + 30)
     mouse.down()
-    for i in range(1, 16):
-        mouse.move(x, top + share * box["height"] * i / 15)
-        opened.page.wait_for_timeout(20)
+    mouse.move(x, box["y"] + box["height"] - 10, steps=12)
+    shown.until("a.rig.wanted.opening < 0.5 * a.scene.opening_rad[1]")
     mouse.up()
+    # at rest, behind the hand by what friction holds: at most the lag at the largest torque
+    shown.until("a.rig.rate === 0 && a.rig.pose.opening - a.rig.wanted.opening < 0.15")
+    shown.page.wait_for_timeout(500)  # the numbers are shown ten times a second
+    after = shown.run("() => scissorcal.rig.crackMost")
+    assert after > before + 0.005
+    number = shown.page.locator("[data-number=crack] dd").inner_text()
+    assert float(number.split()[0]) == pytest.approx(1e3 * after, abs=0.06)
 
 
-def test_a_stroke_by_the_pointer_cuts_the_sheet(opened: Open, scene: Scene) -> None:
-    assert opened.number("crack") == 0.0
-    before = opened.number("opening")
-    assert before == pytest.approx(np.degrees(scene.opening_rad[1]), abs=0.1)
-    drag(opened, 0.45)
-    opened.settle()
-    assert opened.number("opening") < before - 20.0
-    assert opened.number("crack") > 5.0
-    assert opened.number("torque") > 10.0
-    assert opened.number("fracture") > 0.5
-    assert abs(opened.number("error")) < 0.05 * opened.number("work of the hand")
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_torque_drawn_is_that_of_the_package(shown: Shown, sign: float) -> None:
+    inside = np.linspace(*shown.scene.opening_rad, 63)[1:-1]
+    openings = inside.astype(np.float32).astype(float)
+    rate = sign * 0.5 * sum(shown.scene.opening_rate_rad_per_s)
+    for contact in np.linspace(*shown.scene.contact_m, 3):
+        own = shown.package.torque(openings, rate, contact)
+        found = shown.torque(openings, rate, contact)
+        assert np.ptp(own) > 1e-3
+        np.testing.assert_allclose(found, own, rtol=0, atol=1e-5 * np.abs(own).max() + 1e-7)
 
 
-def test_blades_lag_behind_the_pointer_by_the_force(opened: Open) -> None:
-    lag = "() => scissorcal.rig.pose.opening - scissorcal.rig.wanted.opening"
-    drag(opened, 0.4)
-    opened.settle(1.0)
-    loaded = opened.run(lag)
-    step = opened.run("() => scissorcal.rig.step.torque")
-    assert step > 0.01
-    assert loaded > 0.01, "the sheet holds the blades open"
-    opened.run("() => scissorcal.rig.freshSheet()")
-    opened.settle()
-    assert abs(opened.run(lag)) < 0.003
+def test_parts_of_the_law_can_be_left_out(shown: Shown) -> None:
+    openings = np.linspace(*shown.scene.opening_rad, 31)
+    near, far = shown.scene.contact_m
+    whole = shown.torque(openings, -0.3, near)
+    shown.part("friction", False)
+    material = shown.torque(openings, -0.3, near)
+    shown.part("response", False)
+    assert np.all(shown.torque(openings, -0.3, near) == 0.0)
+    shown.part("friction", True)
+    friction = shown.torque(openings, -0.3, near)
+    assert friction.min() > 0.0
+    assert np.all(shown.torque(openings, 0.3, near) < 0.0)
+    assert np.all(shown.torque(openings, -0.3, far) == friction)
+    np.testing.assert_allclose(material + friction, whole, atol=1e-6 * whole.max())
 
 
-def test_blades_at_rest_do_not_chatter(opened: Open) -> None:
-    """Dry friction holds them; it does not push back and forth from tick to tick."""
-    drag(opened, 0.4)
-    opened.settle(1.0)
-    torques = opened.run("() => scissorcal.rig.recent.slice(-50).map((one) => one.torque)")
-    assert np.ptp(torques) < 1e-6
-    assert opened.run("() => Math.abs(scissorcal.rig.rate)") < 1e-5
+def test_without_fracture_the_crack_stays(shown: Shown) -> None:
+    shown.part("fracture", False)
+    before = shown.run("() => scissorcal.rig.crackMost")
+    shown.stroke()
+    assert shown.run("() => scissorcal.rig.crackMost") == before
+    shown.part("fracture", True)
+    shown.stroke()
+    assert shown.run("() => scissorcal.rig.crackMost") > before + 0.005
 
 
-def test_the_keyboard_does_what_the_pointer_does(opened: Open) -> None:
-    canvas = opened.page.locator("canvas.plain")
-    canvas.focus()
-    for _ in range(12):
-        canvas.press("ArrowDown")
-    opened.settle()
-    assert opened.number("opening") < 30.0
-    crack = opened.number("crack")
-    assert crack > 0.0
-    canvas.press("ArrowRight")
-    opened.settle(0.4)
-    canvas.press(" ")
-    opened.settle(2.5)
-    assert opened.number("crack") > crack
-    canvas.press("f")
-    opened.settle(0.2)
-    assert opened.number("crack") == 0.0
+def test_energy_is_accounted_for_over_a_stroke(shown: Shown) -> None:
+    shown.stroke()
+    energy = shown.run("() => ({ ...scissorcal.rig.energy })")
+    spent = sum(energy[name] for name in ("stored", "fracture", "arrest", "friction"))
+    assert energy["hand"] > 1e-3
+    assert energy["fracture"] > 0.0
+    assert energy["friction"] > 0.0
+    assert abs(energy["hand"] - spent) < 0.02 * energy["hand"]
 
 
-def test_the_pages_torque_is_the_packages(opened: Open, package: ModelPackage) -> None:
-    """Within float32, at 3,000 places of the scene, in both directions."""
-    rng = np.random.default_rng(5)
-    ranges = package.manifest.ranges
-    for rate in (-0.9, -0.05, 0.3):
-        for contact in rng.uniform(*ranges.contact_m, 10):
-            openings = rng.uniform(*ranges.opening_rad, 100)
-            wanted = package.torque(openings, rate, np.float32(contact))
-            found = opened.run(
-                "([o, r, c]) => scissorcal.torqueAt(o, r, c)", [openings.tolist(), rate, contact]
+@pytest.mark.parametrize("name", ["response_force", "fracture_energy", "coulomb"])
+def test_a_slider_moves_the_law_to_what_the_model_says(shown: Shown, name: str) -> None:
+    slider = next(one for one in shown.scene.sliders if one.name == name)
+    nodes = read(slider.nodes).astype(float)
+    shown.stroke()
+    shown.page.locator(f"[data-slider={name}]").evaluate(
+        "(one, at) => { one.value = String(at * Number(one.max));"
+        " one.dispatchEvent(new Event('input')); }",
+        (nodes[12] - nodes[0]) / (nodes[-1] - nodes[0]),
+    )
+    cut, friction = central_values(shown.package)
+    assert friction is not None
+    both = np.tile(np.concatenate([cut, friction]), (2, 1))
+    both[1, slider.column] = nodes[12]
+    law = variations(shown.package, both[:, : len(cut)], both[:, len(cut) :])
+    fitted, what_if = shown.run(LAW)
+    for table in fitted["tables"]:
+        moved = np.array(what_if["tables"][table]) - np.array(fitted["tables"][table])
+        wanted = np.diff(law.rows[table], axis=0)[0] if table in law.rows else 0.0 * moved
+        largest = np.abs(what_if["tables"][table]).max(axis=1, keepdims=True)
+        assert np.all(np.abs(moved - wanted) <= 2e-6 * largest), table
+    energy, kappa, damping = what_if["numbers"][4:7]
+    assert energy == pytest.approx(law.fracture_energy[1], rel=1e-6)
+    assert kappa == pytest.approx(law.kappa[1], rel=1e-6)
+    assert damping == law.rate_damping[1]
+    assert what_if != fitted
+
+
+def test_the_law_that_is_felt_changes_the_torque(shown: Shown) -> None:
+    assert shown.run("() => scissorcal.rig.active") == "fitted"
+    shown.page.locator("[data-slider=coulomb]").evaluate(
+        "(one) => { one.value = one.max; one.dispatchEvent(new Event('input')); }"
+    )
+    moving = "() => { const k = scissorcal.rig.kernels[scissorcal.rig.active];"
+    moving += (
+        " return k.step(scissorcal.rig.pose.opening, -0.3, scissorcal.rig.pose.advance).torque; }"
+    )
+    before = shown.run(moving)
+    shown.page.get_by_label("what if", exact=True).check()
+    assert shown.run("() => scissorcal.rig.active") == "whatIf"
+    assert shown.run(moving) > before + 1e-3
+
+
+def test_a_draw_sets_the_sliders(shown: Shown) -> None:
+    values = read(shown.scene.draws.values)
+    for draw in (0, 1):
+        shown.page.get_by_role("button", name="Next draw").click()
+        assert shown.run("() => scissorcal.controls.choices.draw") == draw
+        chosen = shown.run("() => Object.fromEntries(scissorcal.controls.choices.values)")
+        for slider in shown.scene.sliders:
+            nodes = read(slider.nodes)
+            own = values[draw, slider.column]
+            assert chosen[slider.name] == own
+            at = float(shown.page.locator(f"[data-slider={slider.name}]").input_value())
+            assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
+
+
+def test_blades_that_nobody_moves_stand_still(shown: Shown) -> None:
+    shown.page.locator("canvas.plain").press("ArrowDown")
+    shown.page.wait_for_timeout(700)
+    before = shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]")
+    shown.page.wait_for_timeout(500)
+    assert shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]") == before
+    assert shown.run("() => scissorcal.rig.rate") == 0.0
+
+
+def test_keys_alone_work_the_page(shown: Shown) -> None:
+    reached: set[str] = set()
+    for _ in range(80):
+        shown.page.keyboard.press("Tab")
+        reached.add(
+            shown.run(
+                "() => document.activeElement.tagName + ' ' + document.activeElement.textContent"
             )
-            largest = np.abs(wanted).max()
-            np.testing.assert_allclose(found, wanted, rtol=3e-6, atol=3e-6 * largest)
+        )
+        if any(one.startswith("SUMMARY Draw") for one in reached):
+            break
+    wanted = {"CANVAS ", "BUTTON One stroke", "BUTTON Fresh sheet", "BUTTON Next draw"}
+    assert wanted <= reached
+    shown.page.locator("canvas.plain").focus()
+    before = shown.run("() => scissorcal.rig.pose")
+    for key in ("ArrowDown", "ArrowDown", "ArrowDown", "Shift+ArrowRight"):
+        shown.page.keyboard.press(key)
+    wanted_now = shown.run("() => scissorcal.rig.wanted")
+    assert wanted_now["opening"] == pytest.approx(before["opening"] - 3 * 0.035)
+    assert wanted_now["advance"] == pytest.approx(before["advance"] + 0.005)
+    shown.until(f"a.rig.rate === 0 && a.rig.pose.opening < {before['opening']} - 0.06")
+    shown.until(f"a.rig.pose.advance > {before['advance']} + 0.003")
+    assert shown.run(UNNAMED) == []
 
 
-def test_parts_that_are_off_give_nothing(opened: Open) -> None:
-    page = opened.page
-    page.locator('[data-part="friction"]').uncheck()
-    drag(opened, 0.45)
-    opened.settle()
-    assert opened.number("of it friction") == 0.0
-    assert opened.number("friction") == 0.0
-    assert opened.number("torque") > 5.0
-    page.locator('[data-part="response"]').uncheck()
-    opened.settle()
-    assert opened.number("torque") == 0.0
-    assert opened.run("() => scissorcal.torqueAt([0.3, 0.5], -0.3, 0.03)") == [0.0, 0.0]
-    page.locator('[data-part="friction"]').check()
-    page.locator('[data-part="response"]').check()
-    page.locator('[data-part="fracture"]').uncheck()
-    opened.run("() => scissorcal.rig.freshSheet()")
-    drag(opened, 0.25)
-    opened.settle()
-    assert opened.number("crack") == 0.0, "without fracture a sheet is only pressed"
-    assert opened.number("fracture") == 0.0
+def test_a_phone_shows_all_without_scrolling_sideways(phone: Shown) -> None:
+    width = phone.run("() => [document.documentElement.scrollWidth, window.innerWidth]")
+    assert width == [390, 390]
+    background = "() => getComputedStyle(document.body).backgroundColor"
+    dark = phone.run(background)
+    phone.page.emulate_media(color_scheme="light")
+    assert (dark, phone.run(background)) == ("rgb(20, 23, 26)", "rgb(255, 255, 255)")
 
 
-def test_a_slider_changes_the_law_as_variations_says(opened: Open, scene: Scene) -> None:
-    """At the last node, where the page's law is the row that was evaluated there."""
-    slider = next(one for one in scene.sliders if one.name == "response_force")
-    rows = unpacked(slider.rows.tables["response"])
-    centre = unpacked(scene.centre.tables["response"])[0]
-    own = unpacked(scene.tables["response"])
-    opened.set_slider("response_force", 400)
-    found = opened.run("() => Array.from(scissorcal.laws.whatIf.tables.response.y)")
-    wanted = own[1] + rows[-1, 0] - centre[0]
-    np.testing.assert_allclose(found, wanted, rtol=2e-6, atol=1e-7)
-    untouched = opened.run("() => Array.from(scissorcal.laws.fitted.tables.response.y)")
-    np.testing.assert_array_equal(np.float32(untouched), own[1])
-    opened.page.get_by_text("Reset what if").click()
-    found = opened.run("() => Array.from(scissorcal.laws.whatIf.tables.response.y)")
-    np.testing.assert_array_equal(np.float32(found), own[1])
-
-
-def test_what_if_stands_beside_as_fitted_and_is_felt_after_a_swap(opened: Open) -> None:
-    opened.set_slider("fracture_energy", 400)
-    drag(opened, 0.45)
-    opened.settle()
-    beside = "what if, the same motion"
-    assert opened.number(beside) > 1.15 * opened.number("torque")
-    canvas = opened.page.locator("canvas.plain")
-    canvas.focus()
-    canvas.press("s")
-    assert opened.run("() => scissorcal.rig.active") == "whatIf"
-    assert opened.page.locator('[data-key="whatIf"]').is_checked()
-
-
-def test_a_draw_of_the_posterior_moves_every_slider(
-    opened: Open, package: ModelPackage, scene: Scene
-) -> None:
-    field = opened.page.locator('[data-key="draw"]')
-    field.fill("3")
-    field.press("Tab")
-    values = opened.run("() => Object.fromEntries(scissorcal.controls.choices.values)")
-    drawn = np.hstack([package.arrays["draws/cut.npy"], package.arrays["draws/friction.npy"]])[2]
-    assert len(central_values(package)[0]) < len(drawn)
-    for slider in scene.sliders:
-        assert values[slider.name] == pytest.approx(drawn[slider.column], rel=1e-6)
-    opened.page.locator('[data-key="draw"]').fill("0")
-    opened.page.locator('[data-key="draw"]').press("Tab")
-    assert opened.run("() => scissorcal.controls.choices.draw") is None
-
-
-def test_warnings_come_first(opened: Open, scene: Scene) -> None:
-    assert scene.warnings
-    found = opened.page.locator("header .warning")
-    assert tuple(found.all_inner_texts()) == scene.warnings
-    first, stage = found.first.bounding_box(), opened.page.locator("canvas.plain").bounding_box()
-    assert first is not None
-    assert stage is not None
-    assert first["y"] < stage["y"]
-
-
-def test_every_control_has_a_name_and_can_be_reached_by_keys(opened: Open) -> None:
-    nameless = opened.run(
-        """() => [...document.querySelectorAll("button, input, select, canvas[tabindex]")]
-        .filter((e) => !e.closest("[hidden]"))
-        .filter((e) => !(e.getAttribute("aria-label") || e.labels?.[0]?.textContent.trim()
-            || e.textContent.trim()))
-        .map((e) => e.outerHTML)"""
-    )
-    assert nameless == []
-    assert opened.run("() => document.querySelectorAll('[tabindex=\"-1\"]').length") == 0
-    said = opened.page.locator("[aria-live=polite]")
-    expect(said).to_contain_text("degrees")
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_phone_and_both_themes(browser: Browser, file: Path, scheme: str) -> None:
-    opened = open_page(
-        browser, file, viewport=PHONE, color_scheme=scheme, has_touch=True, reduced_motion="reduce"
-    )
-    width = opened.run("() => document.documentElement.scrollWidth")
-    assert width <= PHONE["width"], "nothing has to be scrolled sideways"
-    paper, ink = opened.run(
-        """() => [getComputedStyle(document.body).backgroundColor,
-                  getComputedStyle(document.body).color]"""
-    )
-    brightness = [sum(map(int, text[4:-1].split(","))) for text in (paper, ink)]
-    assert (brightness[0] < brightness[1]) == (scheme == "dark")
-    opened.page.locator("canvas.plain").tap()
-    close(opened)
-
-
-def test_the_page_is_one_file_below_a_megabyte_without_script_from_elsewhere(file: Path) -> None:
-    page = file.read_text(encoding="utf-8")
-    assert len(page.encode()) < MOST_BYTES
-    policy = page.partition('http-equiv="Content-Security-Policy" content="')[2].partition('"')[0]
-    assert "unsafe-inline" not in policy
-    assert "connect-src &#x27;none&#x27;" in policy
-    data = page.partition('id="scene">')[2].partition("</script>")[0]
-    assert json.loads(data)["format"] == "scissorcal-prototype/1"
-
-
-def unpacked(packed: Any) -> NDArray[np.float32]:
-    return np.frombuffer(base64.b64decode(packed.base64), "<f4").reshape(packed.shape)
+def test_the_solid_view_and_the_designer_open(shown: Shown) -> None:
+    shown.page.get_by_label("3-D").check()
+    shown.page.locator(".solid canvas").first.wait_for(state="visible")
+    assert shown.page.locator("canvas.plain").is_hidden()
+    shown.page.get_by_text("Draw plates and blades").click()
+    shown.page.locator(".design button").first.wait_for(state="visible")
+    assert shown.run(UNNAMED) == []

@@ -9,13 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scissorcal.package import ModelPackage, build_package, open_package
+from scissorcal.package import ModelPackage, PackageSummary, build_package, open_package
 from scissorcal.package.compile import table_file
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.arrays import Numbers
 from scissorcal.prototype.parts import Slider
 from scissorcal.prototype.scene import NODES, Scene, scene_of, slider_nodes
+from tests.package.conftest import pad
 from tests.package.fits import cut_fit, friction_fit, recipe
+
+__all__ = ["pad"]
 
 FLOAT32 = 2e-7
 """Relative: half a place of float32, twice."""
@@ -185,3 +188,11 @@ def test_nodes_ascend_around_the_value_and_keep_a_certain_sign(
 def test_a_number_that_is_not_finite_in_float32_is_refused(wrong: float) -> None:
     with pytest.raises(ValueError, match="finite"), np.errstate(over="ignore"):
         Numbers.of([1.0, wrong])
+
+
+def test_a_pad_that_is_only_pressed_has_neither_crack_nor_friction(pad: PackageSummary) -> None:
+    scene = scene_of(open_package(pad.path, warn=False), made_utc="2026", version="1")
+    assert {slider.name for slider in scene.sliders} == {"response_force", "response_exponent"}
+    assert (scene.mean_energy, scene.levels) == (None, ())
+    assert {band.friction for band in scene.bands} == {False}
+    assert np.all(unpacked(scene.centre.fracture_energy) == 0.0)

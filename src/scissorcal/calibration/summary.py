@@ -10,8 +10,15 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from scissorcal.calibration.plateau import plateau_of
+from scissorcal.calibration.stroke_intervals import (
+    FEWEST,
+    Interval,
+    difference_interval,
+    mean_interval,
+    trend_interval,
+)
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording, StrokeKind
 
@@ -19,31 +26,12 @@ Array = NDArray[np.float64]
 Effort = Literal["motor_torque", "handle_force"]
 
 BINS = 60
-LEVEL = 0.90
 ENVELOPE = (0.1, 0.9)
-FEWEST = 3
-"""Strokes without which no interval is given."""
 EDGE = 0.05
 """Share of a stroke's travel at either end that is left out: there the joint speeds up or stops."""
 SPEED_CLASS = 1.4
 """Speeds further apart than this factor are different classes."""
-FLAT = 0.2
-"""On a plateau the mean curve stays within this share of its mean, all in all."""
-LEAST_PLATEAU = 0.15
-"""A plateau is at least this share of the range."""
-STEEP, WHOLE = 0.5, 0.8
-"""It rises at most half as steeply as the whole range, or is nearly the whole itself."""
 FULL_TURN_RAD = 2.0 * np.pi
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A mean over strokes with its 90 % interval (None: fewer than three strokes)."""
-
-    value: float
-    low: float | None
-    high: float | None
-    strokes: int
 
 
 @dataclass(frozen=True)
@@ -241,63 +229,6 @@ def _has_lever(recording: Recording, effort: Effort) -> bool:
     return effort == "handle_force" and turns and bool(np.isfinite(recording.handle_radius_m))
 
 
-def plateau_of(curve: Array, places: Array) -> tuple[int, int] | None:
-    """First bin and the one past the last of the longest level part of ``curve`` (BINS,)."""
-    best: tuple[int, int] | None = None
-    least = max(2, round(LEAST_PLATEAU * len(places)))
-    steepness = float(np.ptp(curve)) / len(curve)
-    for first in range(len(curve)):
-        low = high = total = curve[first]
-        for after in range(first + 2, len(curve) + 1):
-            value = curve[after - 1]
-            low, high, total = min(low, value), max(high, value), total + value
-            if high - low > FLAT * abs(total / (after - first)):
-                break
-            size = after - first
-            # A steady rise is no plateau, however high it stands: it is as steep as the whole.
-            level = size >= WHOLE * len(curve) or (high - low) / size < STEEP * steepness
-            if size >= least and level and (best is None or size > best[1] - best[0]):
-                best = (first, after)
-    return best
-
-
-def mean_interval(values: Array) -> Interval:
-    """Mean of values (n,), one a stroke, with Student's 90 % interval."""
-    count, mean = len(values), float(np.mean(values))
-    if count < FEWEST:
-        return Interval(mean, None, None, count)
-    reach = _t(count - 1) * float(np.std(values, ddof=1)) / np.sqrt(count)
-    return Interval(mean, mean - reach, mean + reach, count)
-
-
-def difference_interval(one: Array, other: Array) -> Interval:
-    """Difference of two means with Welch's 90 % interval (doi:10.1093/biomet/34.1-2.28)."""
-    value, count = float(np.mean(one) - np.mean(other)), min(len(one), len(other))
-    if count < FEWEST:
-        return Interval(value, None, None, count)
-    a, b = np.var(one, ddof=1) / len(one), np.var(other, ddof=1) / len(other)
-    if a + b == 0.0:
-        return Interval(value, value, value, count)
-    freedom = (a + b) ** 2 / (a**2 / (len(one) - 1) + b**2 / (len(other) - 1))
-    reach = _t(float(freedom)) * float(np.sqrt(a + b))
-    return Interval(value, value - reach, value + reach, count)
-
-
-def _t(freedom: float) -> float:
-    return float(stats.t.ppf(0.5 + 0.5 * LEVEL, freedom))
-
-
-def _trend(values: Array) -> Interval | None:
-    """Slope of values (n,) over their number, with the 90 % interval of least squares."""
-    count = len(values)
-    if count < FEWEST:
-        return None
-    fitted = stats.linregress(np.arange(count), values)
-    reach = _t(count - 2) * float(fitted.stderr)
-    slope = float(fitted.slope)
-    return Interval(slope, slope - reach, slope + reach, count)
-
-
 @dataclass(frozen=True)
 class _Strokes:
     """The strokes of a log that reach over the grid, as they were measured."""
@@ -352,7 +283,7 @@ def _summary(recording: Recording, strokes: _Strokes, places: Array, turned: boo
         speeds=tuple(one for curves in every for one in _classes(curves)),
         mean=mean_interval(closing.values.mean(axis=1)),
         work=mean_interval(closing.work),
-        drift=_trend(closing.values.mean(axis=1)),
+        drift=trend_interval(closing.values.mean(axis=1)),
         share=width / strokes.travel,
         left_out=strokes.left_out,
         turned=turned,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scissorcal.calibration.summary import Interval
+from scissorcal.calibration.stroke_intervals import Interval
 from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
 from scissorcal.report.panel import (
     Axis,

@@ -1,5 +1,6 @@
 // The parts of the page together: what each frame does, and what follows from a change.
 
+import { edgeTable } from "./blade_edge";
 import { Curves, TimeChart, TorqueChart } from "./charts";
 import { Controls } from "./controls";
 import { mountDesign } from "./design";
@@ -8,7 +9,7 @@ import { html, refilled } from "./elements";
 import { madeHand, oneStroke, recordedHand } from "./hand";
 import { KEYS, takeInput } from "./input";
 import { asFitted, Average, inPart, Law, ofDraw, whatIf } from "./law";
-import { Drawn, Piece } from "./pieces";
+import { Drawn, Edge, Piece } from "./pieces";
 import { Readout } from "./readout";
 import { Rig } from "./rig";
 import { RigPanel } from "./rig_panel";
@@ -37,6 +38,8 @@ export class App {
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
   private drawn: Drawn | null = null;
+  /** Edge of the blades that a person drew; null: as fitted. */
+  private edge: Edge | null = null;
   private drawnAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
@@ -125,7 +128,7 @@ export class App {
     const { choices } = this.controls;
     const other = choices.draw === null
       ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
-    this.laws = { fitted: this.fitted, whatIf: other };
+    this.laws = { fitted: this.withBlades(this.fitted), whatIf: this.withBlades(other) };
     this.rig.active = choices.active;
     const names = { fitted: "as fitted", whatIf: "what if" };
     const refused = (["whatIf", "fitted"] as const).filter(
@@ -148,9 +151,13 @@ export class App {
     };
     const moved = isMoved ? curve(this.laws.whatIf) : null;
     const curves: Curves = {
-      fitted: curve(this.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
+      fitted: curve(this.laws.fitted), whatIf: choices.draw === null ? moved : null, draw: choices.draw === null ? null : moved,
     };
     this.torque.show(curves);
+  }
+
+  private withBlades(law: Law): Law {
+    return this.edge ? { ...law, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } } : law;
   }
 
   private stroke(): void {
@@ -193,6 +200,7 @@ export class App {
     if (!details.open || section.childElementCount) return;
     mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
       this.drawn = applied?.drawn ?? null;
+      this.edge = applied?.edge ?? null;
       this.rig.cut(pieces ?? this.scene.pieces);
       this.changed();
       this.rig.freshSheet();

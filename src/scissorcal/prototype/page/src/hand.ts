@@ -17,6 +17,7 @@ const LAG_m = 0.003;
 const SETTLES_s = 0.03;
 const HELD = 5; // times the largest torque: what a hand at the other end of the scene's openings can give
 const PUSH_N = 3;
+const STILL_rad_per_s = 1e-4; // a hand that would move the blades no faster lets them rest
 
 /** A hand that holds the handles by a spring: it feels by how far the blades stay behind. */
 export class Coupling {
@@ -40,7 +41,8 @@ export class Coupling {
   moved(at: Pose, wanted: Pose, torque: number, force: number, dt: number): Pose {
     const drive = this.stiffness * (wanted.opening - at.opening) + torque;
     const held = this.friction(at.opening, drive, Math.abs(drive) / this.damping);
-    const turn = Math.abs(drive) <= held ? 0 : (drive - Math.sign(drive) * held) / this.damping;
+    const left = Math.abs(drive) - held;
+    const turn = left > STILL_rad_per_s * this.damping ? (Math.sign(drive) * left) / this.damping : 0;
     const slide = (this.push * (wanted.advance - at.advance) + force) / (this.push * SETTLES_s);
     return { opening: at.opening + dt * turn, advance: at.advance + dt * slide };
   }

@@ -28,8 +28,8 @@ export interface Sample {
 const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
 const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
+const STILL_m = 1e-9; // in a tick
 const TURN_rad = 0.004;
-const STILL_rad_per_s = 1e-4;
 const MOST_SAMPLES = 4000; // of one stroke: 16 s
 
 export class Rig {
@@ -53,6 +53,7 @@ export class Rig {
   pieces: readonly Piece[] | null = null;
   private script: Script | null = null;
   private scriptBegan = 0;
+  private slid = 0;
   private tick = 0;
   private left = 0;
   private closing = false;
@@ -109,16 +110,14 @@ export class Rig {
 
   /** Let a hand move the blades from now on; null gives them back to the pointer. */
   play(script: Script | null): void {
-    if (this.script || script) this.wanted = this.pose;
+    if (script || this.script) this.wanted = this.pose; // else keys pressed in a row add up
     this.script = script;
     this.scriptBegan = this.time;
   }
 
-  /** Whether nothing moves: the blades are where the hand wants them. */
+  /** Whether nobody and nothing moves the blades. */
   get isStill(): boolean {
-    const { pose, wanted } = this;
-    return !this.script && Math.abs(this.rate) < STILL_rad_per_s
-      && Math.abs(wanted.advance - pose.advance) < 1e-6;
+    return !this.script && this.rate === 0 && Math.abs(this.slid) < STILL_m;
   }
 
   get isClosing(): boolean {
@@ -160,6 +159,7 @@ export class Rig {
       next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
     this.rate = (next.opening - last.opening) / dt;
+    this.slid = next.advance - last.advance;
     this.pose = next;
     const other = this.active === "fitted" ? "whatIf" : "fitted";
     const before = this.step;
