@@ -21,6 +21,7 @@ DEEPEST = 32
 LARGEST_MM = 100_000.0
 
 SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
+_NO_PLACES = "it has numbers that are no places on a plate"
 _REFUSED = {
     "script": "it has a script, which no drawing of a plate needs: save it as plain SVG",
     "use": "it has clones (<use>): turn them into paths, such as with 'Unlink Clone'",
@@ -86,18 +87,20 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
 
     _refuse_unsafe(data)
     millimetre = float(Length("1mm").value(ppi=96.0))  # in 1/96 inch, as svgelements rounds it
-    parsed = SVG.parse(io.BytesIO(data), reify=True, ppi=96.0)
+    parsed = SVG.parse(io.BytesIO(data), reify=False, ppi=96.0)
     found: list[list[Any]] = []
     room = MOST_POINTS
     shapes = [one for one in parsed.elements() if isinstance(one, Shape)]
     for index, shape in enumerate(shapes):
         if type(shape).__name__.lower() not in SHAPES:
             continue
-        name = str(shape.id or "")
-        for part in Path(shape).as_subpaths():
-            corners = _flattened(Path(part), FLAT_MM * millimetre, room)
+        name, path = str(shape.id or ""), Path(shape)
+        to_mm = _matrix(path.transform) / millimetre
+        tolerance = FLAT_MM / _stretch(to_mm)
+        for part in path.as_subpaths():
+            corners = _flattened(Path(part), tolerance, room)
             room -= len(corners)
-            contour = _closed(corners, millimetre)
+            contour = _closed(corners, to_mm)
             if len(contour) >= 3:
                 found.append([index, name, contour])
     if not found:
@@ -211,18 +214,41 @@ def _whole(number: float) -> int:
     import math
 
     if not math.isfinite(number) or number > MOST_POINTS:
-        raise ValueError("it has numbers that are no places on a plate")
+        raise ValueError(_NO_PLACES)
     return math.ceil(number)
 
 
-def _closed(corners: list[Any], millimetre: float) -> Any:
+def _matrix(transform: Any) -> Any:
+    """The rows (2, 3) of a shape's transform, groups and viewBox included.
+
+    svgelements would apply it to segments; arcs that it skews are off by some per cent.
+    """
+    import numpy as np
+
+    t = transform
+    rows = np.array([[t.a, t.c, t.e], [t.b, t.d, t.f]], dtype=np.float64)
+    if not np.isfinite(rows).all():
+        raise ValueError(_NO_PLACES)
+    return rows
+
+
+def _stretch(matrix: Any) -> float:
+    """By how much a matrix lengthens at most; 1 where it makes a point of everything."""
+    import numpy as np
+
+    return float(np.linalg.norm(matrix[:, :2], 2)) or 1.0
+
+
+def _closed(corners: list[Any], to_mm: Any) -> Any:
     """Corners (n, 2) in mm, each once."""
     import numpy as np
 
-    places = np.array([[one.x, one.y] for one in corners], dtype=np.float64) / millimetre
-    if not len(places):
-        return places
+    if not corners:
+        return np.zeros((0, 2))
+    drawn = np.array([[one.x, one.y, 1.0] for one in corners], dtype=np.float64)
+    with np.errstate(all="ignore"):
+        places = drawn @ to_mm.T
     if not (np.isfinite(places).all() and np.abs(places).max() <= LARGEST_MM):
-        raise ValueError("it has numbers that are no places on a plate")
+        raise ValueError(_NO_PLACES)
     kept = np.any(places != np.roll(places, 1, axis=0), axis=1)
     return places[kept]

@@ -1,0 +1,132 @@
+"""Shapes of SVG drawings: exact places and areas, and files that are refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scissorcal.errors import InputError
+from scissorcal.model.plate_pieces import Outline, spans_on_line
+from scissorcal.recipe.drawing import FLAT_MM, read_drawing
+
+HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">'
+LAUGHS = "".join(f'<!ENTITY l{i + 1} "{f"&l{i};" * 10}">' for i in range(9))
+
+
+def drawn(tmp_path: Path, inner: str, head: str = HEAD) -> Outline:
+    path = tmp_path / "plate.svg"
+    path.write_text(f"{head}{inner}</svg>", encoding="utf-8")
+    return read_drawing(path).shape("a")
+
+
+TURNS = ("", "rotate(20 40 0)", "rotate(90)", "skewX(15)", "matrix(0 1 -1 0 5 7)", "translate(3 4)")
+
+
+@pytest.mark.parametrize("transform", TURNS)
+@pytest.mark.parametrize(
+    ("shape", "area_mm2"),
+    [
+        ('<rect id="a" x="30" y="-5" width="20" height="10"', 200.0),
+        ('<circle id="a" cx="40" r="5"', 25.0 * math.pi),
+        ('<ellipse id="a" cx="40" rx="20" ry="3"', 60.0 * math.pi),
+        ('<polygon id="a" points="0,0 10,0 0,10"', 50.0),
+        ('<polyline id="a" points="0,0 10,0 0,10"', 50.0),
+        ('<path id="a" d="M0 0h10v10h-10z"', 100.0),
+    ],
+)
+def test_transforms_that_keep_areas_keep_them(
+    tmp_path: Path, shape: str, area_mm2: float, transform: str
+) -> None:
+    outline = drawn(tmp_path, f'{shape} transform="{transform}"/>')
+    assert outline.area_m2 * 1e6 == pytest.approx(area_mm2, rel=0.01)
+
+
+def test_a_turned_rect_stands_where_the_transform_puts_it(tmp_path: Path) -> None:
+    rect = '<g transform="translate(0 30)"><rect id="a" width="20" height="10" '
+    outline = drawn(tmp_path, rect + 'transform="rotate(90)"/></g>')
+    (contour,) = outline.contours
+    assert contour.min(axis=0) * 1e3 == pytest.approx([-10.0, 30.0], abs=1e-9)
+    assert contour.max(axis=0) * 1e3 == pytest.approx([0.0, 50.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "millimetres"), [("mm", 1), ("cm", 10), ("in", 25.4)])
+def test_lengths_follow_width_and_view_box(tmp_path: Path, unit: str, millimetres: float) -> None:
+    head = HEAD.replace("mm", unit).replace("0 0 80 60", "0 0 160 120")
+    outline = drawn(tmp_path, '<rect id="a" width="8" height="4"/>', head)
+    assert np.ptp(outline.contours[0], axis=0) * 1e3 == pytest.approx(
+        [4.0 * millimetres, 2.0 * millimetres], rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("offset_mm", [0.0, 1.0, 3.0, 4.5])
+def test_a_circle_is_cut_at_its_chord(tmp_path: Path, offset_mm: float) -> None:
+    outline = drawn(tmp_path, '<circle id="a" cx="40" cy="30" r="5"/>')
+    ((begin, end),) = spans_on_line(outline, (30.0 + offset_mm) * 1e-3)
+    half = math.sqrt(25.0 - offset_mm**2)
+    allowed = FLAT_MM * 5.0 / half * 1.1  # across the outline 0.01 mm, along the line more
+    assert [begin * 1e3, end * 1e3] == pytest.approx([40.0 - half, 40.0 + half], abs=allowed)
+
+
+@pytest.mark.parametrize(
+    ("curve", "at"),
+    [
+        ("C 0 20 40 20 40 0", lambda t: (3 * (1 - t) * t**2 * 40 + t**3 * 40, 60 * (1 - t) * t)),
+        ("Q 20 40 40 0", lambda t: (40 * (1 - t) * t + 40 * t**2, 80 * (1 - t) * t)),
+    ],
+)
+def test_curves_are_flattened_to_the_stated_tolerance(tmp_path: Path, curve: str, at) -> None:  # type: ignore[no-untyped-def]
+    (corners,) = drawn(tmp_path, f'<path id="a" d="M0 0 {curve} z"/>').contours
+    exact = np.transpose(at(np.linspace(0.0, 1.0, 1001)))
+    farthest = np.full(len(exact), np.inf)
+    for start, end in zip(corners * 1e3, np.roll(corners, -1, axis=0) * 1e3, strict=True):
+        side = end - start
+        share = np.clip((exact - start) @ side / (side @ side), 0.0, 1.0)
+        off = np.linalg.norm(exact - start - share[:, None] * side, axis=1)
+        farthest = np.minimum(farthest, off)
+    assert farthest.max() <= FLAT_MM
+
+
+def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
+    outline = drawn(tmp_path, '<path id="a" d="M0 0h40v40h-40z M10 5v10h10v-10z"/>')
+    found = np.array(spans_on_line(outline, 10e-3)) * 1e3
+    assert found == pytest.approx(np.array([[0.0, 10.0], [20.0, 40.0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]>{HEAD}<text>&l9;</text></svg>', "document type"),
+        (f'<!DOCTYPE s SYSTEM "file:///x">{HEAD}</svg>', "document type"),
+        (f"{HEAD}{'<rect/>' * 20_000}</svg>", "elements"),
+        (f"{HEAD}{'<g>' * 100}{'</g>' * 100}</svg>", "levels"),
+        (f'{HEAD}<path d="M0 0{"h1v1" * 150_000}z"/></svg>', "points"),
+        (f'{HEAD}<path d="M0 0L nan 5L5 nan z"/></svg>', "no closed shape"),
+        (f'{HEAD}<rect width="1e300" height="1e300"/></svg>', "no places"),
+        (f'{HEAD}<rect width="1" height="1" transform="scale(1e400)"/></svg>', "no places"),
+        (f"{HEAD}<script>1</script></svg>", "script"),
+        (f'{HEAD}<rect onload="x()" width="1" height="1"/></svg>', "script"),
+        (f'{HEAD}<image href="http://example.org/x.png"/></svg>', "another file"),
+        (f'{HEAD}<use id="a" href="#a"/></svg>', "clones"),
+        (HEAD.replace("mm", "") + "</svg>", "with a unit"),
+        (HEAD.replace("80mm", "100%") + "</svg>", "with a unit"),
+        (f"{HEAD}</svg>", "no closed shape"),
+        (f'{HEAD}<rect width="1"', "well-formed"),
+        ("<html/>", "not <svg>"),
+        ("", "empty"),
+    ],
+)
+def test_what_is_no_drawing_of_a_plate_is_refused(tmp_path: Path, text: str, why: str) -> None:
+    path = tmp_path / "plate.svg"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=why) as caught:
+        read_drawing(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_shape_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r'no shapes with id "a".*sheet, hole'):
+        drawn(
+            tmp_path,
+            '<rect id="sheet" width="9" height="9"/><rect id="hole" width="1" height="1"/>',
+        )
