@@ -19,6 +19,7 @@ import { Server } from "./socket";
 import { View, View3d } from "./view3d";
 
 const CHARTS_EVERY_ms = 50;
+const AT_REST_ms = 250;
 
 export class App {
   readonly rig: Rig;
@@ -39,6 +40,7 @@ export class App {
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
+  private drawnAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
   private readonly largestTorque: number;
@@ -94,6 +96,9 @@ export class App {
     rig.pass(seconds);
     this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
+    // at rest nothing changes but colours and sizes: four pictures a second are enough
+    if (rig.isStill && !this.panel?.pose && now - this.drawnAt < AT_REST_ms) return this.run();
+    this.drawnAt = now;
     this.draw();
     this.readout.show(rig, now);
     if (now - this.chartedAt >= CHARTS_EVERY_ms) {

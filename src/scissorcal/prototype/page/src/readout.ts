@@ -71,7 +71,12 @@ function list(into: HTMLElement, rows: [string, string, string][]): void {
       entry = html("div", { "data-number": name }, html("dt", {}, name), html("dd", {}));
       into.append(entry);
     }
-    const text = `${value} ${unit}`;
+    const text = `${isZero(value) ? value.replace("-", "") : value.replace("-", "−")} ${unit}`;
     if (entry.lastChild!.textContent !== text) entry.lastChild!.textContent = text;
   });
+}
+
+/** Of a rounded number: minus nothing is nothing. */
+function isZero(value: string): boolean {
+  return Number(value) === 0;
 }

@@ -28,6 +28,7 @@ export interface Sample {
 const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
 const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
+const STILL_m = 1e-9; // in a tick
 const TURN_rad = 0.004;
 const MOST_SAMPLES = 4000; // of one stroke: 16 s
 
@@ -52,6 +53,7 @@ export class Rig {
   pieces: readonly Piece[] | null = null;
   private script: Script | null = null;
   private scriptBegan = 0;
+  private slid = 0;
   private tick = 0;
   private left = 0;
   private closing = false;
@@ -113,6 +115,11 @@ export class Rig {
     this.scriptBegan = this.time;
   }
 
+  /** Whether nobody and nothing moves the blades. */
+  get isStill(): boolean {
+    return !this.script && this.rate === 0 && Math.abs(this.slid) < STILL_m;
+  }
+
   get isClosing(): boolean {
     return this.closing;
   }
@@ -152,6 +159,7 @@ export class Rig {
       next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
     this.rate = (next.opening - last.opening) / dt;
+    this.slid = next.advance - last.advance;
     this.pose = next;
     const other = this.active === "fitted" ? "whatIf" : "fitted";
     const before = this.step;
