@@ -158,6 +158,9 @@ class RigCommands:
     async def _run(self, command: RigCommand) -> None:
         pipe = asyncio.subprocess.PIPE
         words = (*self._program, *command.words)
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+            # as in a background job of a shell; the command would ignore the stop, too
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
             process = await asyncio.create_subprocess_exec(
                 *words,
