@@ -160,16 +160,8 @@ def fill_pieces(struct: Any, pieces: Sequence[Piece], model: Any) -> None:
 
     Raises ValueError for none at all, and for more than the kernel holds.
     """
+    check_pieces(pieces)
     strips = [strip for piece in pieces for strip in piece.strips]
-    if not pieces:
-        raise ValueError(
-            "A plate of pieces needs at least one; leave them out for a uniform sheet."
-        )
-    if len(pieces) > MOST_PIECES or len(strips) > MOST_STRIPS:
-        raise ValueError(
-            f"A plate has up to {MOST_PIECES} pieces and {MOST_STRIPS} strips in all, not "
-            f"{len(pieces)} and {len(strips)}."
-        )
     struct.count = len(pieces)
     first = 0
     for i, piece in enumerate(pieces):

@@ -120,10 +120,6 @@ export class Rig {
     return !this.script && this.rate === 0 && Math.abs(this.slid) < STILL_m;
   }
 
-  get isClosing(): boolean {
-    return this.closing;
-  }
-
   /** Farthest place to which the active law has cut, m. */
   get crackMost(): number {
     const kernel = this.kernels[this.active];
