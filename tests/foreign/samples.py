@@ -22,7 +22,8 @@ from scissorcal.identity import bytes_digest
 from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
 from scissorcal.package.review import Review
 from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe
+from scissorcal.recipe.load import load_recipe, parse_recipe
+from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
 from scissorcal.recipe.plate_surface import probed_surface
 from scissorcal.recording import (
     import_table,
@@ -63,6 +64,47 @@ class Sample:
     make: Callable[[Path], Any]
     read: Callable[[Path], Any]
     seal: Seal | None = None
+
+
+DRAWN = """
+[plate]
+cut_line_mm = 30.0
+[[plate.layers]]
+name = "sheet"
+thickness_mm = 0.1
+outline = "plate.svg"
+id = "sheet"
+holes = ["hole", "slot"]
+[[plate.layers.regions]]
+toughness_ratio = 3.0
+id = "band"
+"""
+DRAWING = """<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="60mm" viewBox="0 0 200 120">
+<title>a plate</title><style>.a{fill:none}</style>
+<g transform="translate(0 60) scale(1.5 2)" style="fill:none;stroke:#000">
+<path id="sheet" d="M0-20h120v40l-20 5c-10 4-20 4-30 0s-20-4-30 0L0,20zM80-1.5v3h5v-3z"/>
+<circle id="hole" class="a" cx="40" cy="0" r="3" transform="rotate(30 40 0)"/>
+<path id="slot" d="M50 2a4 3 20 1 0 6-4q-4-2-6 0t-1e0 2Z" transform="matrix(1 .1 0 1 0 0)"/>
+<polygon id="band" points="60,-20 70,-20 75,20 60,20"/>
+<ellipse cx="9" rx="3" ry="4"/><rect x="1" y="2" width="3" height="4" rx="1"/>
+</g></svg>
+"""
+
+
+def _drawing(path: Path) -> None:
+    path.write_text(DRAWING, encoding="utf-8")
+
+
+def _read_drawing(path: Path) -> None:
+    recipe = parse_recipe(recipe_path("paper-80gsm").read_text(encoding="utf-8") + DRAWN)
+    pieces = plate_pieces(recipe, path.parent)
+    places = [[one.begin_m, *(strip.end_m for strip in one.strips)] for one in pieces]
+    assert places
+    for place in places:
+        assert np.isfinite(place).all()
+        assert (np.diff(place) > 0.0).all()
+    assert plate_sentence(recipe, pieces)
 
 
 def _recipe(path: Path) -> None:
@@ -364,6 +406,7 @@ SAMPLES: dict[str, Sample] = {
     "signature.json": Sample("signature.json", _signature, _read_signature),
     "capture.json": Sample("capture.json", _photo_index, _read_photo_index),
     "path CSV": Sample("path.csv", _path, _read_path),
+    "drawing SVG": Sample("plate.svg", _drawing, _read_drawing),
     "surface CSV": Sample("heights.csv", _surface, _read_surface),
     "stances CSV": Sample("stances.csv", _stances, _read_stances),
     "track of lines": Sample("track.jsonl", _track_lines, _read_track_lines),

@@ -17,6 +17,7 @@ from scissorcal.control.path_file import read_path
 from scissorcal.errors import InputError
 from scissorcal.foreign import Format, open_foreign, parse_json, read_foreign, reading
 from scissorcal.package import open_package
+from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import load_recipe, parse_recipe
 from scissorcal.recipe.plate_surface import probed_surface
 from scissorcal.recording import import_table, read_header, read_recording
@@ -41,6 +42,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "a.toml": load_recipe,
     "path.csv": read_path,
     "stances.csv": read_stances,
+    "plate.svg": read_drawing,
     "heights.csv": lambda path: probed_surface(path, 0.02),
     "cut.verify.json": lambda path: load(path, VerifyResult),
     "a.mp4": lambda path: next(frames_of(str(path))),

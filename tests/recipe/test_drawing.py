@@ -1,14 +1,26 @@
 """Shapes of SVG drawings: exact places and areas, and files that are refused."""
 
+import contextlib
 import math
+import re
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import scissorcal
 from scissorcal.errors import InputError
+from scissorcal.foreign.formats import DRAWING
 from scissorcal.model.plate_pieces import Outline, spans_on_line
-from scissorcal.recipe.drawing import FLAT_MM, read_drawing
+from scissorcal.recipe.drawing import (
+    FLAT_MM,
+    MOST_POINTS,
+    MOST_POINTS_OF_FILE,
+    MOST_SHAPES,
+    parse_drawing,
+    read_drawing,
+)
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">'
 LAUGHS = "".join(f'<!ENTITY l{i + 1} "{f"&l{i};" * 10}">' for i in range(9))
@@ -98,9 +110,16 @@ def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
     [
         (f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]>{HEAD}<text>&l9;</text></svg>', "document type"),
         (f'<!DOCTYPE s SYSTEM "file:///x">{HEAD}</svg>', "document type"),
-        (f"{HEAD}{'<rect/>' * 20_000}</svg>", "elements"),
+        (f"{HEAD}{'<g/>' * 20_000}</svg>", "elements"),
         (f"{HEAD}{'<g>' * 100}{'</g>' * 100}</svg>", "levels"),
-        (f'{HEAD}<path d="M0 0{"h1v1" * 150_000}z"/></svg>', "points"),
+        (f"{HEAD}{'<rect/>' * 401}</svg>", "400 shapes"),
+        (f'{HEAD}<path d="M0 0{"h1v1" * 499_000}z"/></svg>', "20,000 in all"),
+        (f'{HEAD}<path d="M0 0{"h1v1" * 2_000}h1z"/></svg>', "more than 4,000 points"),
+        (f'{HEAD}<path d="M0 0 C{"1e4 1e5 9e4 -1e5 1 1 " * 9}z"/></svg>', "more than 4,000 points"),
+        (f'{HEAD}<path d="M0 0{"h1v1" * 500_000}z"/></svg>', "more than 2 MB"),
+        (f'{HEAD}<rect width="1" height="1" transform="{"scale(1)" * 200}"/></svg>', "1600 char"),
+        (f'{HEAD}<defs><rect width="1" height="1"/></defs></svg>', "no closed shape"),
+        (f'{HEAD}<rect width="1" height="1" style="display: none"/></svg>', "no closed shape"),
         (f'{HEAD}<path d="M0 0L nan 5L5 nan z"/></svg>', "no closed shape"),
         (f'{HEAD}<rect width="1e300" height="1e300"/></svg>', "no places"),
         (f'{HEAD}<rect width="1" height="1" transform="scale(1e400)"/></svg>', "no places"),
@@ -122,6 +141,53 @@ def test_what_is_no_drawing_of_a_plate_is_refused(tmp_path: Path, text: str, why
     with pytest.raises(InputError, match=why) as caught:
         read_drawing(path)
     assert str(path) in str(caught.value)
+
+
+PATH = "M0 0" + "h1v1" * 499_000 + "z"
+SLOW = {
+    "segments of a path": f'<path d="{PATH}"/>',
+    "numbers of one letter": f'<path d="M0 0h{" 1" * 990_000}z"/>',
+    "points": f'<polygon points="{"1 1 " * 499_000}"/>',
+    "a number": f'<path d="M0 0L{"1" * 1_900_000} 1z"/>',
+    "signs": f'<path d="M0 0L{"-" * 1_900_000} 1z"/>',
+    "styles": f"<style>{'a{b:c}' * 320_000}</style>",
+    "openings of styles": f"<style>/*{'a{b' * 600_000}</style>",
+    "a style": f'<rect style="{"a:b;" * 480_000}"/>',
+    "a colour": f'<rect fill="{"rgb(" * 470_000}"/>',
+    "classes": f'<rect class="{"a " * 900_000}"/>',
+    "attributes": "<rect " + " ".join(f'a{i}="1"' for i in range(150_000)) + "/>",
+    "a view box": f'<svg viewBox="0 0 1 {"1" * 1_900_000}"/>',
+    "a text": f"<text>{'a' * 1_900_000}</text>",
+}
+
+
+@pytest.mark.parametrize("what", SLOW)
+def test_two_megabytes_of_one_thing_are_read_or_refused_at_once(what: str) -> None:
+    text = f'{HEAD}{SLOW[what]}<rect width="1" height="1"/></svg>'
+    before = time.process_time()
+    with contextlib.suppress(ValueError):
+        parse_drawing(text.encode())
+    assert time.process_time() - before < 2.0
+
+
+def test_what_only_looks_like_a_shape_is_passed_over(tmp_path: Path) -> None:
+    """Shapes of another namespace, and of what is not shown; the style of a shape places it."""
+    other = '<o:rect xmlns:o="urn:o" id="a" width="9" height="9"/>'
+    clip = '<clipPath><g><rect id="a" width="9" height="9"/></g></clipPath>'
+    moved = '<rect id="a" width="2" height="1" style="fill:red; transform: translate(3px,4px)"/>'
+    (contour,) = drawn(tmp_path, other + clip + moved).contours
+    assert contour.min(axis=0) * 1e3 == pytest.approx([3.0, 4.0], abs=1e-9)
+
+
+def test_page_and_recipe_read_as_much_of_a_drawing() -> None:
+    source = Path(scissorcal.__file__).parent / "prototype" / "page" / "src" / "svg_file.ts"
+    found = dict(re.findall(r"^const (MOST_\w+) = ([\d_]+);", source.read_text(), re.MULTILINE))
+    assert {name: int(value) for name, value in found.items()} == {
+        "MOST_CHARACTERS": DRAWING.most_bytes,
+        "MOST_SHAPES": MOST_SHAPES,
+        "MOST_POINTS": MOST_POINTS,
+        "MOST_POINTS_OF_FILE": MOST_POINTS_OF_FILE,
+    }
 
 
 def test_a_shape_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:

@@ -107,13 +107,13 @@ SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm, z_mm, o
 
 DRAWING = Format(
     "a drawing in SVG",
-    5 * _MB,
+    2 * _MB,
     "Save it as plain SVG, its width and height in mm.",
     memory_bytes=_GB,
     processor_s=20,
     wall_s=60.0,
 )
-"""5,000 shapes of a thousand characters; as points and segments of curves it takes 300 MB."""
+"""20,000 points of 100 characters; as segments of curves they take 100 MB."""
 
 PATH = Format("a path", 5 * _MB, "Write x_mm and what else is stated, one point a line.")
 """200,000 points of 25 characters."""

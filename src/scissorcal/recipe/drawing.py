@@ -15,12 +15,30 @@ if TYPE_CHECKING:
 FLAT_MM = 0.01
 """Curves become polygons that lie nowhere farther from them."""
 
+MOST_SHAPES = 400
+MOST_POINTS = 4_000
+MOST_POINTS_OF_FILE = 20_000
+"""Of one outline, and of all in a file; as the page reads at most (``svg_file.ts``)."""
+
 MOST_ELEMENTS = 5_000
-MOST_POINTS = 200_000
 DEEPEST = 32
+MOST_CHARACTERS = 1_000
+"""Of an attribute other than a path or points; a transform has some 100."""
+
 LARGEST_MM = 100_000.0
 
 SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
+_POINTS = ("d", "points")
+_SIZES = ("x", "y", "width", "height", "r", "rx", "ry", "cx", "cy", "viewBox")
+_PLACES = (*_POINTS, *_SIZES, "id", "transform", "display", "preserveAspectRatio")
+_NOT_SHOWN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata")
+_NUMBERS = {"h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "a": 7}
+"""That a segment of a path takes; any other takes 2."""
+
+_TOO_MANY = (
+    f"it has an outline of more than {MOST_POINTS:,} points, or {MOST_POINTS_OF_FILE:,} in all: "
+    "draw it simpler"
+)
 _NO_PLACES = "it has numbers that are no places on a plate"
 _REFUSED = {
     "script": "it has a script, which no drawing of a plate needs: save it as plain SVG",
@@ -43,15 +61,15 @@ class Drawing:
         if name is None:
             if len(self.shapes) != 1:
                 raise ValueError(
-                    f"{self.path} has {len(self.shapes)} shapes: say which is meant with id (there "
-                    f"are: {listed})"
+                    f"{self.path.name} has {len(self.shapes)} shapes: say which is meant with id "
+                    f"(there are: {listed})"
                 )
             return self.shapes[0][1]
         found = [outline for one, outline in self.shapes if one == name]
         if len(found) != 1:
             count = "no" if not found else str(len(found))
             raise ValueError(
-                f'{self.path} has {count} shapes with id "{name}" (there are: {listed})'
+                f'{self.path.name} has {count} shapes with id "{name}" (there are: {listed})'
             )
         return found[0]
 
@@ -85,20 +103,19 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
 
     from svgelements import SVG, Length, Path, Shape
 
-    _refuse_unsafe(data)
+    data = _plain(data)
     millimetre = float(Length("1mm").value(ppi=96.0))  # in 1/96 inch, as svgelements rounds it
     parsed = SVG.parse(io.BytesIO(data), reify=False, ppi=96.0)
     found: list[list[Any]] = []
-    room = MOST_POINTS
+    room = MOST_POINTS_OF_FILE
     shapes = [one for one in parsed.elements() if isinstance(one, Shape)]
+    shapes = [one for one in shapes if type(one).__name__.lower() in SHAPES]
     for index, shape in enumerate(shapes):
-        if type(shape).__name__.lower() not in SHAPES:
-            continue
         name, path = str(shape.id or ""), Path(shape)
         to_mm = _matrix(path.transform) / millimetre
         tolerance = FLAT_MM / _stretch(to_mm)
         for part in path.as_subpaths():
-            corners = _flattened(Path(part), tolerance, room)
+            corners = _flattened(Path(part), tolerance, min(room, MOST_POINTS))
             room -= len(corners)
             contour = _closed(corners, to_mm)
             if len(contour) >= 3:
@@ -108,43 +125,111 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
     return found
 
 
-def _refuse_unsafe(data: bytes) -> None:
-    """ValueError for what no drawing of a plate needs, before anything is made of it."""
-    from xml.parsers import expat
+class _Plain:
+    """An SVG file with nothing but its shapes and their places; ValueError for what is refused.
 
-    count = depth = 0
+    Nobody else's parser sees styles, texts or pictures: reading them may take forever.
+    """
 
-    def begin(name: str, attributes: dict[str, str]) -> None:
-        nonlocal count, depth
-        count, depth = count + 1, depth + 1
-        local = name.rpartition("}")[2].rpartition(":")[2]
-        if count > MOST_ELEMENTS or depth > DEEPEST:
+    def __init__(self) -> None:
+        self.text: list[str] = []
+        self._elements = self._shapes = self._points = 0
+        self._open: list[str] = []
+        self._hidden = 0
+
+    def begin(self, name: str, attributes: dict[str, str]) -> None:
+        """Called for each element in the order of the file; ``name`` is "namespace local"."""
+        from xml.sax.saxutils import quoteattr
+
+        space, _, local = name.rpartition(" ")
+        self._elements += 1
+        if self._elements > MOST_ELEMENTS or len(self._open) >= DEEPEST:
             raise ValueError(f"it has more than {MOST_ELEMENTS} elements, or {DEEPEST} levels")
         if local in _REFUSED:
             raise ValueError(_REFUSED[local])
-        if count == 1:
+        if self._elements == 1:
             _refuse_unitless(local, attributes)
         for key, value in attributes.items():
-            word = key.rpartition(":")[2].lower()
-            if word == "href" and not value.startswith(("#", "data:image/")):
-                raise ValueError(f"it refers to another file ({value[:60]}): embed or remove it")
-            if word.startswith("on"):
-                raise ValueError(f"it has a script ({key}): save it as plain SVG")
+            _refuse_attribute(key.rpartition(" ")[2], value)
+        is_svg = space in ("", "http://www.w3.org/2000/svg")
+        tag = local if is_svg and local in (*SHAPES, "svg") else "g"
+        hidden = not is_svg or local in _NOT_SHOWN
+        self._open.append(tag if not hidden and not self._hidden else "")
+        self._hidden += hidden or self._hidden > 0
+        if self._hidden:
+            return
+        places = _places(attributes)
+        if tag in SHAPES:
+            self._count(places)
+        said = " ".join(f"{key}={quoteattr(value)}" for key, value in places.items())
+        self.text.append(f"<{tag} {said}>")
 
-    def end(_: str) -> None:
-        nonlocal depth
-        depth -= 1
+    def end(self, _: str) -> None:
+        """Called where an element ends."""
+        tag = self._open.pop()
+        self._hidden -= self._hidden > 0
+        if tag:
+            self.text.append(f"</{tag}>")
+
+    def _count(self, places: dict[str, str]) -> None:
+        self._shapes += 1
+        self._points += _nodes(places.get("d", "")) + _nodes(places.get("points", ""))
+        if self._shapes > MOST_SHAPES:
+            raise ValueError(f"it has more than {MOST_SHAPES} shapes: draw it simpler")
+        if self._points > MOST_POINTS_OF_FILE:
+            raise ValueError(_TOO_MANY)
+
+
+def _plain(data: bytes) -> bytes:
+    """The shapes of a file alone, as SVG; see :class:`_Plain`."""
+    from xml.parsers import expat
 
     def refuse(*_: Any) -> None:
         raise ValueError("it has a document type or entities: save it as plain SVG")
 
-    parser = expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    found = _Plain()
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.StartElementHandler, parser.EndElementHandler = found.begin, found.end
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise ValueError(f"it is not well-formed XML: {error}") from None
+    return "".join(found.text).encode("utf-8")
+
+
+def _refuse_attribute(key: str, value: str) -> None:
+    if key.lower() == "href" and not value.startswith(("#", "data:image/")):
+        raise ValueError(f"it refers to another file ({value[:60]}): embed or remove it")
+    if key.lower().startswith("on"):
+        raise ValueError(f"it has a script ({key[:60]}): save it as plain SVG")
+    if key in _PLACES and key not in _POINTS and len(value) > MOST_CHARACTERS:
+        raise ValueError(f"its {key} has {len(value)} characters: save it as plain SVG")
+
+
+def _places(attributes: dict[str, str]) -> dict[str, str]:
+    """The attributes of an element that say what and where it is, those in its style included."""
+    found = {key: value for key, value in attributes.items() if key in _PLACES}
+    for one in attributes.get("style", "").split(";"):
+        key, _, value = one.partition(":")
+        if key.strip() in ("display", "transform"):
+            _refuse_attribute(key.strip(), value)
+            found[key.strip()] = value.strip()
+    return found
+
+
+def _nodes(drawn: str) -> int:
+    """Segments that a path or a list of points states, or fewer: flags of arcs may be joined."""
+    import re
+
+    count, numbers, each = 0, 0, 2
+    for token in re.finditer(r"[a-df-zA-DF-Z]|[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", drawn):
+        if token[0].isalpha():
+            count, numbers = count + numbers // each + 1, 0
+            each = _NUMBERS.get(token[0].lower(), 2)
+        else:
+            numbers += 1
+    return count + numbers // each
 
 
 def _refuse_unitless(root: str, attributes: dict[str, str]) -> None:
@@ -177,7 +262,7 @@ def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
         if type(segment).__name__ == "Move":
             continue
         if len(corners) + steps > room:
-            raise ValueError(f"its curves need more than {MOST_POINTS} points: draw it simpler")
+            raise ValueError(_TOO_MANY)
         corners += [segment.start]
         corners += [segment.point(step / steps) for step in range(1, steps)]
         corners += [segment.end]
@@ -213,9 +298,9 @@ def _bezier_steps(curve: Any, tolerance: float) -> int:
 def _whole(number: float) -> int:
     import math
 
-    if not math.isfinite(number) or number > MOST_POINTS:
+    if not math.isfinite(number):
         raise ValueError(_NO_PLACES)
-    return math.ceil(number)
+    return math.ceil(min(number, MOST_POINTS_OF_FILE + 1))
 
 
 def _matrix(transform: Any) -> Any:

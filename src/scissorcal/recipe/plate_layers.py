@@ -13,6 +13,7 @@ from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline
+    from scissorcal.recipe.drawing import Drawing
     from scissorcal.recipe.schema import Recipe
 
 MOST_PIECES = 16
@@ -166,9 +167,10 @@ def plate_pieces(recipe: Recipe, folder: Path) -> tuple[LayerPiece, ...]:
         return ()
     shapes = {name: read_drawing(folder / name) for name in drawings(recipe)}
     try:
-        return _pieces(recipe, {name: (folder / name, found) for name, found in shapes.items()})
+        return _pieces(recipe, shapes)
     except ValueError as error:
-        raise InputError(f"The plate of {recipe.name} cannot be cut: {error}.") from None
+        files = ", ".join(str(folder / name) for name in shapes)
+        raise InputError(f"{files}: the plate of {recipe.name} cannot be cut: {error}.") from None
 
 
 def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
@@ -202,7 +204,7 @@ def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
     return said
 
 
-def _pieces(recipe: Recipe, shapes: dict[str, Any]) -> tuple[LayerPiece, ...]:
+def _pieces(recipe: Recipe, shapes: dict[str, Drawing]) -> tuple[LayerPiece, ...]:
     from scissorcal.model.plate_pieces import SMALLEST_M, layer_pieces
 
     layers = [_layer(layer, shapes) for layer in recipe.plate.layers]
@@ -223,7 +225,7 @@ def _pieces(recipe: Recipe, shapes: dict[str, Any]) -> tuple[LayerPiece, ...]:
     return found
 
 
-def _layer(layer: PlateLayer, shapes: dict[str, Any]) -> Layer:
+def _layer(layer: PlateLayer, shapes: dict[str, Drawing]) -> Layer:
     from scissorcal.model.plate_pieces import Layer, Region
 
     holes = [_written(corners) for corners in layer.holes_mm]
@@ -237,7 +239,7 @@ def _layer(layer: PlateLayer, shapes: dict[str, Any]) -> Layer:
     )
 
 
-def _outline(part: DrawnPart, drawing: str | None, shapes: dict[str, Any]) -> Outline:
+def _outline(part: DrawnPart, drawing: str | None, shapes: dict[str, Drawing]) -> Outline:
     if part.outline_mm is not None:
         return _written(part.outline_mm)
     return _drawn(part.outline or drawing, part.id, shapes)
@@ -251,13 +253,12 @@ def _written(corners: Any) -> Outline:
     return Outline((1e-3 * np.array(corners, dtype=np.float64),))
 
 
-def _drawn(drawing: str | None, name: str | None, shapes: dict[str, Any]) -> Outline:
+def _drawn(drawing: str | None, name: str | None, shapes: dict[str, Drawing]) -> Outline:
     """A shape of a drawing that was read; ValueError where it is not there, or has no area."""
     assert drawing is not None
-    path, drawn = shapes[drawing]
-    outline: Outline = drawn.shape(name)
+    outline: Outline = shapes[drawing].shape(name)
     if outline.area_m2 < SMALLEST_AREA_MM2 * 1e-6:
-        raise ValueError(f'{path}: the shape "{name or "without id"}" has no area')
+        raise ValueError(f'{drawing}: the shape "{name or "without id"}" has no area')
     return outline
 
 

@@ -7,7 +7,7 @@ import { Drawn, Layer, layerName } from "./pieces";
 
 const MOST_CHARACTERS = 2_000_000;
 const MOST_SHAPES = 400;
-const MOST_POINTS = 4000; // of one outline, and never more than 20,000 of a file
+const MOST_POINTS = 4_000;
 const MOST_POINTS_OF_FILE = 20_000;
 const FLAT_mm = 0.02;
 const PIXEL_mm = 25.4 / 96;
