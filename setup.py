@@ -76,7 +76,7 @@ class BuildWithData(build_py):
         package = Path(self.build_lib) / "scissorcal"
         for folder in DATA_FOLDERS:
             for source in sorted((ROOT / folder).rglob("*")):
-                if source.suffix in {".toml", ".json"}:
+                if source.suffix in {".toml", ".json", ".svg"}:
                     yield source, package / source.relative_to(ROOT)
 
 

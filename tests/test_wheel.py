@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-TRAVELS = ("recipes/*.toml", "recipes/specimens/*.toml", "data_schemas/*.json")
+TRAVELS = ("recipes/*.toml", "recipes/*.svg", "recipes/specimens/*.toml", "data_schemas/*.json")
 FOR_BROWSERS = ("scissorcal/kernel/web/sc_web.wasm", "scissorcal/prototype/built/page.html")
 STAYS = {"build", "dist", "built", "__pycache__"}
 KEPT = {".npmrc", ".package-lock.json", ".bin"}  # of npm: with them nothing is installed again
@@ -176,7 +176,13 @@ def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:
     recipes, schemas, *names = run(unpacked, tmp_path, code).split()
     assert recipes == str(unpacked / "scissorcal" / "recipes")
     assert schemas == str(unpacked / "scissorcal" / "data_schemas")
-    assert names == ["cotton-cloth", "paper-80gsm", "paper-photographed", "press-only"]
+    assert names == [
+        "cotton-cloth",
+        "paper-80gsm",
+        "paper-photographed",
+        "paper-with-hole",
+        "press-only",
+    ]
 
 
 def test_the_command_makes_a_workspace(unpacked: Path, tmp_path: Path) -> None:

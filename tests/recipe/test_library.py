@@ -13,7 +13,13 @@ from scissorcal.recipe.library import (
 
 
 def test_the_three_recipes_are_there() -> None:
-    assert recipe_names() == ("cotton-cloth", "paper-80gsm", "paper-photographed", "press-only")
+    assert recipe_names() == (
+        "cotton-cloth",
+        "paper-80gsm",
+        "paper-photographed",
+        "paper-with-hole",
+        "press-only",
+    )
 
 
 def test_every_recipe_names_a_specimen_that_exists() -> None:

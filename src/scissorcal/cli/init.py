@@ -14,14 +14,15 @@ def init(
     recipe: Annotated[
         str,
         typer.Option(
-            help="A built-in recipe (paper-80gsm, paper-photographed, cotton-cloth, press-only), "
-            "or a recipe file (.toml)."
+            help="A built-in recipe (paper-80gsm, paper-photographed, paper-with-hole, "
+            "cotton-cloth, press-only), or a recipe file (.toml)."
         ),
     ] = "paper-80gsm",
 ) -> Answer:
     """Start a workspace in FOLDER from a recipe.
 
     The recipe is copied to FOLDER/recipe.toml, to be edited: your rig, your material, your scene.
+    A drawing of its plate (.svg) is copied with it.
 
     \b
     Example:
@@ -30,15 +31,20 @@ def init(
       Edit my-paper/recipe.toml, then go there: cd my-paper
       next: scissorcal plan
     """
+    from scissorcal.recipe.plate_layers import drawings
     from scissorcal.workday.workspace import create_workspace
 
     workspace = create_workspace(folder, recipe)
     works_in(workspace)
     loaded = workspace.recipe()
+    drawn = [workspace.root / name for name in drawings(loaded)]
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
         f"Edit {folder / workspace.recipe_path.name}, then go there: cd {folder}\n"
         "next: scissorcal plan"
     )
+    if drawn:
+        names = ", ".join(path.name for path in drawn)
+        text = text.replace("\nEdit ", f"\nIts plate is drawn in {names}.\nEdit ", 1)
     result = {"workspace": workspace.root, "recipe": loaded.name}
-    return Answer(result, text, files=[workspace.recipe_path])
+    return Answer(result, text, files=[workspace.recipe_path, *drawn])

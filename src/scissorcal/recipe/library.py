@@ -35,7 +35,7 @@ def recipe_names() -> tuple[str, ...]:
     """Return the names of the recipes that come with scissorcal, sorted.
 
     >>> recipe_names()
-    ('cotton-cloth', 'paper-80gsm', 'paper-photographed', 'press-only')
+    ('cotton-cloth', 'paper-80gsm', 'paper-photographed', 'paper-with-hole', 'press-only')
     """
     return _names(recipes_dir())
 

@@ -162,11 +162,13 @@ def find_workspace(folder: Path | None = None) -> Workspace:
 def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     """Make a workspace: the folder, and a copy of a built-in recipe (or of a recipe file) in it.
 
-    A copy of a file is checked before it is made. Raises InputError where the folder already
-    has a recipe, or the recipe is unknown or wrong.
+    The drawings of the recipe's plate are copied with it. All is checked before a copy is made.
+    Raises InputError where the folder already has a recipe, or another file of a drawing's name,
+    or where the recipe is unknown or wrong, or a drawing of it.
     """
     from scissorcal.recipe.library import recipe_path
     from scissorcal.recipe.load import parse_recipe, read_text
+    from scissorcal.recipe.plate_layers import plate_pieces
 
     workspace = Workspace(folder.absolute())
     if workspace.recipe_path.exists():
@@ -177,14 +179,21 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     given = Path(recipe_name)
     source = given if given.suffix == ".toml" else recipe_path(recipe_name)
     text = read_text(source)
-    parse_recipe(text, str(source))
+    recipe = parse_recipe(text, str(source))
+    plate_pieces(recipe, source.parent)
+    copies = _drawings_to_copy(recipe, source.parent, workspace.root)
     try:
         made = [one for one in (workspace.root, *workspace.root.parents) if not one.exists()]
         try:
             workspace.root.mkdir(parents=True, exist_ok=True)
+            for path, data in copies.items():
+                with replacing(path) as part:
+                    part.write_bytes(data)
             with replacing(workspace.recipe_path) as part:
                 part.write_text(text, encoding="utf-8")
         except BaseException:
+            for path in copies:
+                path.unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # a folder that is not empty stays
                 for folder in made:
                     folder.rmdir()
@@ -192,6 +201,25 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     except OSError as error:
         raise file_error(error, workspace.root) or error from None
     return workspace
+
+
+def _drawings_to_copy(recipe: "Recipe", source: Path, target: Path) -> dict[Path, bytes]:
+    """What is to be written for the drawings of a recipe; what lies there already is left."""
+    from scissorcal.foreign import read_foreign
+    from scissorcal.foreign.formats import DRAWING
+    from scissorcal.recipe.plate_layers import drawings
+
+    copies = {}
+    for name in drawings(recipe):
+        data, path = read_foreign(source / name, DRAWING), target / name
+        if not path.exists():
+            copies[path] = data
+        elif read_foreign(path, DRAWING) != data:
+            raise InputError(
+                f"{path} is there already, and is not the drawing of this recipe; it was left as "
+                "it is: choose another folder, or move it away."
+            )
+    return copies
 
 
 def demo_folder(folder: Path) -> Path:
