@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.stepping import STEP_DTYPE, StepOutput, float32_columns, step_output
+from scissorcal.kernel.stepping import StepOutput, step_many, step_output
 from scissorcal.kernel.tables import ModelTables, model_struct
 
 MOST_PIECES = int(lib.SC_PIECES_MAX)
@@ -142,17 +142,8 @@ class PiecesModel:
 
         Returns shape (N,) with STEP_DTYPE.
         """
-        inputs = float32_columns(opening, rate, advance)
-        out = np.zeros(inputs[0].size, dtype=STEP_DTYPE)
-        lib.sc_pieces_step_many(
-            self._config,
-            self._model,
-            self._state,
-            out.size,
-            *(ffi.from_buffer("float[]", column) for column in inputs),
-            ffi.from_buffer("sc_step_output[]", out, require_writable=True),
-        )
-        return out
+        stepped = (self._config, self._model, self._state)
+        return step_many(lib.sc_pieces_step_many, stepped, opening, rate, advance)
 
 
 def fill_pieces(struct: Any, pieces: Sequence[Piece], model: Any) -> None:

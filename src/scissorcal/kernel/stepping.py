@@ -96,16 +96,7 @@ class Kernel:
 
         Returns shape (N,) with STEP_DTYPE.
         """
-        inputs = float32_columns(opening, rate, advance)
-        out = np.zeros(inputs[0].size, dtype=STEP_DTYPE)
-        lib.sc_model_step_many(
-            self._model,
-            self._state,
-            out.size,
-            *(ffi.from_buffer("float[]", column) for column in inputs),
-            ffi.from_buffer("sc_step_output[]", out, require_writable=True),
-        )
-        return out
+        return step_many(lib.sc_model_step_many, (self._model, self._state), opening, rate, advance)
 
     def torque(
         self, opening: ArrayLike, rate: ArrayLike, contact: ArrayLike
@@ -129,6 +120,24 @@ class Kernel:
             ffi.from_buffer("float[]", torque, require_writable=True),
         )
         return torque.reshape(shape)
+
+
+def step_many(
+    function: Any, stepped: tuple[Any, ...], opening: ArrayLike, rate: ArrayLike, advance: ArrayLike
+) -> NDArray[np.void]:
+    """What a C function that takes N steps gives: shape (N,) with STEP_DTYPE.
+
+    ``stepped`` is what it takes first; the inputs broadcast to shape (N,).
+    """
+    inputs = float32_columns(opening, rate, advance)
+    out = np.zeros(inputs[0].size, dtype=STEP_DTYPE)
+    function(
+        *stepped,
+        out.size,
+        *(ffi.from_buffer("float[]", column) for column in inputs),
+        ffi.from_buffer("sc_step_output[]", out, require_writable=True),
+    )
+    return out
 
 
 def step_output(out: Any) -> StepOutput:

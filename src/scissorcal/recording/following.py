@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
-from scissorcal.recording import layout
 from scissorcal.recording.chunks import LARGEST_CHUNK, DamageError
 from scissorcal.recording.header import HEAD, MAGIC
 from scissorcal.recording.partfile import try_lock
-from scissorcal.recording.scan import Telemetry, Walk
+from scissorcal.recording.scan import Telemetry, Walk, samples_among
 from scissorcal.recording.schema import RecordingMetadata
 from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
@@ -110,8 +109,7 @@ class RecordingFollower:
         Damaged chunks are left out. InputError where the file is not one of records any more.
         """
         self._take(self._whole_records())
-        blocks = [event for event in self._walk.events if isinstance(event, np.ndarray)]
-        return np.concatenate(blocks) if blocks else layout.empty_samples()
+        return samples_among(self._walk.events)
 
     def newest_row(self, channel: TelemetryChannel) -> NDArray[np.void]:
         """The last row (at most one) of a channel beside the samples that the last read found."""

@@ -1,6 +1,6 @@
 """Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -80,6 +80,12 @@ class Telemetry:
 Event = NDArray[np.void] | Note | Sheet | Mark | Attachment | Telemetry
 
 
+def samples_among(events: Iterable[Event]) -> NDArray[np.void]:
+    """The samples among events in one array, shape (N,)."""
+    blocks = [event for event in events if isinstance(event, np.ndarray)]
+    return np.concatenate(blocks) if blocks else layout.empty_samples()
+
+
 @dataclass
 class Scan:
     """What a file holds: ``events`` in the order they were written, and what is damaged."""
@@ -93,8 +99,7 @@ class Scan:
 
     def samples(self) -> NDArray[np.void]:
         """All samples in one array, shape (N,)."""
-        blocks = [event for event in self.events if isinstance(event, np.ndarray)]
-        return np.concatenate(blocks) if blocks else layout.empty_samples()
+        return samples_among(self.events)
 
     def telemetry(self, channel: TelemetryChannel) -> NDArray[np.void]:
         """All rows of a channel beside the samples, shape (N,), each with its ``host_time_ns``."""
