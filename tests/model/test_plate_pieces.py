@@ -1,5 +1,7 @@
 """Layers on the line of a cut: exact pieces, heights and toughness."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,6 +15,22 @@ from scissorcal.model.plate_pieces import (
     layer_pieces,
     spans_on_line,
 )
+from tests.model import golden_outlines
+from tests.model.drawn import assert_pieces, golden_cases, pieces_of
+
+
+def test_the_golden_vectors_are_those_of_the_closed_forms() -> None:
+    stored = golden_outlines.FILE.read_text(encoding="utf-8")
+    assert golden_outlines.text() == stored, "run: python -m tests.model.golden_outlines"
+
+
+@pytest.mark.parametrize("case", golden_cases(), ids=lambda case: case["title"])
+def test_golden_outlines_have_their_pieces(case: dict[str, Any]) -> None:
+    try:
+        found = pieces_of(case["drawn"])
+    except ValueError:
+        found = None
+    assert_pieces(found, case)
 
 
 def box(begin: float, end: float, low: float = -10.0, high: float = 10.0) -> Outline:

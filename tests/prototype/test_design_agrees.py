@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
-from scissorcal.model.plate_pieces import Layer, Outline, Region, layer_pieces
 from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
 from tests.browser import open_browser
+from tests.model.drawn import assert_pieces, golden_cases, numbers, pieces_of
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer
 
@@ -62,33 +62,6 @@ def random_drawing(rng: np.random.Generator) -> dict[str, Any]:
     return drawn(*layers, cut=float(rng.choice([0.0, 0.5, -1.0])))
 
 
-def of_recipe(given: dict[str, Any]) -> list[Any]:
-    def outline(corners: Any) -> Outline:
-        return Outline((1e-3 * np.array(corners, dtype=np.float64),))
-
-    layers = [
-        Layer(
-            one["name"],
-            one["thickness_mm"] * 1e-3,
-            one["toughness_ratio"],
-            outline(one["outline"]),
-            tuple(outline(hole) for hole in one["holes"]),
-            tuple(Region(outline(r["outline"]), r["toughness_ratio"]) for r in one["regions"]),
-        )
-        for one in given["layers"]
-    ]
-    return numbers(layer_pieces(layers, 1e-3 * given["cut_line_mm"]))
-
-
-def numbers(pieces: Any) -> list[Any]:
-    """Each piece in mm: begin, top, thickness, then ends and ratios of its strips."""
-    return [
-        [1e3 * piece.begin_m, 1e3 * piece.top_m, 1e3 * piece.thickness_m]
-        + [value for strip in piece.strips for value in (1e3 * strip.end_m, strip.toughness_ratio)]
-        for piece in pieces
-    ]
-
-
 def of_page(bed: Bed, given: dict[str, Any]) -> Any:
     return bed.run(
         "(given) => tried(() => layerPieces(given).map((p) => [p.begin, p.top, p.thickness,"
@@ -104,7 +77,7 @@ def test_random_drawings_have_the_same_pieces(bed: Bed) -> None:
         given = random_drawing(rng)
         found = of_page(bed, given)
         try:
-            wanted = of_recipe(given)
+            wanted = pieces_of(given)
         except ValueError:
             assert "refused" in found, given
             refused += 1
@@ -116,6 +89,12 @@ def test_random_drawings_have_the_same_pieces(bed: Bed) -> None:
         several += len(wanted) > 2
     assert several > RANDOM / 5
     assert RANDOM / 20 < refused < RANDOM / 2
+
+
+@pytest.mark.parametrize("case", golden_cases(), ids=lambda case: case["title"])
+def test_the_page_has_the_pieces_of_the_golden_vectors(bed: Bed, case: dict[str, Any]) -> None:
+    found = of_page(bed, case["drawn"])
+    assert_pieces(None if "refused" in found else found, case)
 
 
 def test_a_saved_recipe_is_taken_and_has_the_same_pieces(bed: Bed, tmp_path: Path) -> None:
