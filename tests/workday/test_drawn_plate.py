@@ -2,15 +2,19 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scissorcal.identity import file_digest
 from scissorcal.kernel import PiecesModel
 from scissorcal.package import ModelPackage, open_package
 from scissorcal.recording import read_recording
 from scissorcal.render.derating import needs_on, softened
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.plan import make_plan
+from scissorcal.workday.reviewed import reviewed_content
+from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 from tests.workday.faults import run
 from tests.workday.made import quick_workspace, record_cut, record_friction
@@ -45,7 +49,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     (made.root / "plate.svg").write_text(SVG.format(hole=25), encoding="utf-8")
     record_friction(made)
     record_cut(made)
-    for words in (("fit",), ("package", "build")):
+    for words in (("fit",), ("report",), ("package", "build")):
         done = run(words, made.root)
         assert done.code == 0, done.err
     return made
@@ -96,14 +100,36 @@ def test_torque_is_none_in_the_hole_and_in_proportion_in_the_band(package: Model
     assert band / sheet == pytest.approx(3.0, rel=0.1)
 
 
-def test_a_changed_drawing_makes_the_package_stale(workspace: Workspace, tmp_path: Path) -> None:
+def test_the_report_says_of_the_plate_what_plan_says(workspace: Workspace) -> None:
+    twin = json.loads(workspace.report_json.read_text(encoding="utf-8"))
+    (panel,) = (panel for panel in twin["panels"] if panel["id"] == "scene-plate")
+    assert panel["sentence"] == make_plan(workspace).plate
+    assert "declared in the recipe, not measured" in panel["sentence"]
+    whole, tough = panel["charts"][0]["series"]
+    assert whole["x"] == pytest.approx([0, 22, None, 28, 35, None, 45, 90], abs=0.01)
+    assert tough["x"] == pytest.approx([35.0, 45.0])
+    assert set(whole["y"]) == {0.1, None}
+    second = {value["name"]: value for value in panel["rows"][1]["values"]}
+    assert second["from"]["number"] == pytest.approx(28.0, abs=0.01)
+    assert second["declared toughness ratio"]["text"] == "1 to 35 mm, 3 to 45 mm, 1 to 90 mm"
+    page = workspace.report_html.read_text(encoding="utf-8")
+    assert panel["sentence"] in " ".join(page.split())
+
+
+def test_a_changed_drawing_makes_package_and_report_stale(workspace: Workspace) -> None:
     drawing = workspace.root / "plate.svg"
     before = drawing.read_bytes()
+    assert not any("stale" in one for one in package_warnings(workspace))
+    states = {s["name"]: s["state"] for s in plan_steps(workspace)}
+    assert "stale" not in states.values()
     try:
         drawing.write_text(SVG.format(hole=60), encoding="utf-8")
         states = {s["name"]: s["state"] for s in plan_steps(workspace)}
         assert states["package build"] == "stale"
+        assert states["report"] == "stale"
         assert states["fit cut"] != "stale"
+        assert any("The package is stale" in one for one in package_warnings(workspace))
+        assert reviewed_content(Engine.of(workspace))["plate.svg"] == file_digest(drawing)
     finally:
         drawing.write_bytes(before)
 

@@ -33,6 +33,7 @@ from scissorcal.report.inputs import (
 from scissorcal.report.twin import twin_text
 
 if TYPE_CHECKING:
+    from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.simplest.choice import SceneChoice
 
 
@@ -59,6 +60,7 @@ def build_report(
     inputs_hash: str = "",
     completeness: Sequence[Cell] = (),
     choice: SceneChoice | None = None,
+    pieces: tuple[LayerPiece, ...] = (),
     review: Review | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
@@ -70,9 +72,9 @@ def build_report(
     read. ``sheets`` are further parts, such as what a package states (:func:`sheet_from_mapping`);
     ``checks`` are trust checks by fit, ``geometry`` what photographs gave, whose pictures the page
     carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
-    used, cell by cell; ``choice`` says what of the fitted laws the scene needs. The page shows
-    ``review`` (by default the one in ``signature.json`` there) where it was given to this very
-    page and twin.
+    used, cell by cell; ``choice`` says what of the fitted laws the scene needs; ``pieces`` are a
+    drawn plate's (`recipe.plate_layers.plate_pieces`). The page shows ``review`` (by default the
+    one in ``signature.json`` there) where it was given to this very page and twin.
     ``created`` must carry its time zone. The same input gives the same bytes; a report that says
     the same as the one in ``output_dir`` keeps the time of that one.
 
@@ -96,6 +98,7 @@ def build_report(
         geometry,
         tuple(completeness),
         choice,
+        pieces,
     )
     document = compose(
         recipe,

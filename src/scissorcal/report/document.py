@@ -128,6 +128,10 @@ def compose(
         from scissorcal.report.subjects.simplest import simplest_panel
 
         scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
+    if evidence.pieces:
+        from scissorcal.report.subjects.drawn_plate import drawn_plate_panel
+
+        scene = [*scene, drawn_plate_panel(recipe, evidence.pieces)]
     provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
     cells = decision.cells_of(

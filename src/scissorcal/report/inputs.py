@@ -15,6 +15,7 @@ from scissorcal.report.numbers import Scalar, scalar
 from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
+    from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.simplest.choice import SceneChoice
 
 GeometryFit = CameraFit | BladeResult | PlateFit
@@ -141,7 +142,7 @@ class Evidence:
     ``recordings`` name strokes, ``raw`` has those whose samples are at hand, ``checks`` the trust
     checks by fit ("friction", "cut"), ``geometry`` what photographs gave, ``completeness`` what was
     planned, recorded and used of captures (one without it is counted from recordings and fits).
-    ``choice`` says what of the fitted laws the scene needs.
+    ``choice`` says what of the fitted laws the scene needs, ``pieces`` are those of a drawn plate.
     """
 
     recordings: tuple[RecordingSummary, ...] = ()
@@ -150,6 +151,7 @@ class Evidence:
     geometry: Geometry = field(default_factory=Geometry)
     completeness: tuple[Cell, ...] = ()
     choice: "SceneChoice | None" = None
+    pieces: "tuple[LayerPiece, ...]" = ()
 
 
 @dataclass(frozen=True)

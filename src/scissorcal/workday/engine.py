@@ -124,8 +124,8 @@ class Engine:
         }
         if step.kind == "package":  # it says which checks its fits failed
             made_from["failed"] = {item: self.state(item).failed for item in step.inputs}
-            if drawn := self._drawings():
-                made_from["drawings"] = drawn
+        if step.kind in ("package", "report") and (drawn := self._drawings()):
+            made_from["drawings"] = drawn
         return digest(made_from)
 
     def _drawings(self) -> dict[str, str]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
+from scissorcal.recipe.plate_layers import drawings
 from scissorcal.report.signature_block import unsigned_digest, with_signature
 from scissorcal.workday.steps import STEPS
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     from scissorcal.workday.engine import Engine
 
 COVERED = ("recordings", "photographs", "fit", "verify")
-"""Kinds of steps whose files a report rests on, beside the recipe."""
+"""Kinds of steps whose files a report rests on, beside the recipe and its drawings."""
 
 
 def reviewed_content(engine: "Engine") -> dict[str, str]:
@@ -22,7 +23,8 @@ def reviewed_content(engine: "Engine") -> dict[str, str]:
     found = {REPORT_PAGE: _page_digest(engine, page)} if page.is_file() else {}
     if twin.is_file():
         found[REPORT_TWIN] = index.digest(twin)
-    for path in (workspace.recipe_path, *_rests_on(engine)):
+    drawn = (workspace.root / name for name in drawings(engine.recipe))
+    for path in (workspace.recipe_path, *filter(Path.is_file, drawn), *_rests_on(engine)):
         found[workspace.relative(path)] = index.digest(path)
     return found
 

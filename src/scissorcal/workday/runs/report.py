@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.load import read_text
+from scissorcal.recipe.plate_layers import plate_pieces
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
@@ -71,6 +72,7 @@ def write_workspace_report(
             inputs_hash=engine.identity("report"),
             completeness=[cell for what in RIG if what in fits for cell in _cells(engine, what)],
             choice=_choice(engine),
+            pieces=plate_pieces(engine.recipe, workspace.root),
         )
         engine.refresh()
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
