@@ -5,19 +5,15 @@ from pathlib import Path
 import pytest
 
 from scissorcal.recording import export_table, read_recording
-from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import quick_workspace, record_friction
+from tests.workday.made import fitted_workspace, quick_workspace, record_friction
 
 from .conftest import Cli
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    workspace = quick_workspace(tmp_path_factory.mktemp("predict") / "paper")
-    record_friction(workspace)
-    fit_workspace(workspace, ("friction",))
-    return workspace
+    return fitted_workspace(tmp_path_factory.mktemp("predict") / "paper", "friction")
 
 
 @pytest.fixture(scope="module")

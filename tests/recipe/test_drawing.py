@@ -170,6 +170,20 @@ def test_two_megabytes_of_one_thing_are_read_or_refused_at_once(what: str) -> No
     assert time.process_time() - before < 2.0
 
 
+@pytest.mark.parametrize("letter", ["L", " "])
+def test_a_drawing_of_the_most_points_is_read(tmp_path: Path, letter: str) -> None:
+    turn = 2.0 * np.pi * np.arange(MOST_POINTS) / MOST_POINTS
+    corners = letter.join(f"{40 + 5 * math.cos(a)} {30 + 5 * math.sin(a)}" for a in turn)
+    path = tmp_path / "plate.svg"
+    rings = MOST_POINTS_OF_FILE // MOST_POINTS
+    path.write_text(HEAD + f'<path d="M{corners}z"/>' * rings + "</svg>")
+    assert [len(shape.contours[0]) for _, shape in read_drawing(path).shapes] == [MOST_POINTS] * 5
+    more = HEAD + f'<path d="M{corners}{letter}0 0z"/></svg>'
+    path.write_text(more)
+    with pytest.raises(InputError, match="more than 4,000 points"):
+        read_drawing(path)
+
+
 def test_what_only_looks_like_a_shape_is_passed_over(tmp_path: Path) -> None:
     """Shapes of another namespace, and of what is not shown; the style of a shape places it."""
     other = '<o:rect xmlns:o="urn:o" id="a" width="9" height="9"/>'

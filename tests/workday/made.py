@@ -1,13 +1,18 @@
 """A workspace with a made-up friction recording, quick to fit."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 from scissorcal.recording import write_recording
+from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
+
+Kind = Literal["friction", "cut"]
 
 RECIPE = """
 format = "scissorcal-recipe/1"
@@ -59,6 +64,15 @@ def quick_workspace(folder: Path) -> Workspace:
     return workspace
 
 
+def fitted_workspace(folder: Path, *kinds: Kind, **how: Any) -> Workspace:
+    """A quick workspace with recordings of these kinds, and with fits of them all."""
+    workspace = quick_workspace(folder)
+    for kind in kinds:
+        RECORD[kind](workspace)
+    fit_workspace(workspace, kinds, **how)
+    return workspace
+
+
 def record_friction(
     workspace: Workspace,
     seed: int = 1,
@@ -94,3 +108,9 @@ def record_cut(workspace: Workspace, seed: int = 3) -> Path:
     text = workspace.recipe_path.read_text(encoding="utf-8")
     write_recording(replace(made, recipe_toml=text), path)
     return path
+
+
+RECORD: dict[Kind, Callable[[Workspace], Path]] = {
+    "friction": record_friction,
+    "cut": record_cut,
+}

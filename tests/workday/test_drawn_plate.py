@@ -1,6 +1,7 @@
-"""A plate drawn with a hole and a tougher band: planned, built, and rendered as drawn."""
+"""The built-in plate with a hole and a band, 90 mm of it: planned, built, rendered as drawn."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from scissorcal.identity import file_digest
 from scissorcal.kernel import PiecesModel
 from scissorcal.package import ModelPackage, open_package
+from scissorcal.recipe.library import recipe_path
 from scissorcal.recording import read_recording
 from scissorcal.render.derating import needs_on, softened
 from scissorcal.workday.engine import Engine
@@ -19,34 +21,21 @@ from scissorcal.workday.workspace import Workspace
 from tests.workday.faults import run
 from tests.workday.made import quick_workspace, record_cut, record_friction
 
-LAYERS = """
-[[plate.layers]]
-name = "sheet"
-thickness_mm = 0.1
-outline = "plate.svg"
-id = "sheet"
-holes = ["hole"]
-
-[[plate.layers.regions]]
-toughness_ratio = 3.0
-id = "band"
-"""
-SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="60mm" viewBox="0 0 100 60">
-<g transform="translate(0 30)">
-<rect id="sheet" x="0" y="-20" width="90" height="40"/>
-<circle id="hole" cx="{hole}" cy="0" r="3"/>
-<rect id="band" x="35" y="-20" width="10" height="40"/>
-</g></svg>
-"""
+BUILT_IN = recipe_path("paper-with-hole")
+DRAWING = "paper-with-hole.svg"
 
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     made = quick_workspace(tmp_path_factory.mktemp("drawn") / "plate")
+    plate = re.search(r"^\[plate\].*?(?=^\[scene\])", BUILT_IN.read_text("utf-8"), re.M | re.S)
+    assert plate is not None
     text = made.recipe_path.read_text(encoding="utf-8")
-    line = text + "\n[plate]\ncut_line_mm = 30.0\n" + LAYERS
-    made.recipe_path.write_text(line, encoding="utf-8")
-    (made.root / "plate.svg").write_text(SVG.format(hole=25), encoding="utf-8")
+    made.recipe_path.write_text(f"{text}\n{plate[0]}", encoding="utf-8")
+    drawing = BUILT_IN.with_suffix(".svg").read_text(encoding="utf-8")
+    shorter = drawing.replace('width="180" height="60"/>', 'width="90" height="60"/>')
+    assert shorter != drawing
+    (made.root / DRAWING).write_text(shorter, encoding="utf-8")
     record_friction(made)
     record_cut(made)
     for words in (("fit",), ("report",), ("package", "build")):
@@ -117,19 +106,19 @@ def test_the_report_says_of_the_plate_what_plan_says(workspace: Workspace) -> No
 
 
 def test_a_changed_drawing_makes_package_and_report_stale(workspace: Workspace) -> None:
-    drawing = workspace.root / "plate.svg"
+    drawing = workspace.root / DRAWING
     before = drawing.read_bytes()
     assert not any("stale" in one for one in package_warnings(workspace))
     states = {s["name"]: s["state"] for s in plan_steps(workspace)}
     assert "stale" not in states.values()
     try:
-        drawing.write_text(SVG.format(hole=60), encoding="utf-8")
+        drawing.write_bytes(before.replace(b'cx="25"', b'cx="60"'))
         states = {s["name"]: s["state"] for s in plan_steps(workspace)}
         assert states["package build"] == "stale"
         assert states["report"] == "stale"
         assert states["fit cut"] != "stale"
         assert any("The package is stale" in one for one in package_warnings(workspace))
-        assert reviewed_content(Engine.of(workspace))["plate.svg"] == file_digest(drawing)
+        assert reviewed_content(Engine.of(workspace))[DRAWING] == file_digest(drawing)
     finally:
         drawing.write_bytes(before)
 

@@ -16,15 +16,12 @@ from scissorcal.workday.history import restore, versions
 from scissorcal.workday.runs.fit import fit_step, fit_workspace
 from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import quick_workspace, record_friction
+from tests.workday.made import fitted_workspace
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    workspace = quick_workspace(tmp_path_factory.mktemp("elsewhere") / "paper")
-    record_friction(workspace)
-    fit_workspace(workspace, ("friction",))
-    return workspace.root
+    return fitted_workspace(tmp_path_factory.mktemp("elsewhere") / "paper", "friction").root
 
 
 @pytest.fixture

@@ -29,17 +29,13 @@ from scissorcal.workday.scene_choice import known_scene_choice
 from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import quick_workspace, record_cut, record_friction
+from tests.workday.made import fitted_workspace, quick_workspace, record_friction
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Friction and a cut, recorded and fitted at draft effort."""
-    workspace = quick_workspace(tmp_path_factory.mktemp("engine") / "paper")
-    record_friction(workspace)
-    record_cut(workspace)
-    fit_workspace(workspace)
-    return workspace
+    return fitted_workspace(tmp_path_factory.mktemp("engine") / "paper", "friction", "cut")
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ _PLACES = (*_POINTS, *_SIZES, "id", "transform", "display", "preserveAspectRatio
 _NOT_SHOWN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata")
 _NUMBERS = {"h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "a": 7}
 """That a segment of a path takes; any other takes 2."""
+_TOKEN = re.compile(r"[a-df-zA-DF-Z]|[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 _TOO_MANY = (
     f"it has an outline of more than {MOST_POINTS:,} points, or {MOST_POINTS_OF_FILE:,} in all: "
@@ -116,8 +118,8 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
         tolerance = FLAT_MM / _stretch(to_mm)
         for part in path.as_subpaths():
             corners = _flattened(Path(part), tolerance, min(room, MOST_POINTS))
-            room -= len(corners)
             contour = _closed(corners, to_mm)
+            room -= len(contour)
             if len(contour) >= 3:
                 found.append([index, name, contour])
     if not found:
@@ -220,16 +222,14 @@ def _places(attributes: dict[str, str]) -> dict[str, str]:
 
 def _nodes(drawn: str) -> int:
     """Segments that a path or a list of points states, or fewer: flags of arcs may be joined."""
-    import re
-
-    count, numbers, each = 0, 0, 2
-    for token in re.finditer(r"[a-df-zA-DF-Z]|[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", drawn):
+    count, numbers, each, letter = 0, 0, 2, False
+    for token in _TOKEN.finditer(drawn):
         if token[0].isalpha():
-            count, numbers = count + numbers // each + 1, 0
-            each = _NUMBERS.get(token[0].lower(), 2)
+            count += max(numbers // each, letter)
+            each, numbers, letter = _NUMBERS.get(token[0].lower(), 2), 0, token[0] not in "zZ"
         else:
             numbers += 1
-    return count + numbers // each
+    return count + max(numbers // each, letter)
 
 
 def _refuse_unitless(root: str, attributes: dict[str, str]) -> None:
@@ -261,9 +261,10 @@ def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
             continue
         if type(segment).__name__ == "Move":
             continue
-        if len(corners) + steps > room:
+        if len(corners) + steps > room + 1:  # the first corner comes again at the end
             raise ValueError(_TOO_MANY)
-        corners += [segment.start]
+        if not corners or corners[-1] != segment.start:
+            corners += [segment.start]
         corners += [segment.point(step / steps) for step in range(1, steps)]
         corners += [segment.end]
     return corners

@@ -27,17 +27,16 @@ from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import quick_workspace, record_friction
+from tests.workday.made import fitted_workspace, quick_workspace, record_friction
 
 FEW = VerifySettings(fits=6)
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    workspace = quick_workspace(tmp_path_factory.mktemp("verify") / "paper")
-    record_friction(workspace)
-    fit_workspace(workspace, ("friction",), effort="standard")
-    return workspace
+    return fitted_workspace(
+        tmp_path_factory.mktemp("verify") / "paper", "friction", effort="standard"
+    )
 
 
 @pytest.fixture(scope="module")
