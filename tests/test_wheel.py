@@ -114,6 +114,7 @@ def test_nothing_is_built_from_a_source_archive(
         tar.extractall(tmp_path, filter="data")
     source = tmp_path / archive.name.removesuffix(".tar.gz")
     assert (source / "src/scissorcal/prototype/page/src/page.html").is_file()
+    assert (source / "recipes/paper-with-hole.svg").is_file()
     for name in FOR_BROWSERS:  # an unpacker need not keep times
         os.utime(source / "src" / name, (0, 0))
     done = setup(source, "build_py", "--build-lib", str(tmp_path / "made"), **without_builders)

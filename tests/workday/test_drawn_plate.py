@@ -100,7 +100,10 @@ def test_the_report_says_of_the_plate_what_plan_says(workspace: Workspace) -> No
     assert set(whole["y"]) == {0.1, None}
     second = {value["name"]: value for value in panel["rows"][1]["values"]}
     assert second["from"]["number"] == pytest.approx(28.0, abs=0.01)
-    assert second["declared toughness ratio"]["text"] == "1 to 35 mm, 3 to 45 mm, 1 to 90 mm"
+    assert (
+        second["declared toughness ratio"]["text"]
+        == "1 (up to 35 mm), 3 (up to 45 mm), 1 (up to 90 mm)"
+    )
     page = workspace.report_html.read_text(encoding="utf-8")
     assert panel["sentence"] in " ".join(page.split())
 

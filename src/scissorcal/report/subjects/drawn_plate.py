@@ -33,7 +33,9 @@ def drawn_plate_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
 
 
 def _row(index: int, piece: LayerPiece) -> Row:
-    stretches = [f"{one.toughness_ratio:g} to {one.end_m * 1e3:.4g} mm" for one in piece.strips]
+    stretches = [
+        f"{one.toughness_ratio:g} (up to {one.end_m * 1e3:.4g} mm)" for one in piece.strips
+    ]
     return Row(
         f"piece {index}",
         (
