@@ -18,11 +18,12 @@ import pytest
 
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.package import build_package
-from scissorcal.recording import read_recording
+from scissorcal.recording import RecordingWriter, Stroke, read_recording
 from scissorcal.render.engine import REQUEST
+from scissorcal.workday.runs.prototype import workspace_hands
 from scissorcal.workday.workspace import Workspace, create_workspace
 from tests.package.fits import cut_fit, friction_fit, recipe
-from tests.prototype.made import ask, heard
+from tests.prototype.made import ask, heard, samples_of
 from tests.strange_device import StrangeDevice
 from tests.strange_device.terminal import serve_on_pty
 
@@ -262,3 +263,20 @@ def test_the_export_is_one_file_and_replaces_nothing_unasked(
     nowhere = tmp_path / "nowhere" / "a.html"
     assert cli("package", "export", "--html", nowhere, "-w", packed.root).code == 2
     assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_recording_whose_name_is_no_text_is_a_hand_all_the_same(
+    packed: Workspace, cli: Cli, tmp_path: Path
+) -> None:
+    stroke = Stroke(0, "closing", 0.3, 0)
+    packed.captures_dir.mkdir(exist_ok=True)
+    path = packed.captures_dir / os.fsdecode(b"cut-\xff.mcap")
+    with RecordingWriter(path, "cut", strokes=(stroke,)) as writer:
+        samples = samples_of(0, 1000)
+        samples["stroke"] = 0
+        writer.append(samples)
+    (hand,) = workspace_hands(packed)
+    assert hand.name == "cut-?"
+    page = tmp_path / "paper.html"
+    said = cli("package", "export", "--html", page, "--workspace", packed.root)
+    assert said.code == 0, said.err

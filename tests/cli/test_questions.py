@@ -111,6 +111,21 @@ def test_the_end_of_the_program_that_answers_is_an_interrupt(body: str) -> None:
         assert process.wait(BOUND_s) == 130
 
 
+@pytest.mark.parametrize("body", [ASKS, WORKS])
+def test_a_stdin_that_is_closed_is_the_end_of_it(body: str) -> None:
+    program = f"import os; os.close(0)\n{PROGRAM.format(body=body)}"
+    ran = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, **ENVIRONMENT},
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=BOUND_s,
+        check=False,
+    )
+    assert ran.returncode in (130, -signal.SIGINT)
+    assert "Bad file descriptor" not in ran.stderr
+
+
 def test_a_command_that_a_shell_started_deaf_to_ctrl_c_hears_it_all_the_same() -> None:
     with asking(WORKS, deaf=True) as process:
         assert line_of(process).startswith("A note")

@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 
 from scissorcal.package import PackageSummary, manifest_schema_text
+from scissorcal.package.manifest import Manifest
 from scissorcal.recipe.library import schemas_dir
 
 SCHEMA = "manifest.schema.json"
@@ -32,3 +33,15 @@ def test_units_are_given_for_what_a_package_has(paper: PackageSummary, pad: Pack
     assert paper.manifest.units["fracture_energy"] == "J/m"
     assert "fracture_energy" not in pad.manifest.units
     assert pad.manifest.units["torque"] == "N m"
+
+
+def test_pieces_with_an_estimated_pose_are_no_package(paper: PackageSummary) -> None:
+    with zipfile.ZipFile(paper.path) as archive:
+        content = json.loads(archive.read("manifest.json"))
+    strip = {"end_m": 0.05, "fracture_energy_J_per_m": 0.4}
+    piece = {"begin_m": 0.0, "upper_face_m": 5e-5, "scale": 1.0, "strips": [strip]}
+    content["pieces"] = [piece]
+    assert Manifest.model_validate_json(json.dumps(content)).pieces
+    content["plate_pose"] = "estimated"
+    with pytest.raises(ValueError, match="estimated pose"):
+        Manifest.model_validate_json(json.dumps(content))

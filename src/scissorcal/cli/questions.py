@@ -56,7 +56,7 @@ def ask(request: str) -> None:
 def _listen(heard: "queue.Queue[bool]") -> None:
     """Read the file itself: a thread that waits in a buffer of Python would hold up its end."""
     rest = b""
-    while block := os.read(0, 4096):
+    while block := _read():
         *lines, rest = (rest + block).split(b"\n")
         for _ in range(lines.count(b"yes")):
             heard.put(True)
@@ -67,3 +67,11 @@ def _listen(heard: "queue.Queue[bool]") -> None:
         time.sleep(PATIENCE_s)
     if answers is heard:
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _read() -> bytes:
+    """What stdin gives next; nothing where it has ended, was closed or cannot be read."""
+    try:
+        return os.read(0, 4096)
+    except OSError:
+        return b""

@@ -294,6 +294,8 @@ class Manifest(Section):
             raise ValueError("mechanics.fracture and the cut fit's fracture contradict each other")
         if (self.provenance.friction is None) != (self.mechanics.friction is None):
             raise ValueError("mechanics.friction and provenance.friction contradict each other")
+        if self.pieces is not None and self.plate_pose == "estimated":
+            raise ValueError("pieces of a plate do not go together with an estimated pose of it")
         return self
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,9 @@ MOST_CHARACTERS = 1_000
 """Of an attribute other than a path or points; a transform has some 100."""
 
 LARGEST_MM = 100_000.0
+
+_LENGTH = re.compile(r"\+?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(mm|cm|in|pt|pc)")
+"""A length of a page in a unit that has a size; svgelements takes what it cannot read as pixels."""
 
 SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
 _POINTS = ("d", "points")
@@ -151,6 +155,8 @@ class _Plain:
             raise ValueError(_REFUSED[local])
         if self._elements == 1:
             _refuse_unitless(local, attributes)
+        elif local == "svg":
+            raise ValueError("it has a drawing within the drawing (<svg>): save it as plain SVG")
         for key, value in attributes.items():
             _refuse_attribute(key.rpartition(" ")[2], value)
         is_svg = space in ("", "http://www.w3.org/2000/svg")
@@ -237,11 +243,25 @@ def _refuse_unitless(root: str, attributes: dict[str, str]) -> None:
         raise ValueError(f"its root is <{root}>, not <svg>")
     for key in ("width", "height"):
         value = attributes.get(key, "").strip()
-        if not value.endswith(("mm", "cm", "in", "pt", "pc")):
+        if not _LENGTH.fullmatch(value):
             raise ValueError(
                 f'its {key} is "{value[:40]}": state it with a unit, such as {key}="80mm", so that '
                 "lengths are known"
             )
+    box = attributes.get("viewBox")
+    if box is not None and not _is_view_box(box):
+        raise ValueError(
+            f'its viewBox is "{box[:40]}": state four numbers, the last two above 0, so that '
+            "lengths are known"
+        )
+
+
+def _is_view_box(text: str) -> bool:
+    try:
+        numbers = [float(one) for one in text.replace(",", " ").split()]
+    except ValueError:
+        return False
+    return len(numbers) == 4 and all(map(math.isfinite, numbers)) and min(numbers[2:]) > 0.0
 
 
 def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
@@ -272,8 +292,6 @@ def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
 
 def _arc_steps(arc: Any, tolerance: float) -> int:
     """A chord over the angle a is r (1 - cos(a / 2)) off its arc."""
-    import math
-
     radius = max(abs(arc.rx), abs(arc.ry))
     if not radius > tolerance:
         return 4
@@ -283,8 +301,6 @@ def _arc_steps(arc: Any, tolerance: float) -> int:
 
 def _bezier_steps(curve: Any, tolerance: float) -> int:
     """A chord over a share h of a curve is at most h^2 / 8 of its largest second derivative off."""
-    import math
-
     names = ("start", "control", "end") if hasattr(curve, "control") else None
     points = [getattr(curve, n) for n in names or ("start", "control1", "control2", "end")]
     degree = len(points) - 1
@@ -297,8 +313,6 @@ def _bezier_steps(curve: Any, tolerance: float) -> int:
 
 
 def _whole(number: float) -> int:
-    import math
-
     if not math.isfinite(number):
         raise ValueError(_NO_PLACES)
     return math.ceil(min(number, MOST_POINTS_OF_FILE + 1))

@@ -136,7 +136,7 @@ def _hand(recording: "Recording") -> "Hand | None":
     if len(kept) < 2:
         return None
     return Hand(
-        name=Path(recording.source).stem,
+        name=Path(recording.source).stem.encode("utf-8", "replace").decode(),
         time=Numbers.of(time_s[kept]),
         opening=Numbers.of(samples["opening"][kept]),
         advance=Numbers.of(samples["advance"][kept]),
