@@ -237,3 +237,27 @@ def test_by_touch_on_a_phone(browser: Browser, tmp_path: Path) -> None:
         for place in [(20, -10), (60, -10), (60, 10), (20, 10), (20, -10)]:
             bed.page.touchscreen.tap(*bed.place(*place))
         assert spans(bed) == [(0, 120), (20, 60)]
+
+
+HOLED = """
+[plate]
+cut_line_mm = 0.0
+[[plate.layers]]
+name = "holed"
+thickness_mm = 0.1
+outline_mm = [[0, -20], [60, -20], [60, 20], [0, 20]]
+holes_mm = [[[10, -5], [20, -5], [20, 5], [10, 5]]]
+"""
+
+
+@pytest.mark.parametrize(("recipe", "layer"), [(HOLED, "holed"), (None, "sheet")])
+def test_the_plate_of_a_package_is_drawn_first(
+    browser: Browser, tmp_path: Path, recipe: str | None, layer: str
+) -> None:
+    with open_bed(browser, tmp_path) as bed:
+        bed.run("(recipe) => Object.assign(scene, { pieces: [], recipe })", recipe)
+        bed.mount()
+        assert bed.page.locator("[data-key=name0]").input_value() == layer
+        bed.page.get_by_label("instead of the package's plate").check()
+        assert len(spans(bed)) == (2 if recipe else 1)
+        assert ("plain sheet" in bed.said) == (recipe is None)

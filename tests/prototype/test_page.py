@@ -288,3 +288,41 @@ def test_the_solid_view_and_the_designer_open(shown: Shown) -> None:
     shown.page.get_by_text("Draw plates and blades").click()
     shown.page.locator(".design button").first.wait_for(state="visible")
     assert shown.run(UNNAMED) == []
+
+
+def test_the_other_law_beside_the_felt_one_has_its_own_name(shown: Shown) -> None:
+    names = "() => [...document.querySelectorAll('section.now dt')].map((one) => one.textContent)"
+    shown.page.wait_for_selector("[data-number='what if, the same motion']")
+    shown.page.locator("[data-key=whatIf]").check()
+    shown.page.wait_for_selector("[data-number='as fitted, the same motion']")
+    assert "as fitted, the same motion" in shown.run(names)
+    assert "what if, the same motion" not in shown.run(names)
+
+
+def test_beyond_the_range_of_the_package_is_said_for_all_to_see(shown: Shown) -> None:
+    told = shown.page.locator("section.now .warning")
+    assert not told.is_visible()
+    far = 2.0 * shown.scene.contact_m[1]
+    shown.run(
+        "(far) => { scissorcal.rig.wanted = { ...scissorcal.rig.wanted, advance: -far }; }", far
+    )
+    told.wait_for(state="visible")
+    assert "Outside the range" in told.inner_text()
+
+
+def test_a_slider_or_a_reset_ends_the_draws(shown: Shown) -> None:
+    draw, play = shown.page.locator("[data-key=draw]"), shown.page.locator("[data-key=play]")
+    play.click()
+    shown.until("a.controls.choices.draw !== null")
+    shown.page.locator("[data-slider=kappa]").evaluate(
+        "(e) => { e.value = 200; e.dispatchEvent(new Event('input')); }"
+    )
+    assert (draw.input_value(), play.inner_text()) == ("0", "Play draws")
+    play.click()
+    shown.until("a.controls.choices.draw !== null")
+    shown.page.locator("[data-key=reset]").click()
+    shown.page.wait_for_timeout(1500)  # draws follow each other every 0.6 s
+    assert shown.run(
+        "() => [scissorcal.controls.choices.draw, scissorcal.controls.choices.values.size]"
+    ) == [None, 0]
+    assert play.inner_text() == "Play draws"

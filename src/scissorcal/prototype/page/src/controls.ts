@@ -54,6 +54,8 @@ export class Controls {
   }
 
   reset(): void {
+    window.clearInterval(this.playing);
+    this.playing = 0;
     this.choices.values.clear();
     this.choices.draw = null;
     this.choices.active = "fitted";
@@ -85,6 +87,14 @@ export class Controls {
         this.changed();
       },
     }), label);
+  }
+
+  /** What a slider changed is no draw any more, and no further one takes its place. */
+  private leaveDraws(): void {
+    window.clearInterval(this.playing);
+    this.playing = 0;
+    this.choices.draw = null;
+    this.fillDraws();
   }
 
   private fillDraws(): void {
@@ -129,7 +139,7 @@ export class Controls {
       input: () => {
         const wanted = low + (Number(input.value) / STEPS) * (high - low);
         this.choices.values.set(slider.name, wanted);
-        this.choices.draw = null;
+        if (this.choices.draw !== null || this.playing) this.leaveDraws();
         output.textContent = shown(wanted);
         input.setAttribute("aria-valuetext", shown(wanted));
         this.changed();

@@ -7,7 +7,7 @@ import { Design, Kind, plainSheet } from "./design_state";
 import { calibratedText, cornerTable, edgePanel, layerList, pieceTable } from "./design_tables";
 import { html, refilled } from "./elements";
 import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
-import { calibratedOf, recipeText } from "./recipe_text";
+import { calibratedOf, drawnFromRecipe, recipeText } from "./recipe_text";
 import { Scene, unpack } from "./scene";
 import { svgOf } from "./svg_file";
 
@@ -56,7 +56,8 @@ class Designer {
     this.calibrated = calibratedOf(scene);
     this.fitted = fittedEdge(scene);
     this.base = scene.recipe ?? null;
-    this.design = new Design(plainSheet(this.calibrated, scene.blade_length_m), (isDone) => this.changed(isDone));
+    const begun = this.begun();
+    this.design = new Design(begun.drawn, (isDone) => this.changed(isDone));
     const paper = html("div", { class: "design-paper" });
     const say = (sentence: string): void => this.say(sentence);
     this.canvas = new DesignCanvas(paper, this.design, this.calibrated, say);
@@ -70,6 +71,21 @@ class Designer {
     this.canvas.fit();
     this.meet();
     this.tables();
+    if (begun.sentence) this.say(begun.sentence);
+  }
+
+  /** What is drawn first: the package's own plate where its recipe holds one, else the plain sheet. */
+  private begun(): { drawn: Drawn; sentence: string } {
+    const { scene } = this;
+    const plain = plainSheet(this.calibrated, scene.blade_length_m);
+    if (!scene.pieces) return { drawn: plain, sentence: "" };
+    try {
+      const own = drawnFromRecipe(scene.recipe ?? "");
+      if (own.layers.length) return { drawn: { ...own, edge: null, edge_points: [] }, sentence: "" };
+    } catch (error) {
+      return { drawn: plain, sentence: `The plate of the package cannot be drawn here: ${(error as Error).message}` };
+    }
+    return { drawn: plain, sentence: "The package does not hold the drawing of its plate: this is a plain sheet." };
   }
 
   private say(sentence: string): void {
@@ -158,7 +174,7 @@ class Designer {
       html("label", { class: "button" }, "Load SVG or recipe ", file),
       saves("recipe.toml", "application/toml", () => recipeText(design.drawn, scene, this.base)),
       saves("drawing.svg", "image/svg+xml", () => svgOf(design.drawn)),
-      html("label", { class: "field" }, this.cuts, " cut this drawing instead of the plain sheet"));
+      html("label", { class: "field" }, this.cuts, ` cut this drawing instead of ${scene.pieces ? "the package's plate" : "the plain sheet"}`));
   }
 
   private async load(chosen: File): Promise<void> {

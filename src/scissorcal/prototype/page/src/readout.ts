@@ -9,19 +9,23 @@ const SAID_EVERY_ms = 2000;
 const SHOWN_EVERY_ms = 100;
 
 const DEG = 180 / Math.PI;
+/** What stands beside the law that is felt: the other one, on the same motion. */
+const BESIDE = { fitted: "what if, the same motion", whatIf: "as fitted, the same motion" };
+const BEYOND = "Outside the range of the package: nothing was checked here.";
 
 /** The state in numbers: shown ten times a second, told to screen readers every two seconds. */
 export class Readout {
   private readonly state = html("dl", { class: "numbers" });
   private readonly energy = html("dl", { class: "numbers" });
   private readonly said = html("p", { class: "said", "aria-live": "polite" });
+  private readonly beyond = html("p", { class: "warning", hidden: true }, BEYOND);
   private shownAt = 0;
   private saidAt = 0;
   private before = "";
 
   constructor(container: HTMLElement, private readonly scene: Scene) {
     container.append(
-      html("h2", {}, "Now"), this.state, html("h3", {}, "Energy since the fresh sheet, mJ"), this.energy,
+      html("h2", {}, "Now"), this.beyond, this.state, html("h3", {}, "Energy since the fresh sheet or the last change of the law, mJ"), this.energy,
       html("p", { class: "note" }, "Work of the hand = stored + fracture + arrest + friction, up to the error of steps of a tick."), this.said);
   }
 
@@ -33,7 +37,7 @@ export class Readout {
     const rows: [string, string, string][] = [
       ["torque", (1e3 * step.torque).toFixed(1), "mN m"],
       ["of it friction", (1e3 * step.friction_torque).toFixed(1), "mN m"],
-      ["what if, the same motion", rig.beside ? (1e3 * rig.beside.torque).toFixed(1) : "–", "mN m"],
+      [BESIDE[rig.active], rig.beside ? (1e3 * rig.beside.torque).toFixed(1) : "–", "mN m"],
       ["handle force", (step.torque / scene.handle_radius_m).toFixed(2), "N"],
       ["force along the cut", step.force.toFixed(2), "N"],
       ["opening", (DEG * rig.pose.opening).toFixed(1), "°"],
@@ -44,6 +48,7 @@ export class Readout {
       ["crack", cut_mm.toFixed(1), "mm"],
     ];
     list(this.state, rows);
+    this.beyond.hidden = !(step.flags & FLAG.outOfRange);
     const error = energy.hand - energy.stored - energy.fracture - energy.arrest - energy.friction;
     list(this.energy, (["hand", "stored", "fracture", "arrest", "friction"] as const)
       .map((name): [string, string, string] => [name === "hand" ? "work of the hand" : name, (1e3 * energy[name]).toFixed(2), "mJ"])
@@ -72,6 +77,7 @@ function list(into: HTMLElement, rows: [string, string, string][]): void {
       into.append(entry);
     }
     const text = `${isZero(value) ? value.replace("-", "") : value.replace("-", "−")} ${unit}`;
+    if (entry.dataset.number !== name) [entry.dataset.number, entry.firstChild!.textContent] = [name, name];
     if (entry.lastChild!.textContent !== text) entry.lastChild!.textContent = text;
   });
 }
