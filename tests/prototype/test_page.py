@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -326,3 +327,52 @@ def test_a_slider_or_a_reset_ends_the_draws(shown: Shown) -> None:
         "() => [scissorcal.controls.choices.draw, scissorcal.controls.choices.values.size]"
     ) == [None, 0]
     assert play.inner_text() == "Play draws"
+
+
+def test_a_plate_of_pieces_keeps_its_cracks_where_the_law_changes(shown: Shown) -> None:
+    shown.run(
+        """() => { const a = scissorcal, upper_face_m = a.scene.upper_face_m;
+        const strips = [{ end_m: 0.2, fracture_energy_J_per_m: a.scene.numbers[4] }];
+        a.rig.cut([{ begin_m: 0, upper_face_m, scale: 1, strips }]);
+        a.changed(); a.rig.freshSheet(); }"""
+    )
+    shown.stroke()
+    cut_m = shown.run("() => scissorcal.rig.crackMost")
+    assert cut_m > 0.005
+    shown.part("friction", False)
+    assert shown.run("() => scissorcal.rig.crackMost") == cut_m
+    shown.part("friction", True)
+    shown.run("() => scissorcal.rig.freshSheet()")
+    assert shown.run("() => scissorcal.rig.crackMost") == 0.0
+
+
+FOLLOW = """([recording, times, openings, advances]) => scissorcal.rig.follow(
+  { recording, time_s: times, opening_rad: openings, advance_m: advances })"""
+
+
+def test_the_page_cuts_what_a_followed_rig_cuts_and_gives_the_blades_back(shown: Shown) -> None:
+    low, high = shown.scene.opening_rad
+    time_s = np.arange(0.0, 0.8, 0.004)
+    opening = high - (high - low) * np.sin(np.pi * time_s / 1.6) ** 2
+    advance = np.full_like(time_s, -shown.scene.contact_m[0])
+    ends = (0, 60, 200)
+    for first, last in pairwise(ends):  # as messages come
+        rows = [values[first:last].tolist() for values in (time_s, opening, advance)]
+        shown.run(FOLLOW, ["one", *rows])
+    assert shown.run("() => scissorcal.rig.isFollowing")
+    script = "const { pose, crackMost, energy } = scissorcal.rig"
+    found = shown.run(f"() => {{ {script}; return {{ pose, crackMost, energy }}; }}")
+    assert found["pose"]["opening"] == opening[-1]
+    fine_s = np.arange(0.0, time_s[-1] + 5e-4, 1e-3)
+    fine = np.interp(fine_s, time_s, opening).astype(np.float32)
+    rate = np.gradient(fine, 1e-3).astype(np.float32)
+    along = np.full(len(fine), advance[0], dtype=np.float32)
+    stepped = shown.package.simulate(fine, rate, along)
+    fracture_J = float(stepped["fracture_J"][1:].sum())  # the books begin after the first sample
+    assert found["energy"]["fracture"] == pytest.approx(fracture_J, rel=1e-3)
+    cracks_m = stepped["contact"] + along
+    assert found["crackMost"] == pytest.approx(float(cracks_m[-1]), abs=1e-6)
+    shown.until("!a.rig.isFollowing")
+    shown.run(FOLLOW, ["two", [0.0], [opening[0]], [advance[0]]])  # a fresh sheet
+    fresh_m = shown.run("() => scissorcal.rig.crackMost")
+    assert fresh_m == pytest.approx(float(cracks_m[0]), abs=1e-6)

@@ -126,6 +126,28 @@ float EXPORT(sc_web_piece_crack)(int32_t which)
     return pieces.begun ? pieces.of[which].crack.crack : config.piece[which].begin;
 }
 
+/* Put the crack of a piece farther on, as after a cut to there. 1, or 0, and nothing is changed, where
+ * there is no such piece or the place is not beyond its near edge. */
+int32_t EXPORT(sc_web_piece_set_crack)(int32_t which, float at)
+{
+    if (which < 0 || which >= config.count || !(at > config.piece[which].begin)) {
+        return 0;
+    }
+    if (!pieces.begun) {
+        sc_pieces_fresh(&config, &pieces);
+    }
+    const sc_plate_piece *const piece = &config.piece[which];
+    const sc_strip *const strip = &config.strip[piece->first];
+    sc_piece_crack *const own = &pieces.of[which];
+    own->strip = 0;
+    while (own->strip < piece->count && at >= strip[own->strip].end) {
+        own->strip++;
+    }
+    own->crack.crack = own->strip < piece->count ? at : strip[piece->count - 1].end;
+    own->crack.detached = 0;
+    return 1;
+}
+
 /* Make the model from the tables as they are and these numbers; 1 if it is sound. The crack is at 0, the
  * plate a uniform sheet in the model's own place. */
 int32_t EXPORT(sc_web_make)(int32_t moving_blades, int32_t closure, int32_t render_friction,

@@ -69,9 +69,9 @@ export class App {
     time.append(html("h2", {}, "The last 8 seconds"));
     this.torque = new TorqueChart(torque, scene);
     this.time = new TimeChart(time);
-    this.readout = new Readout(now, scene);
+    this.readout = new Readout(now, scene, server !== null);
     this.controls = new Controls(law, scene, () => this.changed());
-    this.panel = server ? new RigPanel(rig, server) : null;
+    this.panel = server ? new RigPanel(rig, server, (samples) => this.rig.follow(samples)) : null;
     takeInput(this.drawing, this.rig, scene, { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() });
     this.changed();
     this.rig.freshSheet();
@@ -97,10 +97,10 @@ export class App {
     this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
     // at rest nothing changes but colours and sizes: four pictures a second are enough
-    if (rig.isStill && !this.panel?.pose && now - this.drawnAt < AT_REST_ms) return this.run();
+    if (rig.isStill && now - this.drawnAt < AT_REST_ms) return this.run();
     this.drawnAt = now;
     this.draw();
-    this.readout.show(rig, now);
+    this.readout.show(rig, now, rig.isFollowing ? this.panel?.recent.newestTorque : undefined);
     if (now - this.chartedAt >= CHARTS_EVERY_ms) {
       this.chartedAt = now;
       if (rig.strokeContact !== this.curvesAt) this.showCurves();
@@ -112,11 +112,10 @@ export class App {
 
   private draw(): void {
     const { rig, scene } = this;
-    const followed = this.panel?.pose ?? null;
     const law = this.laws[rig.active];
     const kernel = rig.kernels[rig.active];
     const view: View = {
-      scene, law, step: rig.step, crack: rig.crackMost, pose: followed ?? rig.pose, wanted: followed ?? rig.wanted,
+      scene, law, step: rig.step, crack: rig.crackMost, pose: rig.pose, wanted: rig.wanted,
       pieces: rig.pieces, cracks: rig.pieces && kernel.cracks(rig.pieces.length), drawn: this.drawn,
     };
     if (this.view3d && !this.solid.hidden) this.view3d.draw(view);

@@ -53,6 +53,7 @@ interface Exports {
   sc_web_piece_begin(begin: number, upperFace: number, scale: number): number;
   sc_web_piece_strip(end: number, energy: number): number;
   sc_web_piece_crack(which: number): number;
+  sc_web_piece_set_crack(which: number, at: number): number;
 }
 
 export class Kernel {
@@ -98,6 +99,11 @@ export class Kernel {
   /** Crack tip of each of so many pieces, m. */
   cracks(count: number): number[] {
     return Array.from({ length: count }, (_, i) => this.c.sc_web_piece_crack(i));
+  }
+
+  /** Put the cracks of the pieces where those of the same pieces were. */
+  putCracks(cracks: readonly number[]): void {
+    cracks.forEach((at, i) => this.c.sc_web_piece_set_crack(i, at));
   }
 
   reset(crack = 0): void {

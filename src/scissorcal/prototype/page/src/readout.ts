@@ -23,13 +23,14 @@ export class Readout {
   private saidAt = 0;
   private before = "";
 
-  constructor(container: HTMLElement, private readonly scene: Scene) {
+  constructor(container: HTMLElement, private readonly scene: Scene, private readonly isServed: boolean) {
     container.append(
       html("h2", {}, "Now"), this.beyond, this.state, html("h3", {}, "Energy since the fresh sheet or the last change of the law, mJ"), this.energy,
       html("p", { class: "note" }, "Work of the hand = stored + fracture + arrest + friction, up to the error of steps of a tick."), this.said);
   }
 
-  show(rig: Rig, now: number): void {
+  /** `measured`: torque (N m) of the rig whose motion the model makes, if one is followed. */
+  show(rig: Rig, now: number, measured: number | undefined): void {
     if (now - this.shownAt < SHOWN_EVERY_ms) return;
     this.shownAt = now;
     const { step, energy, scene } = { step: rig.step, energy: rig.energy, scene: this.scene };
@@ -47,6 +48,7 @@ export class Readout {
       ["indentation", (1e3 * Math.max(step.indentation, 0)).toFixed(3), "mm"],
       ["crack", cut_mm.toFixed(1), "mm"],
     ];
+    if (this.isServed) rows.push(["torque of the rig", measured === undefined ? "–" : (1e3 * measured).toFixed(1), "mN m"]);
     list(this.state, rows);
     this.beyond.hidden = !(step.flags & FLAG.outOfRange);
     const error = energy.hand - energy.stored - energy.fracture - energy.arrest - energy.friction;

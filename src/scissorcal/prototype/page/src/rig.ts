@@ -5,6 +5,7 @@ import { Coupling, Pose, Script } from "./hand";
 import { Law } from "./law";
 import { Piece } from "./pieces";
 import { Scene } from "./scene";
+import { RigSamples } from "./socket";
 
 export type Which = "fitted" | "whatIf";
 
@@ -30,6 +31,7 @@ const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
 const STILL_m = 1e-9; // in a tick
 const TURN_rad = 0.004;
+const FOLLOWED_s = 1; // without samples for so long, nothing is followed any more
 const MOST_SAMPLES = 4000; // of one stroke: 16 s
 
 export class Rig {
@@ -60,6 +62,7 @@ export class Rig {
   private storedBefore = 0;
   private turnedAt: number;
   private coupling: Coupling | null = null;
+  private followed = { recording: "", time: 0, quiet_s: Infinity };
 
   constructor(readonly scene: Scene, module: WebAssembly.Module) {
     this.kernels = { fitted: new Kernel(module), whatIf: new Kernel(module) };
@@ -69,12 +72,14 @@ export class Rig {
     this.step = { ...NOTHING };
   }
 
-  /** Take a law, its crack where it was; the energies begin anew where it is the one that is felt. */
+  /** Take a law, its cracks where they were; the energies begin anew where it is the one that is felt. */
   load(which: Which, law: Law, largestTorque: number): boolean {
     const kernel = this.kernels[which];
     const crack = kernel.crack;
+    const cracks = this.pieces ? kernel.cracks(this.pieces.length) : [];
     const isSound = kernel.load(law.tables, law.numbers) && kernel.cut(this.scaled(law));
     kernel.reset(crack);
+    kernel.putCracks(cracks);
     this.sound[which] = isSound;
     if (which === this.active && isSound) {
       this.coupling = new Coupling(this.scene, law, largestTorque);
@@ -83,7 +88,7 @@ export class Rig {
     return isSound;
   }
 
-  /** Cut a plate of pieces, null: the uniform sheet. The laws have to be loaded again. */
+  /** Cut a plate of pieces, null: the uniform sheet. The laws have to be loaded again, and the sheet be fresh. */
   cut(pieces: readonly Piece[] | null): void {
     this.pieces = pieces;
   }
@@ -102,10 +107,39 @@ export class Rig {
     this.script = null;
     this.kernels.fitted.reset();
     this.kernels.whatIf.reset();
-    this.pose = this.wanted = startOf(this.scene);
+    if (!this.isFollowing) this.pose = this.wanted = startOf(this.scene);
     this.recent = [];
     this.rest();
     this.beginStroke();
+  }
+
+  /** Whether the blades are where a running rig has them. */
+  get isFollowing(): boolean {
+    return this.followed.quiet_s < FOLLOWED_s;
+  }
+
+  /**
+   * Move the blades as a running rig moves them, straight from sample to sample in ticks of the loop.
+   *
+   * The laws cut what the rig cuts, from a fresh sheet at the first sample of a recording.
+   */
+  follow({ recording, time_s, opening_rad, advance_m }: RigSamples): void {
+    const tick = 1 / this.scene.loop_rate_Hz;
+    time_s.forEach((time, i) => {
+      const to = { opening: opening_rad[i], advance: advance_m[i] };
+      const passed = time - this.followed.time;
+      const isNew = recording !== this.followed.recording || passed <= 0;
+      const wasElsewhere = !this.isFollowing;
+      this.followed = { recording, time, quiet_s: 0 };
+      if (isNew || wasElsewhere) this.pose = to;
+      if (isNew) return this.freshSheet();
+      if (wasElsewhere) return this.rest();
+      const from = this.pose;
+      const ticks = Math.min(Math.max(Math.round(passed / tick), 1), MOST_STEPS);
+      for (let k = 1; k <= ticks; k++) this.take(between(from, to, k / ticks), passed / ticks);
+    });
+    this.wanted = this.pose;
+    this.script = null;
   }
 
   /** Let a hand move the blades from now on; null gives them back to the pointer. */
@@ -135,6 +169,8 @@ export class Rig {
   /** Let time pass, in ticks of the loop. */
   pass(seconds: number): void {
     const dt = 1 / this.scene.loop_rate_Hz;
+    this.followed.quiet_s += seconds;
+    if (this.isFollowing) return;
     this.left += Math.min(seconds, MOST_STEPS * dt);
     while (this.left >= dt) {
       this.left -= dt;
@@ -144,19 +180,25 @@ export class Rig {
 
   private one(dt: number): void {
     if (!this.sound[this.active] || !this.coupling) return;
-    this.time += dt;
-    const last = this.pose;
     let next: Pose;
-    const played = this.script?.(this.time - this.scriptBegan);
+    const played = this.script?.(this.time + dt - this.scriptBegan);
     if (this.script && !played) this.script = null;
     if (played) {
       next = this.wanted = played;
     } else {
-      next = this.coupling.moved(last, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
+      next = this.coupling.moved(this.pose, this.wanted, this.step.torque - this.step.friction_torque, this.step.force, dt);
     }
+    this.take(next, dt);
+  }
+
+  /** Step both laws to where the blades are after dt, and keep the books. */
+  private take(next: Pose, dt: number): void {
+    const last = this.pose;
+    this.time += dt;
     this.rate = (next.opening - last.opening) / dt;
     this.slid = next.advance - last.advance;
     this.pose = next;
+    if (!this.sound[this.active]) return;
     const other = this.active === "fitted" ? "whatIf" : "fitted";
     const before = this.step;
     this.beside = this.sound[other] ? this.kernels[other].step(next.opening, this.rate, next.advance) : null;
@@ -205,6 +247,10 @@ export class Rig {
     this.stroke = [];
     this.strokeContact = this.kernels[this.active].crack - this.pose.advance;
   }
+}
+
+function between(from: Pose, to: Pose, share: number): Pose {
+  return { opening: from.opening + share * (to.opening - from.opening), advance: from.advance + share * (to.advance - from.advance) };
 }
 
 const NOTHING: Step = {

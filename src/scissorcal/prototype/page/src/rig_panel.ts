@@ -1,7 +1,7 @@
 // A running rig: its state, what a person confirms, and its samples.
 
 import { html, refilled } from "./elements";
-import { connect, Line, Recent, RigState, Server } from "./socket";
+import { connect, Line, Recent, RigSamples, RigState, Server } from "./socket";
 
 /** The section of a rig; only served pages have one. */
 export class RigPanel {
@@ -13,7 +13,7 @@ export class RigPanel {
   private readonly refusal = html("p", { class: "warning", role: "alert" });
   private armed = "";
 
-  constructor(container: HTMLElement, server: Server) {
+  constructor(container: HTMLElement, server: Server, follow: (samples: RigSamples) => void) {
     container.append(html("h2", {}, "Rig"), this.state, this.following, this.buttons, this.refusal,
       html("p", { class: "note" }, "Stop here is a convenience, not an emergency stop: keep the rig's own at hand."));
     this.line = connect(server, {
@@ -23,16 +23,12 @@ export class RigPanel {
         refilled(this.buttons);
       },
       state: (state) => this.show(state),
-      samples: (samples) => this.recent.add(samples),
+      samples: (samples) => {
+        this.recent.add(samples);
+        follow(samples);
+      },
       refused: (sentence) => (this.refusal.textContent = sentence),
     });
-  }
-
-  /** The newest state of the rig's blades, null where nothing is followed. */
-  get pose(): { opening: number; advance: number } | null {
-    const { opening_rad: opening, advance_m: advance } = this.recent.columns;
-    const last = opening.length - 1;
-    return last < 0 ? null : { opening: opening[last], advance: advance[last] };
   }
 
   private show(state: RigState): void {

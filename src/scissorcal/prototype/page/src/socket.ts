@@ -121,6 +121,10 @@ export class Recent {
 
   constructor(readonly kept_s = 10) {}
 
+  get newestTorque(): number | undefined {
+    return this.columns.torque_Nm.at(-1);
+  }
+
   /** Add samples; another recording, or a clock that went back, begins anew. */
   add(samples: RigSamples): void {
     const { time_s } = this.columns;
