@@ -244,10 +244,12 @@ def test_the_confirmed_question_is_answered_and_each_other_one_waits(tmp_path: P
         assert asked.request == "Put a fresh sheet in."
         with pytest.raises(RefusedError, match="stop it first"):
             commands.start("capture cut", OTHER)
-        commands.start("render", OTHER)
-        asked = await told.wait_for(lambda state: state.request is not None)
-        assert asked.request == REQUEST  # the same words once more are another question
-        commands.start("render", PAGE)
+        commands.start("render", OTHER, asked.question)
+        again = await told.wait_for(lambda state: state.request is not None)
+        assert again.request == REQUEST  # the same words once more are another question
+        with pytest.raises(RefusedError, match="answered already"):
+            commands.start("render", PAGE, asked.question)
+        commands.start("render", PAGE, again.question)
         assert (await told.end()).sentence == "['yes\\n', 'yes\\n', 'yes\\n']"
 
     asks = f"print([ask(one) for one in ({REQUEST!r}, 'Put a fresh sheet in.', {REQUEST!r})])"

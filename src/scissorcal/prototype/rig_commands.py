@@ -46,13 +46,18 @@ class RigCommand:
 
 @dataclass(frozen=True)
 class State:
-    """What a page is told of commands; ``request`` is the sentence that waits for an answer."""
+    """What a page is told of commands.
+
+    ``request`` is the sentence that waits for an answer, ``question`` its number while a command
+    runs: an answer names it, so that it answers nothing that its page did not show.
+    """
 
     state: Literal["idle", "running", "ending"] = "idle"
     command: str | None = None
     sentence: str = ""
     code: int | None = None
     request: str | None = None
+    question: int = 0
 
 
 class RefusedError(Exception):
@@ -89,6 +94,7 @@ class RigCommands:
         self._watch: asyncio.Task[None] | None = None
         self._insisting: asyncio.Task[None] | None = None
         self._unasked = False
+        self._questions = 0
         self._stopped = False
         self._lines: deque[str] = deque(maxlen=_LAST_LINES)
 
@@ -102,11 +108,11 @@ class RigCommands:
         self._expiry = asyncio.get_running_loop().call_later(self._armed_s, self._expire)
         self._set(State("idle", name, "", None, command.request))
 
-    def start(self, name: str, who: object) -> None:
-        """Start what this page armed; or, while it runs and asks something, answer with yes."""
+    def start(self, name: str, who: object, question: int = 0) -> None:
+        """Start what this page armed; or, while it runs, answer this question with yes."""
         command = self._known(name)
         if self.runs:
-            self._answer(name)
+            self._answer(name, question)
             return
         if self._armed is None:
             raise RefusedError(f"'{name}' was not armed, or more than {self._armed_s:g} s ago.")
@@ -215,13 +221,16 @@ class RigCommands:
         if first and command is not None and question == command.request:
             self._say_yes()
         elif self.state.state == "running":
-            self._set(replace(self.state, request=question))
+            self._questions += 1
+            self._set(replace(self.state, request=question, question=self._questions))
 
-    def _answer(self, name: str) -> None:
+    def _answer(self, name: str, question: int) -> None:
         if self.state.state != "running" or self.state.request is None:
             raise RefusedError(f"'{self.state.command}' is running already.")
         if name != self.state.command:
             raise RefusedError(f"'{self.state.command}' is running: stop it first.")
+        if question != self.state.question:
+            raise RefusedError("That was answered already: read the question that is shown now.")
         self._set(replace(self.state, request=None))
         self._say_yes()
 

@@ -157,11 +157,11 @@ class PrototypeServer:
 
     def _hear(self, watcher: Watcher, text: str) -> None:
         try:
-            do, command = request_in(text)
+            do, command, question = request_in(text)
             if do == "arm":
                 self.commands.arm(command, watcher)
             elif do == "start":
-                self.commands.start(command, watcher)
+                self.commands.start(command, watcher, question)
             else:
                 self.commands.stop()
         except (InputError, RefusedError) as refused:

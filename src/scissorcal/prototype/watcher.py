@@ -98,19 +98,22 @@ class Watcher:
         return None
 
 
-def request_in(text: str) -> tuple[str, str]:
-    """What a page asks for: "arm", "start" or "stop", and the command's name.
+def request_in(text: str) -> tuple[str, str, int]:
+    """What a page asks for: "arm", "start" or "stop", the command, and the question it answers.
 
     >>> request_in('{"do": "arm", "command": "render"}')
-    ('arm', 'render')
+    ('arm', 'render', 0)
 
     InputError where it is none of these.
     """
-    known = 'A message is an object with "do": arm, start or stop, and "command".'
+    known = 'A message is an object with "do": arm, start or stop, "command" and "question".'
     asked = parse_json(text, "The page's message", known)
     if not isinstance(asked, dict):
         raise InputError(known)
     do, command = asked.get("do"), asked.get("command", "")
+    question = asked.get("question", 0)
     if do not in ("arm", "start", "stop") or not isinstance(command, str):
         raise InputError(known)
-    return do, command
+    if type(question) is not int:
+        raise InputError(known)
+    return do, command, question

@@ -252,7 +252,8 @@ def _reasons(
     return (
         found,
         f"The steepest elastic slope is rendered at {share:.0%}, which changes the "
-        f"mean torque of a stroke by {felt:.1%}; the fracture energy is unchanged.",
+        f"mean torque of a stroke through the uniform sheet by {felt:.1%}; the fracture energy is "
+        "unchanged.",
     )
 
 

@@ -78,8 +78,9 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
     """What a package with a drawn plate asks of the loop; without pieces as `needs_of`.
 
     Each piece is a uniform sheet of its toughest strip. Those that a blade can press at once add
-    up, each at its own worst: an upper bound, which a stack reaches where all are worst at one
-    place.
+    up, each at its own worst, which a stack reaches where all are worst at one place. Slopes are
+    found on a grid: in random steps the largest was up to 7 % above. ``drop_Nm`` leaves out the
+    drop at a weaker strip and where a piece is cut through.
     """
     if not pieces:
         return needs_of(tables, torque_limit)

@@ -45,7 +45,7 @@ export class RigPanel {
     });
     const confirm = request === null ? [] : [
       html("p", { class: "request" }, request),
-      button(`That is done: start ${state.command ?? this.armed}`, () => this.line.start(state.command ?? this.armed), "primary"),
+      button(`That is done: start ${state.command ?? this.armed}`, () => this.line.start(state.command ?? this.armed, state.question), "primary"),
     ];
     refilled(this.buttons, ...confirm,
       ...(state.state === "idle" && request === null ? state.commands.map(arm) : []),

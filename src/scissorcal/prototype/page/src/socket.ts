@@ -14,6 +14,8 @@ export interface RigState {
   code: number | null;
   /** What a person has to confirm before anything moves; null: nothing. */
   request: string | null;
+  /** Number of the question that waits while a command runs; its answer names it. */
+  question: number;
   /** Which recording is followed, or how it ended. */
   following: string;
   /** What may be started; none without a rig. */
@@ -46,7 +48,7 @@ export interface Line {
   /** Ask what has to be confirmed before a command is started. */
   arm(command: string): void;
   /** Start what was armed; or confirm what a running command asks for. */
-  start(command: string): void;
+  start(command: string, question: number): void;
   stop(): void;
   close(): void;
 }
@@ -80,7 +82,7 @@ export function connect(server: Server, handlers: Handlers): Line {
     };
   }
 
-  function say(message: { do: string; command?: string }): void {
+  function say(message: { do: string; command?: string; question?: number }): void {
     if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
     else handlers.refused("The server cannot be reached.");
   }
@@ -88,7 +90,7 @@ export function connect(server: Server, handlers: Handlers): Line {
   open();
   return {
     arm: (command) => say({ do: "arm", command }),
-    start: (command) => say({ do: "start", command }),
+    start: (command, question) => say({ do: "start", command, question }),
     stop: () => say({ do: "stop" }),
     close: () => {
       isOver = true;
