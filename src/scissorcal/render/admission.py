@@ -84,7 +84,8 @@ class Admission:
         """What is rendered of the package's stiffness, in a line."""
         if not self.evaluated:
             return f"stiffness {self.rendered:.3g} N m/rad, not checked against this rig"
-        cost = f", which changes the torque by {self.felt_share:.1%} (rms)" if self.derated else ""
+        changed = f", which changes the uniform sheet's torque by {self.felt_share:.1%} (rms)"
+        cost = changed if self.derated else ""
         return (
             f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad{cost} "
             f"(stable alone {self.allowed_alone:.2g}, in a hand {self.allowed_in_hand:.2g})"
