@@ -1,4 +1,4 @@
-"""The designer's files: recipes with and without a plate, steps back, plates that stand in files."""
+"""Files of the designer: recipes with and without a plate, steps back, plates in SVG files."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -68,7 +68,7 @@ export class App {
     torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)));
     time.append(html("h2", {}, "The last 8 seconds"));
     this.torque = new TorqueChart(torque, scene);
-    this.time = new TimeChart(time);
+    this.time = new TimeChart(time, scene, this.largestTorque, server !== null);
     this.readout = new Readout(now, scene, server !== null);
     this.controls = new Controls(law, scene, () => this.changed());
     this.panel = server ? new RigPanel(rig, server, (samples) => this.rig.follow(samples)) : null;
