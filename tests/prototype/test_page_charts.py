@@ -1,20 +1,16 @@
 """The charts of the page: axes at rest and under load, and names."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
 
-from scissorcal.package import ModelPackage
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene
 from tests.prototype.test_page_hand import (
     Open,
     browser,
-    close,
     file,
-    open_page,
     opened,
     package,
     scene,
