@@ -22,7 +22,8 @@ REQUEST = "Take everything out."
 HARNESS = """
 import { connect, Recent } from "./src/socket";
 const recent = new Recent(2);
-const told = { connected: [], why: [] as string[], states: [], refused: [] as string[], samples: 0 };
+const [why, refused] = [[] as string[], [] as string[]];
+const told = { connected: [], why, states: [], refused, samples: 0 };
 const server = JSON.parse(document.getElementById("server")!.textContent!);
 const line = connect(server, {
   connected: (is, why) => { told.connected.push(is); told.why.push(why); },

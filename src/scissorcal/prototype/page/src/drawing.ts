@@ -26,6 +26,8 @@ interface Colours {
 
 type Point = [number, number];
 
+/** Width of the picture, in lengths of the blades. */
+export const LENGTHS_ACROSS = 2.1;
 const EDGE_POINTS = 40;
 const STRIP_px = 56;
 const LENS_m = 0.0012; // across the magnified circle
@@ -43,7 +45,7 @@ export class Drawing {
     const { width, height } = this.fit();
     const colours = coloursOf(this.canvas);
     const length = view.scene.blade_length_m;
-    this.scale = width / (2.1 * length);
+    this.scale = width / (LENGTHS_ACROSS * length);
     this.origin = [0.29 * width, 0.5 * (height - STRIP_px)];
     const context = this.context;
     context.clearRect(0, 0, width, height);
@@ -55,14 +57,6 @@ export class Drawing {
     this.circle(this.origin, 4, colours.ink);
     this.lens(view, colours, width);
     this.strip(view, colours, width, height);
-  }
-
-  /** The pose that a pointer at a place of the canvas asks for. */
-  poseAt(x: number, scene: Scene, y: number, began: { x: number; y: number; pose: Pose }): Pose {
-    const [closed, open] = scene.opening_rad;
-    const opening = began.pose.opening - ((y - began.y) / this.canvas.clientHeight) * 2 * (open - closed);
-    const advance = began.pose.advance + (x - began.x) / this.scale;
-    return { opening: Math.min(Math.max(opening, 0.5 * closed), open), advance };
   }
 
   private fit(): { width: number; height: number } {
