@@ -139,3 +139,45 @@ def test_contours_of_one_shape_are_plates_and_holes(browser: Browser, tmp_path: 
         bed.run("(drawn_plate) => Object.assign(scene, { pieces: [], drawn_plate })", told)
         bed.mount()
         assert "a hole of its layer ring has a hole" in bed.said
+
+
+def focus(bed: Bed) -> str:
+    """The data-key of what has the focus, once the tables are there anew."""
+    bed.page.wait_for_timeout(100)
+    found: str = bed.run(
+        "() => document.activeElement.dataset.key ?? document.activeElement.tagName"
+    )
+    return found
+
+
+def test_the_focus_stays_in_the_list_where_something_is_removed(bed: Bed, tmp_path: Path) -> None:
+    layers = [
+        f"""[[plate.layers]]
+name = "l{i}"
+thickness_mm = 0.1
+outline_mm = [[{20 * i}, -20], [{20 * i + 20}, -20], [{20 * i + 20}, 20], [{20 * i}, 20]]
+holes_mm = [{f"[[{20 * i + 5}, -5], [{20 * i + 9}, -5], [{20 * i + 9}, 5]], " * 2}]
+"""
+        for i in range(3)
+    ]
+    load(bed, tmp_path, "".join(layers))
+    steps = {  # what is pressed, and where the focus is then
+        "removehole1-0": "removehole1-0",  # the other hole, which has its number now
+        "removehole1-0 ": "Remove1",  # none left: the button before it
+        "Remove1": "Remove1",
+        "Remove1 ": "Remove0",
+        "Remove0": "blade",  # the only button that is left
+    }
+    for key, wanted in steps.items():
+        bed.page.locator(f"[data-key='{key.strip()}']").press("Enter")
+        assert focus(bed) == wanted, key
+    bed.page.keyboard.press("Control+z")
+    assert bed.page.locator(".design-layers li").count() == 1
+
+
+def test_the_focus_leaves_a_button_that_can_do_no_more(bed: Bed) -> None:
+    bed.page.get_by_label("Thickness, mm").fill("0.3")
+    bed.page.keyboard.press("Enter")
+    bed.page.locator("[data-key=undo]").press("Enter")
+    assert bed.page.locator("[data-key=undo]").is_disabled()
+    assert focus(bed) == "circle"
