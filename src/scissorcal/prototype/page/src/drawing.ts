@@ -171,8 +171,10 @@ export class Drawing {
 
   /** The contact, some hundred times larger: how the edges press the sheet. */
   private lens(view: View, colours: Colours, width: number): void {
-    const radius = Math.min(58, 0.13 * width);
-    const [x, y] = [width - radius - 10, radius + 10];
+    // right of the blades' tips, and with its caption above the line of the cut
+    const [beside, above] = [width - this.at([view.scene.blade_length_m, 0])[0], this.origin[1]];
+    const radius = Math.max(Math.min(58, 0.5 * beside - 7, 0.5 * (above - 44)), 10);
+    const [x, y] = [width - radius - 10, radius + 8];
     const context = this.context;
     const kept: [number, Point] = [this.scale, this.origin];
     const contact = Math.max(view.crack - view.pose.advance, 0);
@@ -217,7 +219,9 @@ export class Drawing {
     context.fillStyle = colours.muted;
     context.font = "11px system-ui, sans-serif";
     context.textAlign = "center";
-    context.fillText(`contact, ${(1e3 * LENS_m).toFixed(1)} mm wide`, x, y + radius + 13);
+    const middle = Math.min(x, width - 36);
+    context.fillText("contact,", middle, y + radius + 13);
+    context.fillText(`${(1e3 * LENS_m).toFixed(1)} mm wide`, middle, y + radius + 25);
   }
 
   /** The sheet from above: what is cut, and where the scissors stand. */
