@@ -34,7 +34,7 @@ const MOST_RATIO = 2; // pixels of a screen to one of the page
 // Lines on a face are in front of it.
 const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
 const ZOOMS = "two fingers, + and − zoom, Home sets the view back.";
-const HELP = [`Drag or arrow keys turn the view, ${ZOOMS}`, `Drag or arrow keys move the blades, ${ZOOMS}`];
+const HELP = [`Drag or arrow keys turn the view; ${ZOOMS}`, `Drag or arrow keys move the blades; ${ZOOMS}`];
 const NONE = "This browser has no WebGL, which the 3-D view needs; the plain drawing shows the same.";
 
 export class View3d {
