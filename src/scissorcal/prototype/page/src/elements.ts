@@ -56,12 +56,30 @@ export function numberField(
   return html("label", { class: "field" }, options.hideLabel ? null : `${label} `, input, options.unit && !options.hideLabel ? ` ${options.unit}` : null);
 }
 
-/** Put other children into an element; the input that had the focus has it again. */
+/**
+ * Put other children into an element; what had the focus has it again, by its data-key. Where that is
+ * gone or disabled, its like of the number before takes its place, else the nearest of its kind.
+ */
 export function refilled(element: HTMLElement, ...children: Child[]): void {
   const active = document.activeElement;
-  const key = active instanceof HTMLElement && element.contains(active) ? active.dataset.key : undefined;
+  const isIn = active instanceof HTMLElement && element.contains(active) && active.dataset.key !== undefined;
+  const keys = isIn ? keysNear(element, active) : [];
   element.replaceChildren(...children.filter((child): child is Node | string => child !== null));
-  if (key !== undefined) element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`)?.focus();
+  for (const key of keys) {
+    const found = element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]:not(:disabled)`);
+    if (found) return found.focus();
+  }
+}
+
+/** Keys where the focus may go from an element, the best first: buttons from a button, fields from a field. */
+function keysNear(element: HTMLElement, active: HTMLElement): string[] {
+  const all = [...element.querySelectorAll<HTMLElement>("[data-key]")];
+  const at = all.indexOf(active);
+  const near = [...all.slice(0, at).reverse(), ...all.slice(at + 1)];
+  const alike = near.filter((one) => one.tagName === active.tagName);
+  const key = active.dataset.key as string;
+  const before = key.replace(/\d+$/, (number) => String(Number(number) - 1));
+  return [key, before, ...[...alike, ...near].map((one) => one.dataset.key as string)];
 }
 
 /**
