@@ -54,8 +54,7 @@ export class Controls {
   }
 
   reset(): void {
-    window.clearInterval(this.playing);
-    this.playing = 0;
+    this.stopPlaying();
     this.choices.values.clear();
     this.choices.draw = null;
     this.choices.active = "fitted";
@@ -91,10 +90,14 @@ export class Controls {
 
   /** What a slider changed is no draw any more, and no further one takes its place. */
   private leaveDraws(): void {
-    window.clearInterval(this.playing);
-    this.playing = 0;
+    this.stopPlaying();
     this.choices.draw = null;
     this.fillDraws();
+  }
+
+  private stopPlaying(): void {
+    window.clearInterval(this.playing);
+    this.playing = 0;
   }
 
   private fillDraws(): void {
@@ -114,8 +117,8 @@ export class Controls {
     };
     const next = (): void => chosen(choices.draw === null ? 0 : (choices.draw + 1) % count);
     const play = (): void => {
-      window.clearInterval(this.playing);
-      this.playing = this.playing ? 0 : window.setInterval(next, 600);
+      if (this.playing) this.stopPlaying();
+      else this.playing = window.setInterval(next, 600);
       this.fillDraws();
     };
     renewed(this.draws,
