@@ -8,6 +8,7 @@ import { Drawing } from "./drawing";
 import { html, refilled } from "./elements";
 import { madeHand, oneStroke, recordedHand } from "./hand";
 import { KEYS, takeInput } from "./input";
+import { AT } from "./kernel";
 import { asFitted, Average, inPart, Law, ofDraw, whatIf } from "./law";
 import { Drawn, Edge, Piece } from "./pieces";
 import { Readout } from "./readout";
@@ -159,8 +160,12 @@ export class App {
     this.torque.show(curves);
   }
 
+  /** The law with the drawn edge, which ends where the blade does. */
   private withBlades(law: Law): Law {
-    return this.edge ? { ...law, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } } : law;
+    if (!this.edge) return law;
+    const numbers = [...law.numbers];
+    numbers[AT.tipStation] = Math.fround(1e-3 * this.edge.length_mm);
+    return { ...law, numbers, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } };
   }
 
   private stroke(): void {

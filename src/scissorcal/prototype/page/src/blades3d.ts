@@ -7,7 +7,7 @@ import {
 import { heldValue } from "./law";
 import { Table } from "./kernel";
 
-const POINTS = 48;
+const POINTS = 120;
 const BLADE_mm = 2.2;
 const BEVEL_mm = 0.35;
 

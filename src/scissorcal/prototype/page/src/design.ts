@@ -1,11 +1,12 @@
 // The designer: a person draws plates and blades, and cuts them at once on the page.
 
-import { edgeOfTable } from "./blade_edge";
 import { DesignCanvas, Tool } from "./design_canvas";
 import { drawnFromPlate, openDrawing, savedFile } from "./design_files";
 import { Design, Kind, plainSheet } from "./design_state";
-import { calibratedText, cornerTable, edgePanel, layerList, pieceTable } from "./design_tables";
+import { calibratedText, cornerTable, layerList, pieceTable } from "./design_tables";
+import { Blades, edgePanel } from "./edge_panel";
 import { html, renewed } from "./elements";
+import { tableOf } from "./law";
 import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
 import { calibratedOf, drawnFromRecipe, recipeText } from "./recipe_text";
 import { Scene, unpack } from "./scene";
@@ -39,7 +40,7 @@ export function mountDesign(container: HTMLElement, scene: Scene, apply: Apply):
 
 class Designer {
   private readonly calibrated: Calibrated;
-  private readonly fitted: Edge;
+  private readonly fitted: Blades;
   private readonly design: Design;
   private readonly canvas: DesignCanvas;
   private readonly status = html("p", { class: "design-status", role: "status" });
@@ -52,7 +53,7 @@ class Designer {
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly apply: Apply) {
     this.calibrated = calibratedOf(scene);
-    this.fitted = fittedEdge(scene);
+    this.fitted = { table: tableOf(unpack(scene.tables.edge)), length_m: scene.blade_length_m };
     const begun = this.begun();
     this.design = new Design(begun.drawn, (isDone) => this.changed(isDone), scene.recipe ?? null);
     const paper = html("div", { class: "design-paper" });
@@ -133,9 +134,10 @@ class Designer {
 
   private tables(): void {
     const { design } = this;
+    const say = (sentence: string): void => this.say(sentence);
     renewed(this.side,
       layerList(design), pieceTable(this.pieces, this.refusal),
-      cornerTable(design, (sentence) => this.say(sentence)), edgePanel(design, this.fitted));
+      cornerTable(design, say), edgePanel(design, this.fitted, say));
     this.buttons();
   }
 
@@ -217,11 +219,4 @@ function undoKeys(event: KeyboardEvent, design: Design): void {
   event.preventDefault();
   if (key === "y" || event.shiftKey) design.redo();
   else design.undo();
-}
-
-function fittedEdge(scene: Scene): Edge {
-  const numbers = unpack(scene.tables.edge);
-  const size = numbers.length / 3;
-  const [x, y, slope] = [0, 1, 2].map((row) => numbers.slice(row * size, (row + 1) * size));
-  return edgeOfTable({ x, y, slope }, scene.blade_length_m);
 }

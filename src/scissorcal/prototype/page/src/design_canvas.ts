@@ -1,5 +1,6 @@
 // The drawing itself: plates from above, the line of the cut, corners that pointer and keys move.
 
+import { traced } from "./blade_edge";
 import { Design, Kind, nameOf, outlineAt, Part, withAdded } from "./design_state";
 import { svg } from "./elements";
 import { HELP, keysOf } from "./design_keys";
@@ -112,6 +113,10 @@ export class DesignCanvas {
   }
 
   private add(outline: Outline): void {
+    if (this.draws === "edge" && this.tool !== "polygon") {
+      this.leave();
+      return this.say("An edge is no closed shape: draw it as a polygon, from the pivot to the tip.");
+    }
     if (this.draws !== "edge" && Math.abs(areaOf(outline)) < SMALLEST_mm2) return this.say("This outline encloses no area.");
     const { drawn, part } = this.design;
     const added = withAdded(drawn, this.draws, part.layer, outline, 1e3 * this.calibrated.thickness_m);
@@ -194,11 +199,12 @@ export class DesignCanvas {
   }
 
   private edge(): SVGGElement {
-    const { edge_points } = this.design.drawn;
+    const { edge, edge_points } = this.design.drawn;
     const group = svg("g", { class: "design-edge" });
     if (!edge_points.length) return group;
     const [x, y] = this.at([0, 0]);
-    group.append(svg("path", { d: this.path([edge_points], false) }), svg("circle", { cx: x, cy: y, r: 4 }));
+    if (edge) group.append(svg("path", { d: this.path([traced(edge, edge_points)], false) }));
+    group.append(svg("circle", { cx: x, cy: y, r: 4 }));
     group.append(svg("text", { x: x + 6, y: y + 14 }, "pivot"));
     return group;
   }
@@ -207,7 +213,7 @@ export class DesignCanvas {
   private chosen(): SVGGElement {
     const { outline, part, corner } = this.design;
     const group = svg("g", { class: "design-chosen" });
-    group.append(svg("path", { d: this.path([outline], part.kind !== "edge") }));
+    group.append(svg("path", { class: part.kind === "edge" ? "design-through" : "", d: this.path([outline], part.kind !== "edge") }));
     if (outline.length > MOST_HANDLES || this.tool !== "move") return group;
     const between = outline.map((point, i) => middle(point, outline[(i + 1) % outline.length]));
     if (part.kind === "edge") between.pop();

@@ -3,7 +3,7 @@
 import { Kind, Part, withAdded } from "./design_state";
 import { boundsOf, moved, nested, Outline, Point, stretches } from "./outline";
 import { Drawn, Layer, layerName, materialOf } from "./pieces";
-import { pointsOf } from "./design_tables";
+import { pointsOf } from "./blade_edge";
 import { drawnFromRecipe } from "./recipe_text";
 import { Contours, DrawnPlate } from "./scene";
 import { drawnFromSvg } from "./svg_file";

@@ -1,8 +1,8 @@
 // The drawing as it is being made: which part of it is chosen, and the steps back and forward.
 
-import { canFit, edgeThrough } from "./blade_edge";
+import { edgeThrough, nearestFamily, rounded } from "./blade_edge";
 import { Outline, rectangle } from "./outline";
-import { Calibrated, Drawn, Layer, layerName } from "./pieces";
+import { Calibrated, Drawn, Family, Layer, layerName } from "./pieces";
 
 export type Kind = "outline" | "hole" | "region" | "edge";
 
@@ -138,9 +138,32 @@ export function withOutline(drawn: Drawn, { kind, layer, index }: Part, outline:
   });
 }
 
-/** With other points of the edge, and the edge through them where they determine one. */
-export function withEdge(drawn: Drawn, edge_points: Outline, family = drawn.edge?.family ?? "line"): Drawn {
-  return { ...drawn, edge_points, edge: canFit(edge_points, family) ? edgeThrough(edge_points, family) : drawn.edge };
+/** With other points of the edge and the edge through them; where they make none, the edge stays, and why is kept. */
+export function withEdge(drawn: Drawn, edge_points: Outline, family = familyOf(drawn) ?? nearestFamily(edge_points)): Drawn {
+  const { edge_refused: _, ...kept } = drawn;
+  try {
+    return { ...kept, edge_points, edge: edgeThrough(edge_points, family) };
+  } catch (error) {
+    return { ...kept, edge_points, edge_refused: { family, sentence: (error as Error).message } };
+  }
+}
+
+/** The family that the edge's points are to be. */
+export function familyOf(drawn: Drawn): Family | undefined {
+  return drawn.edge_refused?.family ?? drawn.edge?.family;
+}
+
+export function withoutEdge(drawn: Drawn): Drawn {
+  const { edge_refused: _, ...kept } = drawn;
+  return { ...kept, edge: null, edge_points: [] };
+}
+
+/** Points of an edge that is drawn from the tip on the other way round, and straight on to a pivot that they do not reach. */
+function fromPivot(points: Outline): Outline {
+  const rising = points.every(([s], i) => i === 0 || s < points[i - 1][0]) ? [...points].reverse() : points;
+  const [[s0, e0], [s1, e1]] = rising;
+  if (!(s0 > 0 && s1 > s0)) return rising;
+  return [[0, rounded(e0 - (s0 * (e1 - e0)) / (s1 - s0), 4)], ...rising];
 }
 
 export function withLayer(drawn: Drawn, layer: number, change: (own: Layer) => Layer): Drawn {
@@ -148,7 +171,7 @@ export function withLayer(drawn: Drawn, layer: number, change: (own: Layer) => L
 }
 
 export function withoutPart(drawn: Drawn, { kind, layer, index }: Part): Drawn {
-  if (kind === "edge") return { ...drawn, edge: null, edge_points: [] };
+  if (kind === "edge") return withoutEdge(drawn);
   if (kind === "outline") return { ...drawn, layers: drawn.layers.filter((_, i) => i !== layer) };
   return withLayer(drawn, layer, (own) => ({
     ...own,
@@ -161,7 +184,10 @@ export function withoutPart(drawn: Drawn, { kind, layer, index }: Part): Drawn {
 export function withAdded(
   drawn: Drawn, kind: Kind, layer: number, outline: Outline, thickness_mm: number,
 ): { drawn: Drawn; part: Part } {
-  if (kind === "edge") return { drawn: withEdge(drawn, outline), part: { kind, layer: 0, index: 0 } };
+  if (kind === "edge") {
+    const points = fromPivot(outline);
+    return { drawn: withEdge(drawn, points, nearestFamily(points)), part: { kind, layer: 0, index: 0 } };
+  }
   const own = drawn.layers[layer];
   if (kind === "outline" || !own) {
     const names = drawn.layers.map((one) => one.name);

@@ -1,11 +1,10 @@
-// Numbers beside the drawing: layers, corners, what the blades meet, the blade's edge.
+// Numbers beside the drawing: layers, corners, what the blades meet.
 
-import { canFit, edgeThrough, misfit, offsetAt, rounded } from "./blade_edge";
-import { Design, Kind, nameOf, Part, withAdded, withLayer, withoutPart } from "./design_state";
+import { Design, Kind, nameOf, Part, withLayer, withoutPart } from "./design_state";
 import { addCorner, removeCorner } from "./design_keys";
 import { html, numberField } from "./elements";
 import { boundsOf, crossesItself, moved, Outline, Point, resized } from "./outline";
-import { Calibrated, Drawn, Edge, Layer, layerName, Piece } from "./pieces";
+import { Calibrated, Layer, layerName, Piece } from "./pieces";
 
 const ROWS = 12;
 const MOST_CHECKED = 400; // corners of an outline that is looked at for sides that cross
@@ -169,55 +168,6 @@ export function pieceTable(pieces: Piece[] | null, refusal: string): HTMLElement
     rows.length ? html("table", {},
       html("thead", {}, html("tr", {}, ...heads.map((head) => html("th", { scope: "col" }, head)))),
       html("tbody", {}, ...rows)) : null);
-}
-
-/** The blade's edge: as fitted, or a line or an arc through drawn points or from numbers. */
-export function edgePanel(design: Design, fitted: Edge): HTMLElement {
-  const { drawn } = design;
-  const { edge } = drawn;
-  const begin = (): void => {
-    const points = pointsOf(fitted);
-    const added = withAdded(design.drawn, "edge", 0, points, 1);
-    design.part = added.part;
-    design.replace({ ...added.drawn, edge: fitted });
-  };
-  if (!edge) {
-    return html("section", { class: "design-panel" }, html("h3", {}, "Blades"),
-      html("p", {}, "The blades are as fitted."),
-      html("button", { type: "button", "data-key": "blade", click: begin }, "Draw another edge"));
-  }
-  const change = (values: Partial<Edge>): void => {
-    const other = { ...(design.drawn.edge ?? edge), ...values };
-    design.replace({ ...design.drawn, edge: other, edge_points: pointsOf(other) });
-  };
-  const family = html("select", {
-    "data-key": "family", "aria-label": "Family of the edge",
-    change: (event) => design.replace(withFamily(design.drawn, (event.currentTarget as HTMLSelectElement).value as Edge["family"])),
-  }, ...["line", "arc"].map((one) => html("option", { value: one, selected: one === edge.family }, one)));
-  const number = (label: string, name: "offset_mm" | "taper_deg" | "curvature_per_m" | "length_mm", unit: string, least: number, most: number): HTMLElement =>
-    numberField(label, edge[name], { key: name, unit, least, most }, (value) => change({ [name]: value }));
-  return html("section", { class: "design-panel" }, html("h3", {}, "Blades"),
-    html("div", { class: "row" },
-      html("label", { class: "field" }, "Edge ", family),
-      number("Offset", "offset_mm", "mm", -1000, 1000), number("Taper", "taper_deg", "deg", -89.9, 89.9),
-      edge.family === "arc" ? number("Curvature", "curvature_per_m", "1/m", -1000, 1000) : null,
-      number("Length", "length_mm", "mm", 1, 1000)),
-    html("p", {}, `The points leave the ${edge.family} by up to ${misfit(drawn.edge_points, edge).toFixed(2)} mm.`),
-    html("div", { class: "row" },
-      html("button", { type: "button", "data-key": "points", click: () => design.choose({ kind: "edge", layer: 0, index: 0 }) }, "Choose its points"),
-      html("button", { type: "button", "data-key": "blade", click: () => design.replace(withoutPart(design.drawn, { kind: "edge", layer: 0, index: 0 })) }, "As fitted again")));
-}
-
-function withFamily(drawn: Drawn, family: Edge["family"]): Drawn {
-  return canFit(drawn.edge_points, family) ? { ...drawn, edge: edgeThrough(drawn.edge_points, family) } : drawn;
-}
-
-/** Points on an edge: five from the pivot to the tip. */
-export function pointsOf(edge: Edge): Outline {
-  return [0, 0.25, 0.5, 0.75, 1].map((share): Point => {
-    const station = share * edge.length_mm;
-    return [rounded(station, 3), rounded(offsetAt(edge, station), 4)];
-  });
 }
 
 export function calibratedText({ thickness_m, fracture_energy_J_per_m }: Calibrated): string {

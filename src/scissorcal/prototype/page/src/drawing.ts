@@ -1,7 +1,7 @@
 // The plain look: scissors and sheet from the side, the contact magnified, the sheet from above.
 
 import { Step } from "./kernel";
-import { heldValue, Law } from "./law";
+import { bladeLength, heldValue, Law } from "./law";
 import { Pose } from "./hand";
 import { Scene } from "./scene";
 
@@ -28,7 +28,7 @@ type Point = [number, number];
 
 /** Width of the picture, in lengths of the blades. */
 export const LENGTHS_ACROSS = 2.1;
-const EDGE_POINTS = 40;
+const EDGE_POINTS = 120; // as fine as sixteen cubics ask
 const STRIP_px = 56;
 const LENS_m = 0.0012; // across the magnified circle
 
@@ -44,7 +44,7 @@ export class Drawing {
   draw(view: View): void {
     const { width, height } = this.fit();
     const colours = coloursOf(this.canvas);
-    const length = view.scene.blade_length_m;
+    const length = bladeLength(view.law);
     this.scale = width / (LENGTHS_ACROSS * length);
     this.origin = [0.29 * width, 0.5 * (height - STRIP_px)];
     const context = this.context;
@@ -89,7 +89,7 @@ export class Drawing {
     const turned = (s: number, e: number): Point => [
       s * Math.cos(beta) - e * Math.sin(beta), side * (s * Math.sin(beta) + e * Math.cos(beta)),
     ];
-    const length = view.scene.blade_length_m;
+    const length = bladeLength(view.law);
     const offset = side === -1 && view.scene.moving_blades === 1 ? 0 : 1;
     const depth = Math.max(Math.abs(edge[0][1]), 0.06 * length);
     const back = edge.map(([s, e]): Point => [s, offset * e + 2 * depth * (1 - 0.85 * Math.max(s, 0) / length)]);
@@ -150,7 +150,7 @@ export class Drawing {
   private hand(view: View, colours: Colours): void {
     const lag = view.wanted.opening - view.pose.opening;
     if (Math.abs(lag) < 0.003) return;
-    const reach = 0.5 * view.scene.blade_length_m;
+    const reach = 0.5 * bladeLength(view.law);
     const beta = view.wanted.opening / view.scene.moving_blades;
     this.context.setLineDash([4, 4]);
     this.context.strokeStyle = colours.blue;
@@ -172,7 +172,7 @@ export class Drawing {
   /** The contact, some hundred times larger: how the edges press the sheet. */
   private lens(view: View, colours: Colours, width: number): void {
     // right of the blades' tips, and with its caption above the line of the cut
-    const [beside, above] = [width - this.at([view.scene.blade_length_m, 0])[0], this.origin[1]];
+    const [beside, above] = [width - this.at([bladeLength(view.law), 0])[0], this.origin[1]];
     const radius = Math.max(Math.min(58, 0.5 * beside - 7, 0.5 * (above - 44)), 10);
     const [x, y] = [width - radius - 10, radius + 8];
     const context = this.context;
@@ -244,7 +244,7 @@ export class Drawing {
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(this.origin[0], middle);
-    context.lineTo(this.origin[0] + view.scene.blade_length_m * scale, middle);
+    context.lineTo(this.origin[0] + bladeLength(view.law) * scale, middle);
     context.setLineDash([2, 3]);
     context.stroke();
     context.setLineDash([]);
@@ -259,7 +259,7 @@ export class Drawing {
 function edgeOf(view: View): Point[] {
   const table = view.law.tables.edge;
   return Array.from({ length: EDGE_POINTS + 1 }, (_, i): Point => {
-    const s = (view.scene.blade_length_m * i) / EDGE_POINTS;
+    const s = (bladeLength(view.law) * i) / EDGE_POINTS;
     return [s, heldValue(table, s)];
   });
 }

@@ -48,7 +48,7 @@ export function takeInput(canvas: HTMLElement, rig: Rig, scene: Scene, acts: Act
     if (!began || !event.isPrimary) return;
     const [closed, open] = scene.opening_rad;
     const opening = began.pose.opening - ((event.offsetY - began.y) / canvas.clientHeight) * 2 * (open - closed);
-    const across = (LENGTHS_ACROSS * scene.blade_length_m) / canvas.clientWidth;
+    const across = (LENGTHS_ACROSS * rig.bladeLength_m) / canvas.clientWidth;
     const advance = began.pose.advance + seen.way() * across * (event.offsetX - began.x);
     rig.wanted = { opening: Math.min(Math.max(opening, 0.5 * closed), open), advance };
   });

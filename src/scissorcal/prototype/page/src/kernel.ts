@@ -7,7 +7,7 @@ export const TABLE_NAMES = [
 ] as const;
 
 /** Places in the list of numbers that make a model, as scissorcal.kernel.web_module has them. */
-export const AT = { renderFriction: 2, upperFace: 3, fractureEnergy: 4, kappa: 5, rateDamping: 6 } as const;
+export const AT = { renderFriction: 2, upperFace: 3, fractureEnergy: 4, kappa: 5, rateDamping: 6, tipStation: 9 } as const;
 
 /** x, y and slope of one table, its knots in order. */
 export interface Table {

@@ -99,6 +99,11 @@ export class Average {
   }
 }
 
+/** Length of the blades, m. */
+export function bladeLength(law: Law): number {
+  return law.numbers[AT.tipStation];
+}
+
 /** Value of a piecewise cubic table, held beyond its ends. */
 export function heldValue(table: Table, at: number): number {
   const { x, y, slope } = table;
@@ -114,7 +119,8 @@ export function heldValue(table: Table, at: number): number {
   return y[i] + t * (first + t * (3 * rise - 2 * first - end + t * (first + end - 2 * rise)));
 }
 
-function tableOf(rows: Float32Array): Table {
+/** A table from its three rows, one after the other. */
+export function tableOf(rows: Float32Array): Table {
   const size = rows.length / 3;
   return { x: rows.slice(0, size), y: rows.slice(size, 2 * size), slope: rows.slice(2 * size) };
 }

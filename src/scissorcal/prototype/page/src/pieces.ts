@@ -1,5 +1,6 @@
 // What a person drew, and what the kernel meets of it along the line of the cut: pieces.
 
+import { Spline } from "./edge_points";
 import { Interval, Outline, stretches, without } from "./outline";
 
 /** Material that is bonded to the one before it; it ends at a place along the cut. */
@@ -32,13 +33,28 @@ export interface Layer {
   regions: Region[];
 }
 
-export interface Edge {
+/** From the plainest on. */
+export const FAMILIES = ["line", "arc", "points"] as const;
+export type Family = (typeof FAMILIES)[number];
+
+/** e(s) = offset + s tan(taper) + curvature s^2 / 2. */
+export interface PlainEdge {
   family: "line" | "arc";
   offset_mm: number;
   taper_deg: number;
   curvature_per_m: number;
   length_mm: number;
 }
+
+/** A smooth curve through points, which are all that a recipe holds of it; the last station is its length. */
+export interface CurvedEdge {
+  family: "points";
+  points_mm: Outline;
+  length_mm: number;
+  spline: Spline;
+}
+
+export type Edge = PlainEdge | CurvedEdge;
 
 /** A whole drawing. `edge` is null where the blades stay as they are. */
 export interface Drawn {
@@ -47,6 +63,8 @@ export interface Drawn {
   edge: Edge | null;
   /** Points of the drawn edge: station and offset in mm, from the pivot. */
   edge_points: Outline;
+  /** Why the points as they stand are no edge of a family; the edge then is the last that they were. */
+  edge_refused?: { family: Family; sentence: string };
 }
 
 /** The material that was calibrated, and which blades move. */

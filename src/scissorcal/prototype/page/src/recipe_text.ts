@@ -1,21 +1,21 @@
 // A drawing as tables of a recipe: [[plate.layers]] and [rig.edge] in recipe.toml, and back.
 
-import { parse, TomlTableWithoutBigInt } from "smol-toml";
-import { AT } from "./kernel";
+import { parse } from "smol-toml";
 import { edgeOfTable } from "./blade_edge";
-import { areaOf, Outline, Point } from "./outline";
+import { AT } from "./kernel";
+import { tableOf } from "./law";
+import { areaOf, Outline } from "./outline";
 import { Calibrated, Drawn, Edge, Layer, layerName, Region } from "./pieces";
+import { edgeOf, edgeText } from "./recipe_edge";
 import { Scene, unpack } from "./scene";
+import { list, numberOf, pointsOf, pointsText, positive, quoted, shown, table, Toml } from "./toml";
 
 const MOST_CHARACTERS = 1_000_000;
-const POINTS_OF_A_LINE = 8;
 // What scissorcal.recipe.plate_layers takes.
 const MOST_CORNERS = 2000;
 const MOST_OF_OUTLINE = 1000;
 const MOST_PARTS = 64;
 const SMALLEST_AREA_mm2 = 1e-4;
-
-type Toml = TomlTableWithoutBigInt;
 
 /** What was calibrated, as the pieces of a drawing are compared with it. */
 export function calibratedOf(scene: Scene): Calibrated {
@@ -35,7 +35,8 @@ export function calibratedOf(scene: Scene): Calibrated {
 export function recipeText(drawn: Drawn, scene: Scene, base: string | null): string {
   refuseUnfit(drawn);
   let text = base ?? recipeOf(scene, drawn.edge);
-  if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge));
+  if (drawn.edge_refused) throw new Error(`The points of the blades are no edge yet, so no recipe can hold them: ${drawn.edge_refused.sentence}.`);
+  if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge, edgeIn(parsed(text))));
   text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
   const known = parsed(text);
   const plate = (known.plate ?? {}) as Toml;
@@ -56,13 +57,18 @@ export function drawnFromRecipe(text: string): Drawn {
   const recipe = parsed(text);
   const plate = table(recipe.plate ?? {}, "plate");
   const layers = list(plate.layers ?? [], "plate.layers").map((one, i) => layerOf(one, `plate.layers[${i + 1}]`));
-  const edge = (recipe.rig as Toml | undefined)?.edge;
+  const edge = edgeIn(recipe);
   return {
     cut_line_mm: numberOf(plate.cut_line_mm ?? 0, "plate.cut_line_mm"),
     layers,
-    edge: edge === undefined ? null : edgeOf(table(edge, "rig.edge")),
+    edge: edge && edgeOf(edge),
     edge_points: [],
   };
+}
+
+function edgeIn(recipe: Toml): Toml | null {
+  const edge = (recipe.rig as Toml | undefined)?.edge;
+  return edge === undefined ? null : table(edge, "rig.edge");
 }
 
 function refuseUnfit({ layers }: Drawn): void {
@@ -98,26 +104,10 @@ function layerText(layer: Layer): string {
   ].join("\n");
 }
 
-function edgeText(edge: Edge): string {
-  return [
-    "[rig.edge]",
-    `family = ${quoted(edge.family)}`,
-    `offset_mm = ${shown(edge.offset_mm)}`,
-    `taper_deg = ${shown(edge.taper_deg)}`,
-    ...(edge.family === "arc" ? [`curvature_per_m = ${shown(edge.curvature_per_m)}`] : []),
-    `length_mm = ${shown(edge.length_mm)}`,
-    "",
-  ].join("\n");
-}
-
 /** A recipe of the page's scene: what plan asks for, all else by default. */
 function recipeOf(scene: Scene, edge: Edge | null): string {
   const { thickness_m, fracture_energy_J_per_m } = calibratedOf(scene);
-  const [x, y, slope] = [0, 1, 2].map((row) => {
-    const numbers = unpack(scene.tables.edge);
-    const size = numbers.length / 3;
-    return numbers.slice(row * size, (row + 1) * size);
-  });
+  const own = (): Edge => edgeOfTable(tableOf(unpack(scene.tables.edge)), scene.blade_length_m);
   const range = (values: readonly number[], factor: number): string => `[${values.map((value) => shown(factor * value)).join(", ")}]`;
   const toughness = Math.max(fracture_energy_J_per_m, 1e-6) / thickness_m;
   const name = (scene.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "") || "scene").slice(0, 54);
@@ -131,7 +121,7 @@ description = ${quoted(`Plate drawn on the page of ${oneLine(scene.name)}.`)}
 moving = ${quoted(scene.moving_blades === 2 ? "both" : "upper")}
 handle_radius_mm = ${shown(1e3 * scene.handle_radius_m)}
 
-${edgeText(edge ?? edgeOfTable({ x, y, slope }, scene.blade_length_m))}
+${edgeText(edge ?? own())}
 [material]                         # what is calibrated; layers are stated against it
 name = ${quoted(oneLine(scene.name))}
 thickness_mm = ${shown(1e3 * thickness_m)}
@@ -218,60 +208,10 @@ function layerOf(value: unknown, place: string): Layer {
   };
 }
 
-function edgeOf(edge: Toml): Edge {
-  return {
-    family: edge.family === "arc" ? "arc" : "line",
-    offset_mm: numberOf(edge.offset_mm, "rig.edge.offset_mm"),
-    taper_deg: numberOf(edge.taper_deg, "rig.edge.taper_deg"),
-    curvature_per_m: numberOf(edge.curvature_per_m ?? 0, "rig.edge.curvature_per_m"),
-    length_mm: positive(edge.length_mm, "rig.edge.length_mm"),
-  };
-}
-
 function outlineOf(value: unknown, place: string): Outline {
-  const points = list(value, place).map((one): Point => {
-    const pair = list(one, place);
-    if (pair.length !== 2) throw new Error(`${place} has a point that is not [x, y].`);
-    return [numberOf(pair[0], place), numberOf(pair[1], place)];
-  });
+  const points = pointsOf(value, place);
   if (points.length < 3) throw new Error(`${place} needs three points or more.`);
   return points;
-}
-
-function table(value: unknown, place: string): Toml {
-  if (typeof value !== "object" || value === null || Array.isArray(value)) throw new Error(`${place} must be a table.`);
-  return value as Toml;
-}
-
-function list(value: unknown, place: string): unknown[] {
-  if (!Array.isArray(value)) throw new Error(`${place} must be a list.`);
-  return value;
-}
-
-function numberOf(value: unknown, place: string): number {
-  if (typeof value !== "number" || !Number.isFinite(value)) throw new Error(`${place} must be a number.`);
-  return value;
-}
-
-function positive(value: unknown, place: string): number {
-  const number = numberOf(value, place);
-  if (number <= 0) throw new Error(`${place} must be above 0.`);
-  return number;
-}
-
-function pointsText(outline: Outline): string {
-  const points = outline.map(([x, y]) => `[${shown(x)}, ${shown(y)}]`);
-  const lines: string[] = [];
-  for (let i = 0; i < points.length; i += POINTS_OF_A_LINE) lines.push(points.slice(i, i + POINTS_OF_A_LINE).join(", "));
-  return lines.length === 1 ? `[${lines[0]}]` : `[\n  ${lines.join(",\n  ")},\n]`;
-}
-
-function shown(value: number): string {
-  return String(Number(value.toFixed(6)) + 0);
-}
-
-function quoted(text: string): string {
-  return JSON.stringify(text).replaceAll("\u007f", "\\u007f");
 }
 
 function oneLine(text: string): string {

@@ -2,7 +2,7 @@
 
 import { AT, Kernel, Step } from "./kernel";
 import { Coupling, Pose, Script } from "./hand";
-import { Law } from "./law";
+import { bladeLength, Law } from "./law";
 import { Piece } from "./pieces";
 import { Scene } from "./scene";
 import { RigSamples } from "./socket";
@@ -53,6 +53,7 @@ export class Rig {
   /** Energy that cracks released since it was read last, for sound and rumble. */
   released = 0;
   pieces: readonly Piece[] | null = null;
+  bladeLength_m: number;
   private script: Script | null = null;
   private scriptBegan = 0;
   private slid = 0;
@@ -67,6 +68,7 @@ export class Rig {
   constructor(readonly scene: Scene, module: WebAssembly.Module) {
     this.kernels = { fitted: new Kernel(module), whatIf: new Kernel(module) };
     this.pose = this.wanted = startOf(scene);
+    this.bladeLength_m = scene.blade_length_m;
     this.turnedAt = this.pose.opening;
     this.strokeContact = -this.pose.advance;
     this.step = { ...NOTHING };
@@ -81,6 +83,7 @@ export class Rig {
     kernel.reset(crack);
     kernel.putCracks(cracks);
     this.sound[which] = isSound;
+    this.bladeLength_m = bladeLength(law);
     if (which === this.active && isSound) {
       this.coupling = new Coupling(this.scene, law, largestTorque);
       this.rest();

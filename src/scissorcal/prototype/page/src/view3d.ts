@@ -7,6 +7,7 @@ import {
 import { Blades } from "./blades3d";
 import { coloursOf, heightOver, View as PlainView } from "./drawing";
 import { Table } from "./kernel";
+import { bladeLength } from "./law";
 import { Orbit } from "./orbit";
 import { Interval, rectangle } from "./outline";
 import { Drawn, materialOf, Piece } from "./pieces";
@@ -135,7 +136,7 @@ export class View3d {
     this.shape(view);
     this.place(view);
     this.size(width, height);
-    const length = 1e3 * view.scene.blade_length_m;
+    const length = 1e3 * bladeLength(view.law);
     orbit.aim(new Vector3(0.28 * length, 0, 0), 0.74 * length, width / height);
     renderer.render(this.world, orbit.camera);
     this.tell(view);
@@ -212,7 +213,7 @@ export class View3d {
   /** Make blades and plates anew where they are others than before. */
   private shape(view: View): void {
     const { scene, law } = view;
-    const length = 1e3 * scene.blade_length_m;
+    const length = 1e3 * bladeLength(law);
     if (this.blades?.of !== law.tables.edge) {
       this.blades?.blades.dispose();
       const blades = new Blades(law.tables.edge, length, scene.moving_blades, this.materials);
