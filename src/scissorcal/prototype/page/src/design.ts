@@ -5,7 +5,7 @@ import { drawnFromPlate, openDrawing, savedFile } from "./design_files";
 import { Design, Kind, plainSheet } from "./design_state";
 import { calibratedText, cornerTable, layerList, pieceTable } from "./design_tables";
 import { Blades, edgePanel } from "./edge_panel";
-import { html, renewed } from "./elements";
+import { html, refilled } from "./elements";
 import { tableOf } from "./law";
 import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
 import { calibratedOf, drawnFromRecipe, recipeText } from "./recipe_text";
@@ -135,7 +135,7 @@ class Designer {
   private tables(): void {
     const { design } = this;
     const say = (sentence: string): void => this.say(sentence);
-    renewed(this.side,
+    refilled(this.side,
       layerList(design), pieceTable(this.pieces, this.refusal),
       cornerTable(design, say), edgePanel(design, this.fitted, say));
     this.buttons();
@@ -145,7 +145,7 @@ class Designer {
     const { canvas, design } = this;
     const button = (key: string, text: string, click: () => void, more: Record<string, string | boolean> = {}): HTMLElement =>
       html("button", { type: "button", "data-key": key, click, ...more }, text);
-    renewed(this.tools,
+    refilled(this.tools,
       ...TOOLS.map(([tool, text, sentence]) => button(tool, text, () => {
         canvas.choose(tool);
         this.buttons();

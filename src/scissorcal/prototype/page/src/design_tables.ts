@@ -3,7 +3,7 @@
 import { Design, Kind, nameOf, Part, withLayer, withoutPart } from "./design_state";
 import { addCorner, removeCorner } from "./design_keys";
 import { html, numberField } from "./elements";
-import { boundsOf, crossesItself, moved, Outline, Point, resized } from "./outline";
+import { boundsOf, crossesItself, moved, Point, resized } from "./outline";
 import { Calibrated, Layer, layerName, Piece } from "./pieces";
 
 const ROWS = 12;

@@ -25,7 +25,7 @@ function filled<Kind extends Element>(element: Kind, attributes: Attributes, chi
   return element;
 }
 
-/** What an element does at its events, so that `renewed` can give it another thing to do. */
+/** What an element does at its events, so that `refilled` can give it another thing to do. */
 const listeners = new WeakMap<Element, Map<string, (event: Event) => void>>();
 
 function listen(element: Element, name: string, does: (event: Event) => void): void {
@@ -57,18 +57,27 @@ export function numberField(
 }
 
 /**
- * Put other children into an element; what had the focus has it again, by its data-key. Where that is
- * gone or disabled, its like of the number before takes its place, else the nearest of its kind.
+ * Put other children into an element, but leave what has the focus in its place, with what is typed and
+ * selected in it: it only gets the attributes and listeners of its successor, the element with the
+ * same data-key. Where that is gone or disabled, its like of the number before gets the focus, else the
+ * nearest of its kind. Listeners take their element from the event.
  */
 export function refilled(element: HTMLElement, ...children: Child[]): void {
   const active = document.activeElement;
-  const isIn = active instanceof HTMLElement && element.contains(active) && active.dataset.key !== undefined;
-  const keys = isIn ? keysNear(element, active) : [];
-  element.replaceChildren(...children.filter((child): child is Node | string => child !== null));
+  const focused = active instanceof HTMLElement && element.contains(active) && active.dataset.key !== undefined ? active : null;
+  const keys = focused ? keysNear(element, focused) : [];
+  const fresh = html("div", {}, ...children);
+  const next = focused ? enabled(fresh, keys[0]) : null;
+  if (focused && next) return renew(element, fresh, focused, next);
+  element.replaceChildren(...fresh.childNodes);
   for (const key of keys) {
-    const found = element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]:not(:disabled)`);
+    const found = enabled(element, key);
     if (found) return found.focus();
   }
+}
+
+function enabled(element: HTMLElement, key: string): HTMLElement | null {
+  return element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]:not(:disabled)`);
 }
 
 /** Keys where the focus may go from an element, the best first: buttons from a button, fields from a field. */
@@ -82,20 +91,6 @@ function keysNear(element: HTMLElement, active: HTMLElement): string[] {
   return [key, before, ...[...alike, ...near].map((one) => one.dataset.key as string)];
 }
 
-/**
- * Put other children into an element, as `refilled` does, but leave the field that has the focus in
- * its place, with what is typed and selected in it: it only gets the attributes and listeners of its
- * successor, the element with the same data-key. Listeners take their element from the event.
- */
-export function renewed(element: HTMLElement, ...children: Child[]): void {
-  const focused = document.activeElement;
-  const key = focused instanceof HTMLElement && element.contains(focused) ? focused.dataset.key : undefined;
-  const fresh = html("div", {}, ...children);
-  const next = key === undefined ? null : fresh.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`);
-  if (next && focused instanceof HTMLElement) renew(element, fresh, focused, next);
-  else element.replaceChildren(...fresh.childNodes);
-}
-
 /** Children of `fresh` in the place of those of `old`, but on the way to `focused`, which stays for `next`. */
 function renew(old: Element, fresh: Element, focused: HTMLElement, next: HTMLElement): void {
   const kept = [...old.children].find((child) => child.contains(focused));
@@ -119,56 +114,7 @@ function renew(old: Element, fresh: Element, focused: HTMLElement, next: HTMLEle
 
 /** Attributes and listeners of a successor; what is typed and not yet taken stays as it is. */
 function succeed(kept: Element, other: Element): void {
-  const isTyped = kept instanceof HTMLInputElement && kept.value !== kept.defaultValue;
-  for (const { name } of [...kept.attributes]) if (!other.hasAttribute(name)) kept.removeAttribute(name);
-  for (const { name, value } of other.attributes) if (kept.getAttribute(name) !== value) kept.setAttribute(name, value);
-  if (other instanceof HTMLInputElement && kept instanceof HTMLInputElement) {
-    kept.checked = other.checked;
-    if (!isTyped && kept.value !== other.value) kept.value = other.value;
-  }
-  const [own, others] = [listeners.get(kept), listeners.get(other)];
-  for (const name of own?.keys() ?? []) if (!others?.has(name)) own?.delete(name);
-  for (const [name, does] of others ?? []) listen(kept, name, does);
-}
-
-/**
- * Put other children into an element, as `refilled` does, but leave the field that has the focus in
- * its place, with what is typed and selected in it: it only gets the attributes and listeners of its
- * successor, the element with the same data-key. Listeners take their element from the event.
- */
-export function renewed(element: HTMLElement, ...children: Child[]): void {
-  const focused = document.activeElement;
-  const key = focused instanceof HTMLElement && element.contains(focused) ? focused.dataset.key : undefined;
-  const fresh = html("div", {}, ...children);
-  const next = key === undefined ? null : fresh.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`);
-  if (next && focused instanceof HTMLElement) renew(element, fresh, focused, next);
-  else element.replaceChildren(...fresh.childNodes);
-}
-
-/** Children of `fresh` in the place of those of `old`, but on the way to `focused`, which stays for `next`. */
-function renew(old: Element, fresh: Element, focused: HTMLElement, next: HTMLElement): void {
-  const kept = [...old.children].find((child) => child.contains(focused));
-  const other = [...fresh.children].find((child) => child.contains(next));
-  if (!kept || !other || kept.tagName !== other.tagName || (kept === focused) !== (other === next)) {
-    old.replaceChildren(...fresh.childNodes);
-    if (old.contains(next)) next.focus();
-    return;
-  }
-  const nodes = [...fresh.childNodes];
-  const place = nodes.indexOf(other);
-  while (kept.previousSibling) kept.previousSibling.remove();
-  while (kept.nextSibling) kept.nextSibling.remove();
-  kept.before(...nodes.slice(0, place));
-  kept.after(...nodes.slice(place + 1));
-  succeed(kept, other);
-  if (kept !== focused) return renew(kept, other, focused, next);
-  if (kept.innerHTML !== other.innerHTML) kept.replaceChildren(...other.childNodes);
-  if (other instanceof HTMLSelectElement) (kept as HTMLSelectElement).value = other.value;
-}
-
-/** Attributes and listeners of a successor; what is typed and not yet taken stays as it is. */
-function succeed(kept: Element, other: Element): void {
-  const isTyped = kept instanceof HTMLInputElement && kept.value !== kept.defaultValue;
+  const isTyped = kept instanceof HTMLInputElement && kept.type !== "range" && kept.value !== kept.defaultValue;
   for (const { name } of [...kept.attributes]) if (!other.hasAttribute(name)) kept.removeAttribute(name);
   for (const { name, value } of other.attributes) if (kept.getAttribute(name) !== value) kept.setAttribute(name, value);
   if (other instanceof HTMLInputElement && kept instanceof HTMLInputElement) {
