@@ -1,11 +1,14 @@
 """An edge through points: it keeps them, follows the curve between, and refuses what it cannot."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.model.edge_points import LARGEST_MISFIT_M, edge_through
+from tests.model.golden_edges import golden
 
 
 @settings(max_examples=60, deadline=None)
@@ -55,3 +58,18 @@ def test_a_wavy_edge_is_followed_between_its_points() -> None:
 def test_what_is_no_edge_is_refused(points: list[list[float]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         edge_through(points)
+
+
+@pytest.mark.parametrize("case", golden()["cases"], ids=lambda case: case["title"])
+def test_the_golden_edges(case: dict[str, Any]) -> None:
+    edge, misfit = edge_through(case["points_m"])
+    assert len(edge.spline_m) == case["pieces"] + 3
+    assert misfit <= LARGEST_MISFIT_M
+    assert np.max(np.abs(edge.offset_at(case["at_m"]) - case["offset_m"])) < 1e-9
+    assert np.max(np.abs(edge.slope_at(case["at_m"]) - case["slope"])) < 1e-6
+
+
+@pytest.mark.parametrize("case", golden()["refused"], ids=lambda case: case["words"])
+def test_the_golden_refusals(case: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=case["words"]):
+        edge_through(case["points_m"])

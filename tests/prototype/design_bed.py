@@ -19,7 +19,9 @@ HARNESS = """
 import { View3d } from "./src/view3d";
 import { mountDesign } from "./src/design";
 import { asFitted } from "./src/law";
-import { edgeOfTable, edgeTable, edgeThrough } from "./src/blade_edge";
+import { edgeOfTable, edgeTable, edgeThrough, nearestFamily, offsetAt } from "./src/blade_edge";
+import { edgeIn } from "./src/edge_file";
+import { splineSlope, splineThrough, splineValue } from "./src/edge_points";
 import { layerPieces, piecesOf } from "./src/pieces";
 import { crossesItself, nested, stretches } from "./src/outline";
 import { drawnFromSvg, readSvg, svgOf } from "./src/svg_file";
@@ -30,6 +32,7 @@ const step = { torque: 0, force: 0, contact: 0, indentation: 0, height: 0, respo
 const view = { scene, law: asFitted(scene), pose: { opening: 0.45, advance: 0 },
   wanted: { opening: 0.45, advance: 0 }, step, crack: 0.03 };
 Object.assign(window, { View3d, mountDesign, edgeOfTable, edgeTable, edgeThrough, layerPieces,
+  nearestFamily, offsetAt, edgeIn, splineSlope, splineThrough, splineValue,
   piecesOf, crossesItself, nested, stretches, drawnFromSvg, readSvg, svgOf, calibratedOf,
   drawnFromRecipe, recipeText, scene, view, told: [] });
 /** The value of an expression, or the sentence with which it was refused. */
@@ -69,7 +72,7 @@ def scene(moving_blades: int = 2) -> dict[str, Any]:
         "upper_face_m": THICKNESS_MM * 1e-3 / moving_blades,
         "moving_blades": moving_blades,
         "tables": tables,
-        "numbers": [0.0, 0.0, 1.0, 5e-5, ENERGY_J_PER_M, 0.7, 0.0],
+        "numbers": [0.0, 0.0, 1.0, 5e-5, ENERGY_J_PER_M, 0.7, 0.0, 0.01, 0.06, 0.075],
         "mean_energy": None,
         "levels": [],
     }

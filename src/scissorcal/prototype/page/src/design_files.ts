@@ -1,12 +1,13 @@
 // Files of a drawing: what was loaded becomes a drawing, what is saved goes to the person's disk.
 
-import { Kind, Part, withAdded } from "./design_state";
-import { boundsOf, moved, nested, Outline, Point, stretches } from "./outline";
-import { Drawn, Layer, layerName, materialOf } from "./pieces";
 import { pointsOf } from "./blade_edge";
+import { Kind, Part, withAdded } from "./design_state";
+import { edgeIn } from "./edge_file";
+import { boundsOf, moved, nested, Outline, stretches } from "./outline";
+import { Drawn, Layer, layerName, materialOf } from "./pieces";
 import { drawnFromRecipe } from "./recipe_text";
 import { Contours, DrawnPlate } from "./scene";
-import { drawnFromSvg } from "./svg_file";
+import { drawnFromSvg, readSvg } from "./svg_file";
 
 interface Wanted {
   /** What outlines of a foreign SVG file become. */
@@ -37,13 +38,9 @@ export function openDrawing(name: string, text: string, present: Drawn, wanted: 
   const drawn = drawnFromSvg(text, thickness_mm);
   const { isOurs, ...found } = drawn;
   if (isOurs) return { drawn: found, part: FIRST, sentence: `${name}: the drawing as it was saved.` };
+  if (wanted.kind === "edge") return edgeOf(name, text, present);
   if (wanted.kind === "outline") return placed(name, found);
   const outlines = found.layers.map((layer) => layer.outline);
-  if (wanted.kind === "edge") {
-    const points = lowerSide(outlines[0] ?? found.edge_points);
-    const added = withAdded(present, "edge", 0, points, thickness_mm);
-    return { ...added, sentence: `${name}: an edge through ${points.length} points.` };
-  }
   if (!outlines.length) throw new Error(`${name} has no closed outline with an area.`);
   const line = present.cut_line_mm;
   const { low, high } = boundsOf(outlines.flat());
@@ -54,6 +51,14 @@ export function openDrawing(name: string, text: string, present: Drawn, wanted: 
   }
   const added = `${name}: ${outlines.length} outline${outlines.length === 1 ? "" : "s"} added`;
   return { drawn: now, part, sentence: `${added}${up ? ", moved onto the line of the cut" : ""}.` };
+}
+
+/** The edge of a foreign file beside the plates that there are. */
+function edgeOf(name: string, text: string, present: Drawn): Opened {
+  const { points, sentence } = edgeIn(name, readSvg(text));
+  const added = withAdded(present, "edge", 0, points, 1);
+  const toPivot = added.drawn.edge_points.length - points.length;
+  return { ...added, sentence: `${name}: ${sentence}${toPivot ? " It begins in front of the pivot and was continued straight to it." : ""}` };
 }
 
 /** A recipe without layers is about the uniform sheet, which is drawn and not cut as drawn. */
@@ -109,22 +114,4 @@ function placed(name: string, drawn: Drawn): Opened {
   const shift = (outline: Outline): Outline => moved(outline, dx, dy);
   const layers = drawn.layers.map((layer) => ({ ...layer, outline: shift(layer.outline), holes: layer.holes.map(shift) }));
   return { drawn: { ...drawn, layers }, part: FIRST, sentence: `${sentence}, moved so that the cut begins at their edge and goes through their middle.` };
-}
-
-/** Of a closed outline the side that cuts: from its first to its last station, on the side of low offset. */
-function lowerSide(outline: Outline): Outline {
-  const at = (best: (a: number, b: number) => boolean): number =>
-    outline.reduce((found, [x], i) => (best(x, outline[found][0]) ? i : found), 0);
-  const [near, far] = [at((a, b) => a < b), at((a, b) => a > b)];
-  const walk = (step: 1 | -1): Outline => {
-    const points: Outline = [outline[near]];
-    for (let i = near; i !== far;) {
-      i = (i + step + outline.length) % outline.length;
-      points.push(outline[i]);
-    }
-    return points;
-  };
-  const mean = (points: Outline): number => points.reduce((sum, [, y]: Point) => sum + y, 0) / points.length;
-  const [one, other] = [walk(1), walk(-1)];
-  return mean(one) <= mean(other) ? one : other;
 }

@@ -2,8 +2,8 @@
 
 import { SVGPathData } from "svg-pathdata";
 import { flattened, nested, Outline, Point } from "./outline";
-import { withEdge } from "./design_state";
-import { Drawn, Layer, layerName } from "./pieces";
+import { familyOf, withEdge } from "./design_state";
+import { Drawn, FAMILIES, Family, Layer, layerName } from "./pieces";
 
 const MOST_CHARACTERS = 2_000_000;
 const MOST_SHAPES = 400;
@@ -25,6 +25,8 @@ const NOT_SHOWN = "defs, symbol, clipPath, mask, pattern, marker, metadata, fore
 /** One element's outlines in mm, y up; `marks` are its data- attributes and those of its group. */
 export interface Shape {
   outlines: Outline[];
+  /** Of each outline, whether its end is its begin. */
+  closed: boolean[];
   id: string;
   marks: Record<string, string>;
 }
@@ -53,7 +55,8 @@ export function readSvg(text: string): Shape[] {
   for (const element of root.querySelectorAll<SVGGeometryElement>("*")) {
     if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN)) continue;
     if (found.length === MOST_SHAPES) throw new Error(`This SVG file has more than ${MOST_SHAPES} shapes.`);
-    const outlines = outlinesOf(element, unit, corner).filter((outline) => outline.length >= 2);
+    const contours = outlinesOf(element, unit, corner).filter(({ outline }) => outline.length >= 2);
+    const outlines = contours.map(({ outline }) => outline);
     points += outlines.reduce((sum, one) => sum + one.length, 0);
     if (points > MOST_POINTS_OF_FILE || outlines.some((one) => one.length > MOST_POINTS)) {
       throw new Error(`This SVG file has an outline of more than ${MOST_POINTS} points, or ${MOST_POINTS_OF_FILE} in all.`);
@@ -61,7 +64,7 @@ export function readSvg(text: string): Shape[] {
     if (outlines.flat(2).some((value) => !(Math.abs(value) < 1e5))) {
       throw new Error("This SVG file has a place that is no number, or 100 m away.");
     }
-    if (outlines.length) found.push({ outlines, id: element.id, marks: marksOf(element) });
+    if (outlines.length) found.push({ outlines, closed: contours.map(({ isClosed }) => isClosed), id: element.id, marks: marksOf(element) });
   }
   if (!found.length) throw new Error("This SVG file has no path, rectangle, circle, ellipse, polygon or polyline.");
   return found;
@@ -78,7 +81,6 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
       name: layerName(nameOf(shapes, plate.outline), drawn.layers.map((one) => one.name), `plate ${i + 1}`),
       thickness_mm, toughness_ratio: 1, ...plate, regions: [],
     }));
-    if (!drawn.layers.length) drawn.edge_points = shapes[0].outlines[0];
     return drawn;
   }
   drawn.isOurs = true;
@@ -90,7 +92,7 @@ export function drawnFromSvg(text: string, thickness_mm: number): Drawn & { isOu
   for (const { outlines: found, marks } of ours) {
     const { kind, layer, ratio, thickness } = marks;
     const outlines = found.map(settle);
-    if (kind === "edge") Object.assign(drawn, withEdge(drawn, outlines[0], marks.family === "arc" ? "arc" : "line"));
+    if (kind === "edge") Object.assign(drawn, withEdge(drawn, outlines[0], familyIn(marks.family)));
     if (kind === "outline") {
       drawn.layers.push({
         name: layerName(layer ?? "", drawn.layers.map((one) => one.name), "plate"), thickness_mm: positive(thickness, thickness_mm), toughness_ratio: positive(ratio, 1),
@@ -138,7 +140,7 @@ export function svgOf(drawn: Drawn): string {
   })];
   if (drawn.edge_points.length) {
     lines.push(shape("polyline", drawn.edge_points, {
-      id: "edge", "data-kind": "edge", "data-family": drawn.edge?.family ?? "line", stroke: "blue", fill: "none", "stroke-width": "0.3",
+      id: "edge", "data-kind": "edge", "data-family": familyOf(drawn) ?? "line", stroke: "blue", fill: "none", "stroke-width": "0.3",
     }));
   }
   const box = [left, top, width, height].map(number);
@@ -157,8 +159,9 @@ function unitOf(root: SVGSVGElement): number {
   return (unit * width.valueInSpecifiedUnits) / box.width;
 }
 
-function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Point): Outline[] {
+function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Point): { outline: Outline; isClosed: boolean }[] {
   const found: Outline[] = [];
+  const shut = new Set<Outline>();
   const matrix = placeOf(element);
   const place = (x: number, y: number): Point => [
     unit * (matrix.a * x + matrix.c * y + matrix.e - left), -unit * (matrix.b * x + matrix.d * y + matrix.f - top),
@@ -177,9 +180,15 @@ function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Poin
       own.push(...flattened(
         own[own.length - 1], place(command.x1, command.y1), place(command.x2, command.y2), place(command.x, command.y), FLAT_mm,
       ));
-    } else if (command.type === SVGPathData.CLOSE_PATH) found.push([own[0]]);
+    } else if (command.type === SVGPathData.CLOSE_PATH) {
+      shut.add(own);
+      found.push([own[0]]);
+    }
   }
-  return found.map(settled);
+  return found.map((points) => {
+    const outline = settled(points);
+    return { outline, isClosed: shut.has(points) || outline.length < points.length && areSame(points[0], points[points.length - 1]) };
+  });
 }
 
 /** To 0.1 um, without points that stand on the one before, nor the first one again at the end. */
@@ -189,6 +198,10 @@ function settled(outline: Outline): Outline {
   const kept = points.filter((point, i) => i === 0 || apart(point, points[i - 1]));
   while (kept.length > 1 && !apart(kept[0], kept[kept.length - 1])) kept.pop();
   return kept;
+}
+
+function areSame([x1, y1]: Point, [x2, y2]: Point): boolean {
+  return round(x1) === round(x2) && round(y1) === round(y2);
 }
 
 function round(value: number): number {
@@ -238,6 +251,13 @@ function marksOf(element: SVGElement): Record<string, string> {
 /** The id of the element that an outline is from. */
 function nameOf(shapes: Shape[], outline: Outline): Layer["name"] {
   return shapes.find((shape) => shape.outlines.includes(outline))?.id ?? "";
+}
+
+/** The family that a drawing of ours names; where it names none, the points say it. */
+function familyIn(text: string | undefined): Family | undefined {
+  const family = FAMILIES.find((one) => one === text);
+  if (text !== undefined && !family) throw new Error(`This drawing has an edge of the family "${text}", and an edge is one of ${FAMILIES.join(", ")}.`);
+  return family;
 }
 
 function positive(text: string | undefined, otherwise: number): number {
