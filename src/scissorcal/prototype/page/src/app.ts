@@ -45,6 +45,7 @@ export class App {
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
+  private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: both curves are the law with these, the shaded interval and the measured lines are of the blades as fitted.");
   private drawnAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
@@ -70,7 +71,7 @@ export class App {
         html("details", { class: "designer", toggle: (event) => this.openDesign(event.target as HTMLDetailsElement, design) }, html("summary", {}, "Draw plates and blades"), design)),
       html("footer", { class: "note" }, `${scene.name}, page made ${scene.made_utc} by scissorcal ${scene.version}. Tables within ${(1e3 * scene.bound_Nm).toPrecision(2)} mN m of the fitted law.`));
     this.drawing = new Drawing(canvas);
-    torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)));
+    torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)), this.bladesNote);
     time.append(html("h2", {}, "The last 8 seconds"));
     this.torque = new TorqueChart(torque, scene);
     this.time = new TimeChart(time, scene, this.largestTorque, server !== null);
@@ -219,6 +220,7 @@ export class App {
     mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
       this.drawn = applied?.drawn ?? null;
       this.edge = applied?.edge ?? null;
+      this.bladesNote.hidden = !this.edge;
       this.rig.cut(pieces ?? this.scene.pieces);
       this.changed();
       this.rig.freshSheet();

@@ -115,7 +115,7 @@ export function edgeOfTable(table: Table, length_m: number): Edge {
   return { ...plainThrough(points, family), length_mm: rounded(1e3 * length_m, 3) };
 }
 
-/** Points on the edge of a table, some to be moved by hand: even from the pivot, or before it, to the tip. */
+/** Points on the edge of a table, some to be moved by hand: even from the pivot to the tip. */
 export function sampledPoints(table: Table, length_m: number): Outline {
   return sampled(table, length_m, SAMPLED).map(([s, e]): Point => [rounded(s, 3), rounded(e, 4)]);
 }
@@ -126,9 +126,8 @@ export function leavesTable(edge: Edge, table: Table, length_m: number): number 
 }
 
 function sampled(table: Table, length_m: number, count: number): Outline {
-  const [start, end] = [Math.min(0, table.x[0]), length_m];
   return Array.from({ length: count }, (_, i): Point => {
-    const s = start + ((end - start) * i) / (count - 1);
+    const s = (length_m * i) / (count - 1);
     return [1e3 * s, 1e3 * heldValue(table, s)];
   });
 }

@@ -48,7 +48,7 @@ function told(isClosed: boolean, hasPivot: boolean, points: Outline, whole: Outl
 function left(points: Outline, whole: Outline): string {
   if (points.length === whole.length) return "";
   try {
-    return `, all left by up to ${(1e3 * misfit(whole, edgeThrough(points, "points"))).toPrecision(2)} um`;
+    return `, all left by up to ${(1e3 * misfit(whole, edgeThrough(points, "points"))).toPrecision(2)} µm`;
   } catch {
     return ""; // the panel says why it is no edge
   }

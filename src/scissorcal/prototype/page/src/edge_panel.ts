@@ -96,5 +96,5 @@ function stateOf({ edge, edge_points, edge_refused }: Drawn): HTMLElement {
 }
 
 function micrometres(length_mm: number): string {
-  return `${Math.max(1e3 * length_mm, 0.1).toPrecision(2)} um`;
+  return `${Math.max(1e3 * length_mm, 0.1).toPrecision(2)} µm`;
 }
