@@ -1,6 +1,6 @@
 // What a person changes: parts of the law, parameters, draws of the posterior, hands.
 
-import { html, numberField, refilled } from "./elements";
+import { html, numberField, refilled, renewed } from "./elements";
 import { Parts } from "./law";
 import { Which } from "./rig";
 import { Scene, Slider, unpack } from "./scene";
@@ -121,7 +121,7 @@ export class Controls {
       else this.playing = window.setInterval(next, 600);
       this.fillDraws();
     };
-    refilled(this.draws,
+    renewed(this.draws,
       numberField(`draw of the posterior (1 to ${count}, 0 for none)`, choices.draw === null ? 0 : choices.draw + 1, { key: "draw", least: 0, most: count }, (value) => chosen(value < 0.5 ? null : Math.round(value) - 1)),
       html("button", { type: "button", click: next, "data-key": "next" }, "Next draw"),
       html("button", { type: "button", click: play, "data-key": "play", "aria-pressed": String(this.playing !== 0) }, this.playing ? "Stop" : "Play draws"));
