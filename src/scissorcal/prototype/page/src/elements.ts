@@ -92,8 +92,8 @@ export function renewed(element: HTMLElement, ...children: Child[]): void {
   const key = focused instanceof HTMLElement && element.contains(focused) ? focused.dataset.key : undefined;
   const fresh = html("div", {}, ...children);
   const next = key === undefined ? null : fresh.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`);
-  if (next && focused instanceof HTMLElement) renew(element, fresh, focused, next);
-  else element.replaceChildren(...fresh.childNodes);
+  if (next && !next.matches(":disabled") && focused instanceof HTMLElement) renew(element, fresh, focused, next);
+  else refilled(element, ...fresh.childNodes);
 }
 
 /** Children of `fresh` in the place of those of `old`, but on the way to `focused`, which stays for `next`. */
