@@ -1,6 +1,6 @@
 // What a person changes: parts of the law, parameters, draws of the posterior, hands.
 
-import { html, numberField, refilled, renewed } from "./elements";
+import { html, numberField, refilled } from "./elements";
 import { Parts } from "./law";
 import { Which } from "./rig";
 import { Scene, Slider, unpack } from "./scene";
@@ -121,7 +121,7 @@ export class Controls {
       else this.playing = window.setInterval(next, 600);
       this.fillDraws();
     };
-    renewed(this.draws,
+    refilled(this.draws,
       numberField(`draw of the posterior (1 to ${count}, 0 for none)`, choices.draw === null ? 0 : choices.draw + 1, { key: "draw", least: 0, most: count }, (value) => chosen(value < 0.5 ? null : Math.round(value) - 1)),
       html("button", { type: "button", click: next, "data-key": "next" }, "Next draw"),
       html("button", { type: "button", click: play, "data-key": "play", "aria-pressed": String(this.playing !== 0) }, this.playing ? "Stop" : "Play draws"));
@@ -137,18 +137,18 @@ export class Controls {
     const shown = (at: number): string => `${(scale * at).toFixed(decimals).replace("-", "−")} ${raised(unit)}`.trim();
     const output = html("output", {}, shown(value));
     const input = html("input", {
-      type: "range", min: 0, max: STEPS, step: "any", "aria-label": slider.meaning || slider.name,
+      type: "range", min: 0, max: STEPS, step: "any", value: STEPS * share(value), "aria-label": slider.meaning || slider.name,
       "aria-valuetext": shown(value), "data-slider": slider.name, "data-key": slider.name,
-      input: () => {
-        const wanted = low + (Number(input.value) / STEPS) * (high - low);
+      input: (event) => {
+        const moved = event.currentTarget as HTMLInputElement;
+        const wanted = low + (Number(moved.value) / STEPS) * (high - low);
         this.choices.values.set(slider.name, wanted);
         if (this.choices.draw !== null || this.playing) this.leaveDraws();
         output.textContent = shown(wanted);
-        input.setAttribute("aria-valuetext", shown(wanted));
+        moved.setAttribute("aria-valuetext", shown(wanted));
         this.changed();
       },
     });
-    input.value = String(STEPS * share(value));
     const range = html("span", { class: "range", "aria-hidden": "true" }, html("span", { class: "interval" }), html("span", { class: "tick" }));
     const [interval, tick] = range.children as unknown as HTMLElement[];
     interval.style.left = `${100 * share(slider.q05)}%`;

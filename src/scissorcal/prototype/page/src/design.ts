@@ -5,7 +5,7 @@ import { DesignCanvas, Tool } from "./design_canvas";
 import { drawnFromPlate, openDrawing, savedFile } from "./design_files";
 import { Design, Kind, plainSheet } from "./design_state";
 import { calibratedText, cornerTable, edgePanel, layerList, pieceTable } from "./design_tables";
-import { html, renewed } from "./elements";
+import { html, refilled } from "./elements";
 import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
 import { calibratedOf, drawnFromRecipe, recipeText } from "./recipe_text";
 import { Scene, unpack } from "./scene";
@@ -133,7 +133,7 @@ class Designer {
 
   private tables(): void {
     const { design } = this;
-    renewed(this.side,
+    refilled(this.side,
       layerList(design), pieceTable(this.pieces, this.refusal),
       cornerTable(design, (sentence) => this.say(sentence)), edgePanel(design, this.fitted));
     this.buttons();
@@ -143,7 +143,7 @@ class Designer {
     const { canvas, design } = this;
     const button = (key: string, text: string, click: () => void, more: Record<string, string | boolean> = {}): HTMLElement =>
       html("button", { type: "button", "data-key": key, click, ...more }, text);
-    renewed(this.tools,
+    refilled(this.tools,
       ...TOOLS.map(([tool, text, sentence]) => button(tool, text, () => {
         canvas.choose(tool);
         this.buttons();

@@ -25,7 +25,7 @@ function filled<Kind extends Element>(element: Kind, attributes: Attributes, chi
   return element;
 }
 
-/** What an element does at its events, so that `renewed` can give it another thing to do. */
+/** What an element does at its events, so that `refilled` can give it another thing to do. */
 const listeners = new WeakMap<Element, Map<string, (event: Event) => void>>();
 
 function listen(element: Element, name: string, does: (event: Event) => void): void {
@@ -57,18 +57,27 @@ export function numberField(
 }
 
 /**
- * Put other children into an element; what had the focus has it again, by its data-key. Where that is
- * gone or disabled, its like of the number before takes its place, else the nearest of its kind.
+ * Put other children into an element, but leave what has the focus in its place, with what is typed and
+ * selected in it: it only gets the attributes and listeners of its successor, the element with the
+ * same data-key. Where that is gone or disabled, its like of the number before gets the focus, else the
+ * nearest of its kind. Listeners take their element from the event.
  */
 export function refilled(element: HTMLElement, ...children: Child[]): void {
   const active = document.activeElement;
-  const isIn = active instanceof HTMLElement && element.contains(active) && active.dataset.key !== undefined;
-  const keys = isIn ? keysNear(element, active) : [];
-  element.replaceChildren(...children.filter((child): child is Node | string => child !== null));
+  const focused = active instanceof HTMLElement && element.contains(active) && active.dataset.key !== undefined ? active : null;
+  const keys = focused ? keysNear(element, focused) : [];
+  const fresh = html("div", {}, ...children);
+  const next = focused ? enabled(fresh, keys[0]) : null;
+  if (focused && next) return renew(element, fresh, focused, next);
+  element.replaceChildren(...fresh.childNodes);
   for (const key of keys) {
-    const found = element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]:not(:disabled)`);
+    const found = enabled(element, key);
     if (found) return found.focus();
   }
+}
+
+function enabled(element: HTMLElement, key: string): HTMLElement | null {
+  return element.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]:not(:disabled)`);
 }
 
 /** Keys where the focus may go from an element, the best first: buttons from a button, fields from a field. */
@@ -80,20 +89,6 @@ function keysNear(element: HTMLElement, active: HTMLElement): string[] {
   const key = active.dataset.key as string;
   const before = key.replace(/\d+$/, (number) => String(Number(number) - 1));
   return [key, before, ...[...alike, ...near].map((one) => one.dataset.key as string)];
-}
-
-/**
- * Put other children into an element, as `refilled` does, but leave the field that has the focus in
- * its place, with what is typed and selected in it: it only gets the attributes and listeners of its
- * successor, the element with the same data-key. Listeners take their element from the event.
- */
-export function renewed(element: HTMLElement, ...children: Child[]): void {
-  const focused = document.activeElement;
-  const key = focused instanceof HTMLElement && element.contains(focused) ? focused.dataset.key : undefined;
-  const fresh = html("div", {}, ...children);
-  const next = key === undefined ? null : fresh.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`);
-  if (next && !next.matches(":disabled") && focused instanceof HTMLElement) renew(element, fresh, focused, next);
-  else refilled(element, ...fresh.childNodes);
 }
 
 /** Children of `fresh` in the place of those of `old`, but on the way to `focused`, which stays for `next`. */
@@ -119,7 +114,7 @@ function renew(old: Element, fresh: Element, focused: HTMLElement, next: HTMLEle
 
 /** Attributes and listeners of a successor; what is typed and not yet taken stays as it is. */
 function succeed(kept: Element, other: Element): void {
-  const isTyped = kept instanceof HTMLInputElement && kept.value !== kept.defaultValue;
+  const isTyped = kept instanceof HTMLInputElement && kept.type !== "range" && kept.value !== kept.defaultValue;
   for (const { name } of [...kept.attributes]) if (!other.hasAttribute(name)) kept.removeAttribute(name);
   for (const { name, value } of other.attributes) if (kept.getAttribute(name) !== value) kept.setAttribute(name, value);
   if (other instanceof HTMLInputElement && kept instanceof HTMLInputElement) {
