@@ -13,7 +13,9 @@ HOLD = """() => {
   const held = [];
   window.setTimeout = (f) => held.push(f);
   window.clearTimeout = (which) => { held[which - 1] = () => {}; };
-  window.redrawn = () => { for (const f of held.splice(0, held.length, ...held.map(() => () => {}))) f(); };
+  window.redrawn = () => {
+    for (const f of held.splice(0, held.length, ...held.map(() => () => {}))) f();
+  };
 }"""
 
 
@@ -100,4 +102,3 @@ def test_a_button_that_is_pressed_while_the_tables_change_does_its_work(bed: Bed
     redrawn(bed)
     page.mouse.up()
     assert outline(bed)[:3] == [[12, -30], [66, -30], [120, -30]]
-
