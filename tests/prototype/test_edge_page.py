@@ -140,6 +140,11 @@ def test_a_recipe_goes_through_the_page_as_it_is(bed: Bed, tmp_path: Path) -> No
     file.write_text(text, encoding="utf-8")
     loaded(bed.page, file)
     assert saved(bed, tmp_path) == tomllib.loads(text)["rig"]["edge"]
+    note = bed.page.get_by_text("cuts with the blades as fitted")
+    expect(note).to_be_visible()  # a recipe without a plate is not cut as drawn
+    bed.page.get_by_label("cut this drawing").check()
+    expect(note).to_have_count(0)
+    assert applied(bed)["points_mm"] == tomllib.loads(text)["rig"]["edge"]["points_mm"]
     file.write_text('[rig.edge]\nfamily = "spline"\n', encoding="utf-8")
     bed.page.set_input_files("input[type=file]", file)
     expect(bed.page.locator(".design-status")).to_contain_text('one of "line", "arc", "points"')
@@ -265,3 +270,21 @@ def test_beyond_the_tip_of_a_drawn_blade_there_is_no_force(shown: Shown) -> None
     page.keyboard.press("Enter")
     assert shown.run("() => scissorcal.rig.bladeLength_m") == np.float32(0.04)
     assert shown.torque(opening, -0.3, place)[0] == 0.0
+
+
+def test_an_edge_that_leans_back_is_said_and_gives_no_torque(shown: Shown) -> None:
+    page = shown.page
+    told = page.locator("section.now .warning", has_text="leans back")
+    note = page.locator("section.torque .note", has_text="The blades are drawn")
+    assert (told.is_visible(), note.is_visible()) == (False, False)
+    page.get_by_role("button", name="Draw another edge").click()
+    page.get_by_label("Taper, deg").fill("75")
+    page.keyboard.press("Enter")
+    expect(note).to_be_visible()
+    page.locator("canvas.plain").press("ArrowUp")
+    expect(told).to_be_visible()
+    assert shown.run("() => scissorcal.rig.step.torque") == 0.0
+    page.get_by_role("button", name="As fitted again").click()
+    page.locator("canvas.plain").press("ArrowUp")
+    expect(told).to_be_hidden()
+    expect(note).to_be_hidden()

@@ -46,7 +46,10 @@ class Designer {
   private readonly status = html("p", { class: "design-status", role: "status" });
   private readonly side = html("div", { class: "design-side" });
   private readonly tools = html("div", { class: "row", role: "toolbar", "aria-label": "Tools of the drawing" });
-  private readonly cuts = html("input", { type: "checkbox", change: () => this.told() });
+  private readonly cuts = html("input", { type: "checkbox", change: () => {
+    this.told();
+    this.refresh();
+  } });
   private pieces: Piece[] | null = null;
   private refusal = "";
   private timer = 0;
@@ -110,6 +113,12 @@ class Designer {
     this.told();
   }
 
+  /** Why the model does not have the blades that are drawn; "" where it has. */
+  private unfelt(): string {
+    if (!this.cuts.checked) return "The model on this page cuts with the blades as fitted, until it cuts this drawing (the box above).";
+    return this.pieces ? "" : "The model takes these blades together with the plate, which it refuses.";
+  }
+
   private told(): void {
     if (!this.cuts.checked) this.apply(null, null);
     else if (this.pieces) this.apply(this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge });
@@ -137,7 +146,7 @@ class Designer {
     const say = (sentence: string): void => this.say(sentence);
     refilled(this.side,
       layerList(design), pieceTable(this.pieces, this.refusal),
-      cornerTable(design, say), edgePanel(design, this.fitted, say));
+      cornerTable(design, say), edgePanel(design, this.fitted, say, this.unfelt()));
     this.buttons();
   }
 

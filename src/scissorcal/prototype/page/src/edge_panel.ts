@@ -15,8 +15,8 @@ export interface Blades {
   length_m: number;
 }
 
-/** The blade's edge: as fitted, or a line, an arc or a curve through points. */
-export function edgePanel(design: Design, fitted: Blades, say: (sentence: string) => void): HTMLElement {
+/** The blade's edge: as fitted, or a line, an arc or a curve through points; `unfelt` says why the model does not have it. */
+export function edgePanel(design: Design, fitted: Blades, say: (sentence: string) => void, unfelt: string): HTMLElement {
   const { edge, edge_points } = design.drawn;
   const panel = (...children: (HTMLElement | null)[]): HTMLElement =>
     html("section", { class: "design-panel" }, html("h3", {}, "Blades"), ...children);
@@ -36,7 +36,7 @@ export function edgePanel(design: Design, fitted: Blades, say: (sentence: string
   const isPlain = edge && edge.family !== "points" && edge.family === family;
   return panel(
     html("div", { class: "row" }, html("label", { class: "field" }, "Edge ", select), ...(isPlain ? numbers(design, edge) : [])),
-    stateOf(design.drawn),
+    stateOf(design.drawn), unfelt ? html("p", { class: "note" }, unfelt) : null,
     html("p", {}, "Stations are mm from the pivot towards the tip. An offset below 0 lies on the side of the sheet."),
     html("div", { class: "row" },
       html("button", { type: "button", "data-key": "points", click: () => design.choose(THE_EDGE) }, "Choose its points"),

@@ -19,15 +19,14 @@ export class Readout {
   private readonly state = html("dl", { class: "numbers" });
   private readonly energy = html("dl", { class: "numbers" });
   private readonly said = html("p", { class: "said", "aria-live": "polite" });
-  private readonly beyond = html("p", { class: "warning", hidden: true }, BEYOND);
-  private readonly leaning = html("p", { class: "warning", hidden: true }, LEANING);
+  private readonly warning = html("p", { class: "warning", hidden: true });
   private shownAt = 0;
   private saidAt = 0;
   private before = "";
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly isServed: boolean) {
     container.append(
-      html("h2", {}, "Now"), this.beyond, this.leaning, this.state, html("h3", {}, "Energy since the fresh sheet or the last change of the law, mJ"), this.energy,
+      html("h2", {}, "Now"), this.warning, this.state, html("h3", {}, "Energy since the fresh sheet or the last change of the law, mJ"), this.energy,
       html("p", { class: "note" }, "Work of the hand = stored + fracture + arrest + friction, up to the error of steps of a tick."), this.said);
   }
 
@@ -52,8 +51,9 @@ export class Readout {
     ];
     if (this.isServed) rows.push(["torque of the rig", measured === undefined ? "–" : (1e3 * measured).toFixed(1), "mN m"]);
     list(this.state, rows);
-    this.beyond.hidden = !(step.flags & FLAG.outOfRange);
-    this.leaning.hidden = !(step.flags & FLAG.invalid);
+    const warning = step.flags & FLAG.invalid ? LEANING : step.flags & FLAG.outOfRange ? BEYOND : "";
+    this.warning.hidden = !warning;
+    if (warning && this.warning.textContent !== warning) this.warning.textContent = warning;
     const error = energy.hand - energy.stored - energy.fracture - energy.arrest - energy.friction;
     list(this.energy, (["hand", "stored", "fracture", "arrest", "friction"] as const)
       .map((name): [string, string, string] => [name === "hand" ? "work of the hand" : name, (1e3 * energy[name]).toFixed(2), "mJ"])
@@ -64,7 +64,7 @@ export class Readout {
   private say(rig: Rig, cut_mm: number, now: number): void {
     if (now - this.saidAt < SAID_EVERY_ms) return;
     const flags = rig.step.flags;
-    const beyond = flags & FLAG.outOfRange ? "Outside the range of the package. " : flags & FLAG.invalid ? "The edge leans back. " : "";
+    const beyond = flags & FLAG.invalid ? "The edge leans back. " : flags & FLAG.outOfRange ? "Outside the range of the package. " : "";
     const text = `${beyond}Torque ${(1e3 * rig.step.torque).toFixed(0)} millinewton metres, opening ${(DEG * rig.pose.opening).toFixed(0)} degrees, crack at ${cut_mm.toFixed(0)} mm.`;
     if (text === this.before) return;
     this.saidAt = now;
