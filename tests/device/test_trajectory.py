@@ -18,6 +18,7 @@ from scissorcal.device.trajectory import (
     usable_opening,
 )
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.recipe.edge import Edge
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.pace import TURN_ACCELERATION
 from tests.device.conftest import IDENTITY
@@ -194,15 +195,17 @@ def test_approach_starts_where_the_rig_stands_and_moves_one_axis_at_a_time() -> 
 
 
 def test_the_crossing_is_the_root_of_the_edge() -> None:
-    blade = dataclasses.replace(
-        Blade.of(builtin_recipe("paper-80gsm")), curvature=-1.5, moving_blades=1
-    )
+    edge = {"family": "arc", "offset_mm": -8.0, "taper_deg": 2.0, "length_mm": 75.0}
+    given = Edge.model_validate({**edge, "curvature_per_m": -1.5})
+    paper = builtin_recipe("paper-80gsm")
+    upper = paper.model_copy(update={"rig": paper.rig.model_copy(update={"edge": given})})
+    blade = dataclasses.replace(Blade.of(upper), moving_blades=1)
     for opening in np.radians([15.0, 25.0, 35.0]):
         x = float(blade.crossing(opening))
         station = np.linspace(0, blade.length, 200_001)
-        edge = blade.offset + blade.slope * station + blade.curvature * station**2 / 2
-        along = station * np.cos(opening) - edge * np.sin(opening)
-        height = station * np.sin(opening) + edge * np.cos(opening)
+        offset = -8e-3 + np.tan(np.radians(2.0)) * station - 1.5 * station**2 / 2
+        along = station * np.cos(opening) - offset * np.sin(opening)
+        height = station * np.sin(opening) + offset * np.cos(opening)
         assert np.interp(x, along, height) == pytest.approx(blade.upper_face, abs=1e-9)
         assert blade.opening_at(x, (0.1, 0.9)) == pytest.approx(opening, abs=1e-6)
 

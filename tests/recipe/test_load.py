@@ -124,7 +124,7 @@ def test_builtin_recipes_load(name: str) -> None:
         (
             'family = "line"',
             'family = "lien"',
-            'rig.edge.family: "lien" is not allowed here; allowed: "line", "arc". Did you mean '
+            'rig.edge.family: "lien" is not allowed here; allowed: "line", "arc", "points". Did you mean '
             '"line"?',
         ),
         (
