@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import ConfigDict, Field, GetCoreSchemaHandler, Strict, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -91,11 +91,10 @@ class Edge(Section):
 
         So digests of recipes are what they were before there were points.
         """
-        schema = handler(source)
-        schema["serialization"] = core_schema.wrap_serializer_function_ser_schema(
+        written = core_schema.wrap_serializer_function_ser_schema(
             lambda edge, inner: {k: v for k, v in inner(edge).items() if v is not None}
         )
-        return schema
+        return cast(CoreSchema, {**handler(source), "serialization": written})
 
     @property
     def length_m(self) -> float:
