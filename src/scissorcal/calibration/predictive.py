@@ -75,7 +75,8 @@ def _resampled(left_out: LeftOut) -> Array:
 
 
 def _rounded(values: Array) -> NDArray[np.float32]:
-    """The nearest numbers with a short mantissa."""
-    bits = values.astype(np.float32).view(np.uint32)
+    """The nearest numbers with a short mantissa, within what 32 bits hold."""
+    largest = np.finfo(np.float32).max
+    bits = np.clip(values, -largest, largest).astype(np.float32).view(np.uint32)
     step = np.uint32(1 << (23 - MANTISSA_BITS))
     return ((bits + step // np.uint32(2)) & ~(step - np.uint32(1))).view(np.float32)

@@ -15,6 +15,7 @@ from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.edge import Edge as Curve
+    from scissorcal.recipe.schema import Recipe
 
 Offset_mm = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Point_mm = Annotated[tuple[Offset_mm, Offset_mm], Strict(False)]
@@ -109,6 +110,11 @@ class StatedCurve:
     edge: Curve
     misfit_m: float = 0.0
 
+    @property
+    def pieces(self) -> int:
+        """Cubics of the curve through points; 1 for a line or an arc."""
+        return max(1, len(self.edge.spline_m) - 3)
+
 
 def stated_curve(edge: Edge) -> StatedCurve:
     """The model's edge that a recipe states; every other room takes it from here.
@@ -146,21 +152,21 @@ def _through(points_mm: tuple[tuple[float, float], ...]) -> StatedCurve:
     return StatedCurve(*edge_through(1e-3 * np.array(points_mm, dtype=np.float64)))
 
 
-def edge_sentence(edge: Edge) -> str:
-    """What a recipe says of the edge where it states points; "" for a line or an arc."""
-    if edge.points_mm is None:
+def edge_sentence(recipe: Recipe) -> str:
+    """What a recipe's points make of the blade's edge; "" where it states a line or an arc."""
+    edge = recipe.rig.edge
+    if edge.points_mm is None or recipe.rig.joint == "linear":
         return ""
     curve = stated_curve(edge)
-    pieces = len(curve.edge.spline_m) - 3
-    those = "1 cubic" if pieces == 1 else f"a smooth curve of {pieces} cubics"
+    those = "one cubic" if curve.pieces == 1 else f"a smooth curve of {curve.pieces} cubics"
     use = (
         "Photographs take its place; it only plans the captures."
         if edge.source == "photographs"
         else "It is taken from the recipe, not measured."
     )
     return (
-        f"The edge goes through {len(edge.points_mm)} points of the recipe, from "
-        f"{edge.points_mm[0][0]:g} to {edge.points_mm[-1][0]:g} mm: {those}, which leaves them by "
+        f"The edge follows {len(edge.points_mm)} points of the recipe, from "
+        f"{edge.points_mm[0][0]:g} to {edge.points_mm[-1][0]:g} mm: {those} that leaves them by "
         f"at most {max(1e6 * curve.misfit_m, 0.1):.2g} um. {use}"
     )
 
