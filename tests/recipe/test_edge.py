@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,8 @@ from scissorcal.recipe.show import as_toml, recipe_settings
 POINTS = 'family = "points"\npoints_mm = [[0, -8], [30, -7], [75, -5]]'
 
 
-def text_with(edge: str, **more: str) -> str:
+def text_with(edge: str) -> str:
     text = recipe_path("paper-80gsm").read_text(encoding="utf-8")
-    for old, new in more.items():
-        text = text.replace(f"[{old}]", f"[{old}]\n{new}")
     return re.sub(r"\[rig\.edge\].*?(?=\n\[)", f"[rig.edge]\n{edge}\n", text, flags=re.DOTALL)
 
 
@@ -123,3 +122,10 @@ def test_the_schema_knows_what_each_family_needs(edge: dict[str, Any], right: bo
     whole = Recipe.model_json_schema()
     schema = whole["$defs"]["Edge"] | {"$defs": whole["$defs"]}
     assert Draft202012Validator(schema).is_valid(edge) is right
+
+
+def test_the_example_of_the_documents_says_what_it_prints() -> None:
+    page = (Path(__file__).parents[2] / "docs/files.md").read_text(encoding="utf-8")
+    example = re.search(r"```toml\n\[rig\.edge\]\n(.*?)```", page, re.DOTALL)
+    assert example is not None
+    assert f"note: {edge_sentence(parse_recipe(text_with(example[1])))}\n" in page
