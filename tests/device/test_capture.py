@@ -11,7 +11,6 @@ from scissorcal.device.capture import (
     CaptureReport,
     capture_cut,
     capture_friction,
-    identity_facts,
     open_writer,
     servo_config,
 )
@@ -20,6 +19,7 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.rig_record import identity_facts
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError

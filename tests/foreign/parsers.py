@@ -1,6 +1,7 @@
 """Parsers that do everything wrong, for the child process of `scissorcal.foreign`."""
 
 import ctypes
+import mmap
 import os
 import tempfile
 import time
@@ -9,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from scissorcal.errors import InputError
+
+_KEPT: list[mmap.mmap] = []
 
 
 def good(data: bytes, factor: int = 1) -> dict[str, Any]:
@@ -28,6 +31,16 @@ def grow(data: bytes) -> int:
     kept = []
     while True:
         kept.append(bytes(50_000_000))
+
+
+def keep(data: bytes, size: int) -> int:
+    """Reserves memory for good, as the pools of some libraries do."""
+    _KEPT.append(mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS))
+    return os.getpid()
+
+
+def need(data: bytes, size: int) -> int:
+    return len(bytes(size))
 
 
 def large(data: bytes) -> Any:

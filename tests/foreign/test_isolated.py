@@ -13,6 +13,7 @@ import pytest
 
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.foreign import Format, isolated, parse_isolated
+from scissorcal.foreign.child import MOST_HELD_BYTES
 
 KIND = Format("a test", 10_000, "Write it again.", memory_bytes=600_000_000, processor_s=20)
 HERE = "tests.foreign.parsers"
@@ -91,6 +92,23 @@ def test_limits_of_time_and_of_an_answers_size() -> None:
     assert "unpacks to more than 0.1 GB" in refusal("large", replace(KIND, memory_bytes=10**8)) or (
         "more than 0.1 GB of memory" in refusal("large", replace(KIND, memory_bytes=10**8))
     )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process holds")
+def test_what_an_earlier_parser_keeps_is_not_the_next_files() -> None:
+    more = replace(KIND, memory_bytes=2_000_000_000)
+    kept = parse_isolated(f"{HERE}:keep", b"a", "a.bin", more, size=1_500_000_000)
+    size = 300_000_000
+    assert parse_isolated(f"{HERE}:need", b"a", "b.bin", KIND, size=size) == size
+    assert "more than 0.6 GB of memory" in refusal("grow")
+    assert parse_isolated(f"{HERE}:good", b"a", "a.bin", KIND)["pid"] == kept
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process holds")
+def test_a_child_that_keeps_too_much_is_replaced() -> None:
+    more = replace(KIND, memory_bytes=6_000_000_000)
+    kept = parse_isolated(f"{HERE}:keep", b"a", "a.bin", more, size=MOST_HELD_BYTES)
+    assert parse_isolated(f"{HERE}:good", b"a", "a.bin", KIND)["pid"] != kept
 
 
 def test_words_of_a_library_do_not_mix_with_the_answer(capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,9 +1,7 @@
 """Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from scissorcal.device.advance_trajectory import advance_plan, refuse_without_motor
 from scissorcal.device.capture_gains import (
@@ -27,12 +25,13 @@ from scissorcal.device.loading import Confirm, Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
+from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.device.watching import watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
-from scissorcal.recording.probe import PROBE_KEY, UNKNOWN_REST, ProbeResult, RestFacts
+from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
 
 SUPERVISOR_S = 0.3
 """Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
@@ -251,33 +250,6 @@ def servo_config(
             still_rad=control.still_rad,
         ),
     )
-
-
-def identity_facts(identity: Identity) -> dict[str, Any]:
-    """The identity as plain numbers and strings, for a recording; the hash in hexadecimal."""
-    facts = identity._asdict()
-    del facts["nonce_echo"]
-    return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
-
-
-def rig_facts(identity: Identity, motor_sign: int, probe: ProbeResult | None) -> dict[str, Any]:
-    """What a recording holds of its rig: the identity, a motor sign of -1, and the probe.
-
-    Torques in the recording are of the corrected sign.
-    """
-    facts = identity_facts(identity)
-    if motor_sign != 1:
-        facts["motor_sign"] = motor_sign
-    if probe is not None:
-        facts[PROBE_KEY] = probe.as_dict()
-    return facts
-
-
-def identity_of(facts: Mapping[str, Any]) -> Identity:
-    """The identity that a recording's facts state, as `identity_facts` wrote them."""
-    known = {name: facts[name] for name in Identity._fields if name in facts}
-    known["schema_hash"] = int(str(facts["schema_hash"]), 16)
-    return Identity(**{**known, "nonce_echo": 0})
 
 
 def gains_for(

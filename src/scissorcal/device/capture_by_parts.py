@@ -13,7 +13,6 @@ from scissorcal.device.capture import (
     finish,
     gains_for,
     motion_for,
-    rig_facts,
 )
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
 from scissorcal.device.drive import CaptureProgress, Drive
@@ -23,6 +22,7 @@ from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion
 from scissorcal.device.parts import Part
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe

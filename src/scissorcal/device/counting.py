@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.capture import identity_of, planned
+from scissorcal.device.capture import planned
 from scissorcal.device.completeness import planned_excitation_s
 from scissorcal.device.coverage import (
     NEEDED_S,
@@ -14,6 +14,7 @@ from scissorcal.device.coverage import (
     cut_coverage,
     friction_coverage,
 )
+from scissorcal.device.rig_record import identity_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.load import parse_recipe
@@ -40,7 +41,9 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
     grid.add(recording.samples[label >= 0])
     until = UntilMark.last_of(recording.marks)
     if until is None:
-        strokes, sheets = _plan(recipe, identity_of(recording.device), kind, by_hand)
+        strokes, sheets = _plan(
+            recipe, identity_of(recording.device, recording.source), kind, by_hand
+        )
     else:
         strokes, sheets = _chosen(recording)
     whole = _whole(recording, label)
@@ -129,7 +132,7 @@ def _chosen(recording: Recording) -> tuple[list[list[Any]], list[int]]:
 
 def _grid(recording: Recording, recipe: Recipe, kind: CaptureKind) -> tuple[bool, CoverageGrid]:
     """Whether a hand moved the blades, and the cells of the plan."""
-    identity = identity_of(recording.device)
+    identity = identity_of(recording.device, recording.source)
     if kind == "friction":
         return False, friction_coverage(recipe, identity)
     if kind == "friction-advance":

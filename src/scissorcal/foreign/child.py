@@ -17,6 +17,9 @@ from scissorcal.foreign.plain import FrameError, read_frame, write_frame
 START_S = 120.0
 """Time to start an interpreter; it takes 0.05 s, on a loaded machine some seconds."""
 
+MOST_HELD_BYTES = 4_000_000_000
+"""A child that keeps more after its answer is replaced, since each file may add its own limit."""
+
 _HEAD_BYTES = 1_000_000
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[1:]; "
@@ -90,6 +93,8 @@ class Child:
         if not isinstance(answer, dict):
             self._end()
             raise DiedError("its parser gave no answer.")
+        if answer.pop("held", 0) > MOST_HELD_BYTES:
+            self.close()
         return answer
 
     def close(self) -> None:

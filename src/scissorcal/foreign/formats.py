@@ -14,7 +14,8 @@ class Format:
     """A format of files: its name with an article, its largest size, and what to do about a file.
 
     ``remedy`` is a whole sentence. Where the parser runs in a child process, ``memory_bytes`` is
-    what that may hold, ``processor_s`` the processor time that it has, and ``wall_s`` the time.
+    what a file may add to what that holds, ``processor_s`` the processor time that it has, and
+    ``wall_s`` the time.
     """
 
     name: str

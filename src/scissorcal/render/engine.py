@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.device.capture import rig_facts
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
+from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity, PlateConfig, ServoConfig

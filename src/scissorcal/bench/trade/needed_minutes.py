@@ -6,8 +6,8 @@ from typing import TypeVar
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.capture import identity_of
 from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.rig_record import identity_of
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction
@@ -22,10 +22,10 @@ def needed_minutes(case: Case, friction_speeds: int, cut_speeds: int) -> float |
     sheets and the excitation stay as the recipe has them. None where the recordings do not state
     the rig, or where the recipe cannot be planned on it.
     """
-    device = next((one.device for one in case.friction if "schema_hash" in one.device), None)
-    if device is None:
+    known = next((one for one in case.friction if "schema_hash" in one.device), None)
+    if known is None:
         return None
-    identity, capture = identity_of(device), case.recipe.capture
+    identity, capture = identity_of(known.device, known.source), case.recipe.capture
     fewer = capture.model_copy(
         update={
             "friction": _with_speeds(capture.friction, friction_speeds),

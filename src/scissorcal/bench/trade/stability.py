@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.capture import identity_of
+from scissorcal.device.rig_record import identity_of
 from scissorcal.kernel import ModelTables
 from scissorcal.model import FrictionLaw
 from scissorcal.model.friction import angle_factor
@@ -44,12 +44,12 @@ def known_rig(case: Case) -> Rig | None:
     nothing that damps.
     """
     recordings = (*case.cut, *case.friction)
-    device = next((one.device for one in recordings if "schema_hash" in one.device), None)
-    if device is None or case.friction_fit is None:
+    known = next((one for one in recordings if "schema_hash" in one.device), None)
+    if known is None or case.friction_fit is None:
         return None
-    identity = identity_of(device)
+    identity = identity_of(known.device, known.source)
     rig = fitted_facts(case.friction_fit.parameters, _least_factor(case), "the fit of friction")
-    facts, _ = loop_facts(identity, with_probe(rig, probe_of(device)))
+    facts, _ = loop_facts(identity, with_probe(rig, probe_of(known.device)))
     return None if facts is None else Rig(facts, identity.opening_resolution)
 
 

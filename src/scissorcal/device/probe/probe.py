@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from scissorcal.device.capture import identity_facts
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
@@ -34,6 +33,7 @@ from scissorcal.device.probe.pulses import (
 from scissorcal.device.probe.result import REAL_TIME, Estimate, ProbeResult
 from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
 from scissorcal.device.probe.watchdog import Watchdog, lag_ticks, watchdog
+from scissorcal.device.rig_record import identity_facts
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity

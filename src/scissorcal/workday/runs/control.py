@@ -283,7 +283,7 @@ def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
 def _open_writer(
     path: Path, link: "Link", workspace: Workspace, path_file: Path, probe: "ProbeResult"
 ) -> "RecordingWriter":
-    from scissorcal.device.capture import rig_facts
+    from scissorcal.device.rig_record import rig_facts
     from scissorcal.recording import Joint, RecordingWriter
 
     recipe = workspace.recipe()

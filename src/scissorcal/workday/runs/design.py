@@ -230,7 +230,7 @@ def _known(engine: "Engine") -> tuple["TorqueKnowledge", Any, tuple[str, ...]]:
 
 def _last_identity(workspace: Workspace) -> "Identity | None":
     """The identity that the last recording's rig stated; None where there is none."""
-    from scissorcal.device.capture import identity_of
+    from scissorcal.device.rig_record import identity_of
     from scissorcal.recording import read_header
 
     paths = [path for kind in ("friction", "cut") for path in workspace.recordings(kind)]
@@ -238,7 +238,7 @@ def _last_identity(workspace: Workspace) -> "Identity | None":
     for path in sorted(paths, key=lambda one: one.stem.partition("-")[2], reverse=True):
         device = read_header(path).device
         if device:
-            return identity_of(device)
+            return identity_of(device, str(path))
     return None
 
 

@@ -339,6 +339,6 @@ def _session(
 
 
 def _facts(link: "Link | None", recipe: "Recipe") -> dict[str, Any]:
-    from scissorcal.device.capture import rig_facts
+    from scissorcal.device.rig_record import rig_facts
 
     return {} if link is None else rig_facts(link.identity, recipe.rig.motor_sign, None)

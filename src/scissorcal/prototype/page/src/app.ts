@@ -37,6 +37,10 @@ export class App {
   private readonly panel: RigPanel | null;
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
+  private readonly acts = { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() };
+  private readonly bladesBox = html("label", { hidden: true }, html("input", {
+    type: "checkbox", change: (event) => this.moveBlades((event.target as HTMLInputElement).checked),
+  }), "move the blades");
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
@@ -68,11 +72,11 @@ export class App {
     torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)));
     time.append(html("h2", {}, "The last 8 seconds"));
     this.torque = new TorqueChart(torque, scene);
-    this.time = new TimeChart(time);
+    this.time = new TimeChart(time, scene, this.largestTorque, server !== null);
     this.readout = new Readout(now, scene, server !== null);
     this.controls = new Controls(law, scene, () => this.changed());
     this.panel = server ? new RigPanel(rig, server, (samples) => this.rig.follow(samples)) : null;
-    takeInput(this.drawing, this.rig, scene, { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() });
+    takeInput(canvas, this.rig, scene, this.acts);
     this.changed();
     this.rig.freshSheet();
   }
@@ -181,7 +185,7 @@ export class App {
       button("Strokes", () => this.play(madeHand(this.scene))),
       ...this.scene.hands.map((hand) => button(`Hand of ${hand.name}`, () => this.play(recordedHand(hand)))),
       button("Fresh sheet", () => this.rig.freshSheet()),
-      box("3-D", (isOn) => this.show3d(isOn)), box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
+      box("3-D", (isOn) => this.show3d(isOn)), this.bladesBox, box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
   }
 
   private play(script: Parameters<Rig["play"]>[0]): void {
@@ -192,7 +196,17 @@ export class App {
   private show3d(isOn: boolean): void {
     this.solid.hidden = !isOn;
     this.drawing.canvas.hidden = isOn;
-    if (isOn) this.view3d ??= new View3d(this.solid);
+    if (isOn && !this.view3d) this.open3d();
+    this.bladesBox.hidden = !isOn || !this.view3d?.canvas;
+  }
+
+  private open3d(): void {
+    const view = this.view3d = new View3d(this.solid);
+    if (view.canvas) takeInput(view.canvas, this.rig, this.scene, this.acts, { movesBlades: () => view.movesBlades, way: () => view.way });
+  }
+
+  private moveBlades(isOn: boolean): void {
+    if (this.view3d) this.view3d.movesBlades = isOn;
   }
 
   private openDesign(details: HTMLDetailsElement, section: HTMLElement): void {

@@ -1,0 +1,62 @@
+"""What a recording holds of its rig: the identity that it stated, its motor's sign, its probe."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, get_type_hints
+
+from scissorcal.errors import InputError
+from scissorcal.kernel.messages import Identity
+from scissorcal.recording.probe import PROBE_KEY, ProbeResult
+
+
+def rig_facts(identity: Identity, motor_sign: int, probe: ProbeResult | None) -> dict[str, Any]:
+    """What a recording holds of its rig: the identity, a motor sign of -1, and the probe.
+
+    Torques in the recording are of the corrected sign.
+    """
+    facts = identity_facts(identity)
+    if motor_sign != 1:
+        facts["motor_sign"] = motor_sign
+    if probe is not None:
+        facts[PROBE_KEY] = probe.as_dict()
+    return facts
+
+
+def identity_facts(identity: Identity) -> dict[str, Any]:
+    """The identity as plain numbers and strings, for a recording; the hash in hexadecimal."""
+    facts = identity._asdict()
+    del facts["nonce_echo"]
+    return {**facts, "schema_hash": f"{identity.schema_hash:016x}"}
+
+
+def identity_of(facts: Mapping[str, Any], source: str) -> Identity:
+    """The identity that the facts of the recording ``source`` state, as `identity_facts` wrote it.
+
+    Raises InputError, which names ``source`` and the field, where one is missing or no number.
+    """
+    found: dict[str, Any] = {"nonce_echo": 0}
+    for name, kind in get_type_hints(Identity).items():
+        value = facts.get(name)
+        if name == "schema_hash" and isinstance(value, str):
+            value = _hexadecimal(value)
+        if name not in found and not _is(value, kind):
+            raise InputError(
+                f"{source or 'The recording'} is damaged: what it holds of its rig has no {name} "
+                "that is a number or text as a rig states it. Capture again, or restore it from a "
+                "backup."
+            )
+        found.setdefault(name, value)
+    return Identity(**found)
+
+
+def _is(value: Any, kind: type) -> bool:
+    if kind is float and not isinstance(value, bool):
+        return isinstance(value, int | float) and math.isfinite(value)
+    return type(value) is kind
+
+
+def _hexadecimal(text: str) -> int | None:
+    try:
+        return int(text, 16)
+    except ValueError:
+        return None

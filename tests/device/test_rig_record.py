@@ -1,0 +1,51 @@
+"""What a recording holds of its rig: it comes back, and whatever else stands there is refused."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scissorcal.device.rig_record import identity_facts, identity_of
+from scissorcal.errors import InputError
+from scissorcal.kernel.messages import Identity
+from tests.bench.trade.cases import IDENTITY
+
+FACTS = identity_facts(IDENTITY)
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=5,
+)
+
+
+def test_an_identity_comes_back_from_json() -> None:
+    facts = json.loads(json.dumps(FACTS))
+    assert identity_of(facts, "a.mcap") == IDENTITY._replace(nonce_echo=0)
+
+
+@given(st.sampled_from(sorted(FACTS)), PLAIN)
+def test_a_field_of_another_kind_is_refused_by_name(name: str, value: object) -> None:
+    found = outcome({**FACTS, name: value})
+    if isinstance(found, str):
+        assert found.startswith("a.mcap is damaged")
+        assert f" no {name} " in found
+        return
+    stated, kind = getattr(found, name), Identity.__annotations__[name]
+    assert type(stated) is kind or (kind is float and math.isfinite(stated))
+
+
+def outcome(facts: dict[str, object]) -> Identity | str:
+    """The identity of some facts, or the sentence that refuses them."""
+    try:
+        return identity_of(facts, "a.mcap")
+    except InputError as refusal:
+        return str(refusal)
+
+
+@pytest.mark.parametrize("name", sorted(FACTS))
+def test_a_field_that_is_missing_is_named(name: str) -> None:
+    facts = {key: value for key, value in FACTS.items() if key != name}
+    with pytest.raises(InputError, match=f"no {name} "):
+        identity_of(facts, "a.mcap")
