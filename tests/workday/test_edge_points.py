@@ -202,11 +202,29 @@ def test_the_report_shows_the_points(workspace: Workspace) -> None:
     assert len(drawn[1]["x"]) == 40
 
 
+def test_other_points_make_the_fit_stale_and_the_friction_not(workspace: Workspace) -> None:
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    assert states(workspace)["fit cut"] == "done"
+    try:
+        workspace.recipe_path.write_text(recipe_of_points(lift_mm=0.01), encoding="utf-8")
+        found = states(workspace)
+        assert (found["fit cut"], found["fit friction"]) == ("stale", "done")
+        assert found["capture cut"] == "done"
+    finally:
+        workspace.recipe_path.write_text(text, encoding="utf-8")
+
+
+def states(workspace: Workspace) -> dict[str, str]:
+    """Of what is there, whether or not it was verified."""
+    return {
+        step.name: "done" if step.state == "unverified" else step.state
+        for step in make_plan(workspace).steps
+    }
+
+
 def test_a_package_of_other_points_is_refused(workspace: Workspace, package: ModelPackage) -> None:
-    """Unless only the writing of the points changed, the cut has to be fitted again."""
     recipe = parse_recipe(recipe_of_points(lift_mm=0.01))
-    results = (load_result(Engine.of(workspace), what) for what in ("friction", "cut"))
-    friction, cut = results
+    friction, cut = (load_result(Engine.of(workspace), what) for what in ("friction", "cut"))
     with pytest.raises(InputError, match=r"another rig\.edge\.points_mm.*scissorcal fit"):
         build_package(recipe, friction, cut, workspace.root / "no.zip", np.random.default_rng(0))
     line = parse_recipe(recipe_of_line())
