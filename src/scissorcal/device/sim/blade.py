@@ -107,11 +107,14 @@ class BladeOnSheet:
     def energy(self, opening: float, contact: float) -> float:
         """Energy in joules that the sheet stores, all moving blades together."""
         beta = opening / self.moving
-        beyond = self._place(math.sin(beta), math.cos(beta), contact)[0] - self.length
+        sine, cosine = math.sin(beta), math.cos(beta)
+        station, edge, _ = self._place(sine, cosine, contact)
+        beyond = station - self.length
         weight = 1.0 if beyond <= 0.0 else self._fading(beyond)[0]
         if weight == 0.0:
             return 0.0
-        return self.moving * weight * self.response.energy(self.indentation(opening, contact))
+        indentation = self.upper_face - station * sine - edge * cosine
+        return self.moving * weight * self.response.energy(indentation)
 
     def crossing(self, opening: float) -> float:
         """Distance from the pivot at which the edge passes the sheet's upper face.
