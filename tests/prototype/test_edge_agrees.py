@@ -9,11 +9,13 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
+from scissorcal.errors import InputError
 from scissorcal.kernel.tables import Table
 from scissorcal.model.edge import Edge
 from scissorcal.model.edge_points import edge_through
 from scissorcal.package.tables import hermite
 from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe.load import parse_recipe
 from tests.browser import open_browser
 from tests.model.golden_edges import golden
 from tests.prototype.design_bed import Bed, open_bed
@@ -122,8 +124,23 @@ def test_a_recipe_keeps_every_digit_of_the_points(bed: Bed) -> None:
     assert back["edge"]["points_mm"] == points
     again = recipe_of(bed, back, text)
     assert tomllib.loads(again)["rig"]["edge"] == stated
-    edge, _ = edge_through(1e-3 * np.array(stated["points_mm"]))
+    edge = parse_recipe(again).rig.edge
+    assert edge.points_mm == tuple(tuple(point) for point in points)
     assert edge.length_m == 0.075
+
+
+def test_recipe_and_page_refuse_the_same_points_by_the_same_sentence(bed: Bed) -> None:
+    base = recipe_path("paper-80gsm").read_text(encoding="utf-8")
+    head, tail = base.split("[rig.edge]")
+    tail = tail.partition("\n\n")[2]
+    for case in golden()["refused"]:
+        points_mm = (1e3 * np.array(case["points_m"])).tolist()
+        stated = f'{head}[rig.edge]\nfamily = "points"\npoints_mm = {points_mm}\n\n{tail}'
+        found = bed.run("(text) => tried(() => drawnFromRecipe(text))", stated)["refused"]
+        assert found.startswith("rig.edge.points_mm cannot be an edge: ")
+        with pytest.raises(InputError) as refused:
+            parse_recipe(stated)
+        assert found.removeprefix("rig.edge.").rstrip(".") in str(refused.value)
 
 
 def test_what_a_recipe_says_besides_the_shape_stays(bed: Bed) -> None:

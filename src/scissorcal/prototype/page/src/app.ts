@@ -16,18 +16,19 @@ import { Rig } from "./rig";
 import { RigPanel } from "./rig_panel";
 import { Ripple } from "./ripple";
 import { Scene, unpack } from "./scene";
-import { Server } from "./socket";
+import { RigSamples, Server } from "./socket";
 import { View, View3d } from "./view3d";
 
-const CHARTS_EVERY_ms = 50;
-const AT_REST_ms = 250;
+const CHARTS_EVERY_ms = 100; // as the numbers: each costs as much processor time as six pictures of the blades
+const AT_REST_ms = 250; // nothing changes then but colours and sizes
+const STIRS = ["pointerdown", "pointerup", "keydown", "wheel", "input", "change", "click", "resize", "visibilitychange"];
 
 export class App {
   readonly rig: Rig;
   readonly average: Average;
   readonly controls: Controls;
-  /** Frames drawn, and seconds since the first: frames per second. */
-  readonly frames = { count: 0, seconds: 0 };
+  /** Pictures and charts drawn, and seconds since the first. */
+  readonly frames = { count: 0, charts: 0, seconds: 0 };
   laws: { fitted: Law; whatIf: Law };
   private readonly fitted: Law;
   private readonly drawing: Drawing;
@@ -46,7 +47,9 @@ export class App {
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
   private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: both curves are the law with these, the shaded interval and the measured lines are of the blades as fitted.");
-  private drawnAt = 0;
+  /** Timer of the next picture while the blades stand still, else 0. */
+  private resting = 0;
+  private stirredAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
   private readonly largestTorque: number;
@@ -77,14 +80,16 @@ export class App {
     this.time = new TimeChart(time, scene, this.largestTorque, server !== null);
     this.readout = new Readout(now, scene, server !== null);
     this.controls = new Controls(law, scene, () => this.changed());
-    this.panel = server ? new RigPanel(rig, server, (samples) => this.rig.follow(samples)) : null;
+    this.panel = server ? new RigPanel(rig, server, (samples) => this.follow(samples)) : null;
     takeInput(canvas, this.rig, scene, this.acts);
     this.changed();
     this.rig.freshSheet();
   }
 
   run(): void {
-    requestAnimationFrame((now) => this.frame(now));
+    for (const name of STIRS) window.addEventListener(name, () => this.stir(), { capture: true });
+    window.addEventListener("pointermove", (event) => event.buttons && this.stir(), { capture: true });
+    this.next();
   }
 
   /** Torque (N m) of the average law: what open_package(...).torque gives at these places. */
@@ -93,27 +98,53 @@ export class App {
     return Array.from(this.average.torque(Float32Array.from(openings), rate, contact));
   }
 
+  /** Sixty pictures a second while something moves, four at rest: then each would cost as much for nothing. */
   private frame(now: number): void {
-    const seconds = this.before ? (now - this.before) / 1e3 : 0;
-    this.before = now;
-    this.frames.count += seconds ? 1 : 0;
-    this.frames.seconds += seconds;
     const { rig } = this;
-    rig.pass(seconds);
+    this.pass(now);
+    this.frames.count += 1;
     this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
-    // at rest nothing changes but colours and sizes: four pictures a second are enough
-    if (rig.isStill && now - this.drawnAt < AT_REST_ms) return this.run();
-    this.drawnAt = now;
     this.draw();
     this.readout.show(rig, now, rig.isFollowing ? this.panel?.recent.newestTorque : undefined);
-    if (now - this.chartedAt >= CHARTS_EVERY_ms) {
-      this.chartedAt = now;
-      if (rig.strokeContact !== this.curvesAt) this.showCurves();
-      this.torque.draw(rig);
-      this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
-    }
-    this.run();
+    if (now - this.chartedAt >= CHARTS_EVERY_ms) this.chart(now);
+    if (rig.isStill && now - this.stirredAt > AT_REST_ms) this.resting = window.setTimeout(() => this.next(), AT_REST_ms);
+    else this.next();
+  }
+
+  private next(): void {
+    this.resting = 0;
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Something may move now: the time until then has passed at rest. */
+  private stir(): void {
+    this.stirredAt = performance.now();
+    if (!this.resting) return;
+    window.clearTimeout(this.resting);
+    this.pass(performance.now());
+    this.next();
+  }
+
+  private pass(now: number): void {
+    const seconds = this.before ? Math.max(now - this.before, 0) / 1e3 : 0;
+    this.before = Math.max(now, this.before);
+    this.frames.seconds += seconds;
+    this.rig.pass(seconds);
+  }
+
+  private follow(samples: RigSamples): void {
+    this.stir();
+    this.rig.follow(samples);
+  }
+
+  private chart(now: number): void {
+    const { rig } = this;
+    this.chartedAt = now;
+    this.frames.charts += 1;
+    if (rig.strokeContact !== this.curvesAt) this.showCurves();
+    this.torque.draw(rig);
+    this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
   }
 
   private draw(): void {
@@ -131,6 +162,7 @@ export class App {
   /** A choice of the law changed: load both laws, and draw their curves. */
   private changed(): void {
     const { choices } = this.controls;
+    this.stir();
     const other = choices.draw === null
       ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
     this.laws = { fitted: this.withBlades(this.fitted), whatIf: this.withBlades(other) };

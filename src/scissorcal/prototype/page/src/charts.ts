@@ -31,6 +31,8 @@ export class TorqueChart {
   private readonly measured: Row[];
   private curves: Curves = { fitted: null, whatIf: null, draw: null };
   private theme = "";
+  /** What is drawn: nothing is drawn again that has not changed. */
+  private drawn: unknown[] = [];
 
   private readonly container = html("div", { class: "chart" });
 
@@ -49,6 +51,9 @@ export class TorqueChart {
 
   draw(rig: Rig): void {
     this.theme = rebuiltWhere(this.theme, this.container, () => this.build());
+    const now = [this.theme, this.curves, rig.strokeContact, rig.stroke, rig.stroke.length];
+    if (now.every((one, i) => one === this.drawn[i])) return;
+    this.drawn = now;
     const band = this.scene.bands.find((one) => !one.friction && one.rate < 0);
     const [low, high] = band ? bandAt(band, rig.strokeContact, this.openings) : [[], []];
     const live = latest(rig.stroke, this.openings);
