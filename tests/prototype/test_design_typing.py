@@ -75,6 +75,18 @@ def test_what_is_selected_in_a_field_stays_selected(bed: Bed) -> None:
     assert outline(bed)[1] == [60, -30]
 
 
+def test_a_number_that_changes_under_a_selection_is_replaced_by_what_is_typed(bed: Bed) -> None:
+    page = bed.page
+    page.get_by_label("Width, mm").fill("60")
+    page.keyboard.press("Enter")
+    page.get_by_label("x of corner 2, mm").select_text()  # 120 as yet
+    redrawn(bed)
+    assert page.get_by_label("x of corner 2, mm").input_value() == "60"
+    page.keyboard.insert_text("7")
+    page.keyboard.press("Enter")
+    assert outline(bed)[1] == [7, -30]
+
+
 def test_numbers_of_two_fields_before_the_tables_are_both_taken(bed: Bed) -> None:
     page = bed.page
     page.get_by_label("Thickness, mm").fill("0.3")

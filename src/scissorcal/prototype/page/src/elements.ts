@@ -115,11 +115,14 @@ function renew(old: Element, fresh: Element, focused: HTMLElement, next: HTMLEle
 /** Attributes and listeners of a successor; what is typed and not yet taken stays as it is. */
 function succeed(kept: Element, other: Element): void {
   const isTyped = kept instanceof HTMLInputElement && kept.type !== "range" && kept.value !== kept.defaultValue;
+  const before = kept instanceof HTMLInputElement ? kept.value : "";
   for (const { name } of [...kept.attributes]) if (!other.hasAttribute(name)) kept.removeAttribute(name);
   for (const { name, value } of other.attributes) if (kept.getAttribute(name) !== value) kept.setAttribute(name, value);
   if (other instanceof HTMLInputElement && kept instanceof HTMLInputElement) {
     kept.checked = other.checked;
-    if (!isTyped && kept.value !== other.value) kept.value = other.value;
+    if (!isTyped) kept.value = other.value;
+    // as when it got the focus: what is typed takes the place of the other value
+    if (kept.value !== before && kept === document.activeElement) kept.select();
   }
   const [own, others] = [listeners.get(kept), listeners.get(other)];
   for (const name of own?.keys() ?? []) if (!others?.has(name)) own?.delete(name);
