@@ -14,12 +14,8 @@ OPENINGS, CONTACTS = 48, 24
 STEP_RAD = 1e-3
 """Opening over which a slope is taken: some hundred steps of float32 in torque, and an indentation
 change of some 20 um."""
-BINS = 25
 WIDENINGS = 8
 """Rounds in which intervals are widened; each takes most of what is too steep."""
-STROKE_TICKS = 4000
-LEAST_SHARE = 0.05
-"""Of a stroke's largest torque; the cost of derating is compared where torque is above."""
 
 
 @dataclass(frozen=True)
@@ -149,30 +145,6 @@ def _steepest_inside(width: Array, rise: Array, slope: Array) -> Array:
     )
     inside = first + turn * (2.0 * second + 3.0 * turn * third)
     return np.asarray(np.maximum(inside, np.maximum(first, last)) / width)
-
-
-def felt_change(tables: ModelTables, other: ModelTables, torque_limit: float) -> float:
-    """Relative rms difference of torque, averaged over its ripple, in one closing stroke.
-
-    Torque is held to its limit, as it is rendered, and averaged in 25 bins of opening. The blades
-    close over the scene's openings: on a sheet whose near edge is at the scene's nearest contact,
-    or, where nothing is cut, at the middle of its contacts. Zero where no torque is felt.
-    """
-    one, two = (np.minimum(_stroke(each), torque_limit) for each in (tables, other))
-    felt = one > LEAST_SHARE * one.max()
-    if not felt.any() or one.max() <= 0.0:
-        return 0.0
-    return float(np.sqrt(np.mean((two - one)[felt] ** 2) / np.mean(one[felt] ** 2)))
-
-
-def _stroke(tables: ModelTables) -> Array:
-    quiet = replace(tables, render_friction=False)
-    kernel = Kernel(quiet)
-    pressed = 0.5 * (tables.contact_min + tables.contact_max)
-    kernel.reset(tables.contact_min if tables.fracture_energy > 0.0 else pressed)
-    opening = np.linspace(tables.opening_max, tables.opening_min, STROKE_TICKS)
-    torque = kernel.step_many(opening, 0.0, 0.0)["torque"].astype(np.float64)
-    return np.asarray(torque.reshape(BINS, -1).mean(axis=1))
 
 
 def _friction(tables: ModelTables) -> float:
