@@ -141,7 +141,8 @@ def test_overlapping_pieces_need_a_stiffer_rig(package: ModelPackage) -> None:
     sheet = needs_on(package.tables, limit, ())
     one = needs_on(package.tables, limit, package.pieces[:1])
     stack = needs_on(package.tables, limit, (package.pieces[0], package.pieces[0]))
-    assert one.stiffness == pytest.approx(sheet.stiffness, rel=1e-3)
+    assert one.found <= sheet.stiffness * 1.01
+    assert sheet.stiffness <= one.stiffness < 1.1 * sheet.stiffness
     assert stack.stiffness == pytest.approx(2.0 * one.stiffness, rel=1e-6)
 
 

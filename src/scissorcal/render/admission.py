@@ -21,7 +21,7 @@ from scissorcal.render.admission_rule import (
     allowed_stiffness,
 )
 from scissorcal.render.cures import stated_cures
-from scissorcal.render.derating import Needs, needs_on, softened
+from scissorcal.render.derating import Needs, needs_on, softened, stiffness_on
 from scissorcal.render.felt_cost import felt_change
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
@@ -40,7 +40,9 @@ class Admission:
 
     ``allowed_alone`` and ``allowed_in_hand`` are the rule's stiffness without and with the hand's
     damping ``hand_damping_Nm_s_per_rad``; ``needed`` the package's largest over the scene, at
-    ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``steepest_N_per_m``
+    about ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. Of a drawn plate
+    both are proved bounds, and ``needed_found`` is the largest slope that its strokes show; of the
+    uniform sheet it is ``needed``. ``steepest_N_per_m``
     is to what the response was limited (None: not derated), ``felt_share`` the relative rms change
     of mean torque that this costs (`felt_cost.felt_change`) in what is cut: a stroke through the
     uniform sheet, or those through the drawn plate (``is_drawn``); ``felt_sheet_share`` is that of
@@ -56,6 +58,7 @@ class Admission:
     allowed_alone: float
     allowed_in_hand: float
     needed: float
+    needed_found: float
     needed_at: tuple[float, float]
     rendered: float
     drop_Nm: float
@@ -135,6 +138,7 @@ def admit(
         allowed_alone=alone,
         allowed_in_hand=held,
         needed=needs.stiffness,
+        needed_found=needs.found,
         needed_at=(needs.opening, needs.contact),
         rendered=left,
         drop_Nm=needs.drop_Nm,
@@ -146,7 +150,7 @@ def admit(
         friction_width_rad=_friction_width(needs, facts, held),
         sources=(),
         reasons=(
-            *_reasons(needs, facts, (alone, held), left),
+            *_reasons(needs, facts, (alone, held), is_drawn=bool(pieces)),
             *_cost(needs, left, felt, is_drawn=bool(pieces)),
             *_damped(needs, damping),
         ),
@@ -211,6 +215,7 @@ def _unchecked(needs: Needs, hand: float, *, is_drawn: bool) -> Admission:
         allowed_alone=math.nan,
         allowed_in_hand=math.nan,
         needed=needs.stiffness,
+        needed_found=needs.found,
         needed_at=(needs.opening, needs.contact),
         rendered=needs.stiffness,
         drop_Nm=needs.drop_Nm,
@@ -248,7 +253,7 @@ def _soften(
         return None, needed
     while left > allowed and left > LEAST_FACTOR * needed:
         steepest *= max(0.999 * allowed / left, 0.5)
-        left = needs_on(softened(tables, steepest), limit, pieces).stiffness
+        left = stiffness_on(softened(tables, steepest), limit, pieces)
     return steepest, left
 
 
@@ -264,11 +269,14 @@ def _felt(
 
 
 def _reasons(
-    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], left: float
+    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], *, is_drawn: bool
 ) -> tuple[str, ...]:
     place = f"{math.degrees(needs.opening):.0f} deg, contact {needs.contact * 1e3:.0f} mm"
+    known = f"at {place}"
+    if is_drawn:
+        known += f"; a bound for any motion, {needs.found:.3g} N m/rad are found in strokes"
     return (
-        f"The package needs up to {needs.stiffness:.3g} N m/rad (at {place}); this rig renders "
+        f"The package needs up to {needs.stiffness:.3g} N m/rad ({known}); this rig renders "
         f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "
         f"{facts.delay_s * 1e3:.2g} ms of delay.",
     )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel
 
 Array = NDArray[np.float64]
+Stroke = tuple[Array, Array, NDArray[np.bool_]]
 
 BINS = 25
 STROKE_TICKS = 4000
@@ -47,9 +48,7 @@ def felt_change(
     return float(np.sqrt(np.mean((two - one)[felt] ** 2) / np.mean(one[felt] ** 2)))
 
 
-def plate_strokes(
-    tables: ModelTables, pieces: Sequence[Piece]
-) -> tuple[tuple[Array, Array, NDArray[np.bool_]], ...]:
+def plate_strokes(tables: ModelTables, pieces: Sequence[Piece]) -> tuple[Stroke, ...]:
     """The closing strokes that cut a drawn plate: of each (opening, advance, whether it counts).
 
     Each closes over the scene's openings, after the plate was moved into the open blades until the
@@ -62,7 +61,8 @@ def plate_strokes(
     opening = np.concatenate([np.full(APPROACH_TICKS, tables.opening_max), closing])
     counts = np.arange(len(opening)) >= APPROACH_TICKS
     middle = 0.5 * (tables.contact_min + tables.contact_max)
-    done, before, strokes = -np.inf, None, []
+    done, before = -np.inf, None
+    strokes: list[Stroke] = []
     while len(strokes) < MOST_STROKES:
         front = _next_front(model, done)
         if front is None:
@@ -92,7 +92,7 @@ def _next_front(model: PiecesModel, done: float) -> tuple[float, bool] | None:
 def _cut(
     tables: ModelTables,
     pieces: Sequence[Piece],
-    strokes: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+    strokes: Sequence[Stroke],
 ) -> Array:
     """Torque (ticks that count,) of a fresh plate along the strokes."""
     model = PiecesModel(tables, pieces)
